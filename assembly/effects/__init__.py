@@ -1,6 +1,6 @@
-"""Effects that the declared model of a robot may lack, each in a separate module.
+"""Library of effects that a declared robot model may lack, one module per effect.
 
-Begin at ``effect.py``, which defines an effect.  ``library.py`` adds the effects of
+Start with ``effect.py``, which defines an effect.  ``library.py`` adds the effects of
 other distributions.  Effects are applied in the order of :data:`LIBRARY`.  Friction
 acts on a joint's spring, so drive compliance comes before friction.  The elastic
 foundation adds a frame, so it comes last.
@@ -59,10 +59,10 @@ def apply_effects(conditions: Conditions, effects: Mapping[str, Values]) -> Cond
 
     Args:
         conditions: conditions without these effects.
-        effects: for each effect its parameters by public name.
+        effects: parameters of each effect by public name.
 
     Returns:
-        The conditions changed by all of these effects.
+        The conditions with all of these effects applied.
 
     Raises:
         KeyError: an effect is not in the library.
@@ -77,14 +77,14 @@ def apply_effects(conditions: Conditions, effects: Mapping[str, Values]) -> Cond
 
 
 def apply_known(conditions: Conditions, robot: Robot) -> Conditions:
-    """Return the conditions with all effects that a robot's file declares.
+    """Apply all effects that are declared in the file of a robot.
 
     Args:
-        conditions: conditions of the robot without effects, R rows.
+        conditions: conditions of R measurements of the robot without effects.
         robot: robot with these effects.
 
     Returns:
-        The conditions with the robot's effects, those of each session, and its
+        The conditions with the effects of the robot and of each session, and with its
         functions.
     """
     recorded = conditions

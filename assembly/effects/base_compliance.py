@@ -18,14 +18,14 @@ def _apply(conditions: Conditions, values: Values) -> Conditions:
 
 
 def on_foundation(conditions: Conditions) -> Conditions:
-    """Return conditions with a new frame at the base that carries all other frames.
+    """Insert a frame between the base and all other frames.
 
     Args:
-        conditions: R rows.
+        conditions: conditions of R measurements.
 
     Returns:
-        The conditions; the new frame is the first frame.  If the robot already has such
-        a frame, the conditions are unchanged.
+        The conditions, in which the new frame comes first.  They are unchanged if the
+        robot already has such a frame.
     """
     feet = [f for f in conditions.robot.frames if f.parent == BASE]
     foot = feet[0]
@@ -53,12 +53,12 @@ def _standing(conditions: Conditions, robot: Robot) -> Conditions:
 
 
 def with_foundation(robot: Robot, values: Values) -> Robot:
-    """Return a robot on an elastic foundation, a frame between base and ground.
+    """Place a robot on an elastic foundation, a frame between base and ground.
 
     Args:
         robot: robot on a rigid base.
         values: ``stiffness.rx`` .. ``stiffness.tz`` [N m/rad, N/m]; the foundation is
-            rigid in directions that are not given.
+            rigid in unspecified directions.
 
     Returns:
         The robot on its foundation.
@@ -74,7 +74,7 @@ def with_foundation(robot: Robot, values: Values) -> Robot:
 
 
 def _public(robot: Robot, values: Values) -> dict[str, float]:
-    """Return stiffnesses from compliances; negative for a stiffer foundation."""
+    """Convert compliances to stiffnesses; negative for a stiffer foundation."""
     return {
         f"stiffness.{name.removeprefix('compliance.')}": 1 / c
         for name, c in values.items()

@@ -1,9 +1,9 @@
-"""Mass and centre of mass of a body that differ from the declared values.
+"""Deviation of a body's mass and centre of mass from their declared values.
 
 Let m and c be the declared mass and centre, and M and C the true ones.  The parameter
 ``mass`` is M - m, and ``moment`` is M C - m c.  The weight is linear in both; the true
-centre is (m c + moment)/M.  Moments of inertia do not influence the weight and remain
-as declared.
+centre is (m c + moment)/M.  Moments of inertia do not influence the weight and are
+unchanged.
 """
 
 from dataclasses import replace

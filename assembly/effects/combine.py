@@ -1,8 +1,8 @@
-"""Combination of a declared effect with a difference that a diagnosis identified.
+"""Combine a declared effect with an effect identified by a diagnosis.
 
-Effects act in sequence: first the declared one, then the identified one.  Both together
-are equivalent to a single effect with other parameters: offsets and compliances are
-added, factors multiplied, eccentricities added as vectors, rotations of frames
+The declared effect acts first, followed by the identified one.  Together they are
+equivalent to a single effect with modified parameters: offsets and compliances are
+added, factors multiplied, eccentricities added as vectors, and frame rotations
 composed.
 """
 
@@ -19,19 +19,19 @@ Effects = Mapping[str, Values]
 
 
 def combined(declared: Effects, found: Effects) -> dict[str, dict[str, float]]:
-    """Return the effects of a robot's file combined with additional effects.
+    """Combine the effects declared in a robot file with additional effects.
 
     Args:
-        declared: for each effect of the file its parameters by public name.
-        found: for each additional effect, which acts after the declared one, its
-            parameters by public name.
+        declared: parameters of each effect in the file, by public name.
+        found: parameters of each additional effect by public name.  Additional effects
+            act after declared ones.
 
     Returns:
-        Parameters of the single effects that are equivalent to both in sequence.
+        Parameters of the equivalent single effects.
 
     Raises:
-        ValueError: no single effect is equivalent, as for two contact laws in one
-            joint, or two drifts with different time constants.
+        ValueError: no equivalent single effect exists, for example for two contact laws
+            in one joint or two drifts with different time constants.
     """
     both = {name: dict(values) for name, values in declared.items()}
     for name, values in found.items():
@@ -44,12 +44,12 @@ def combined(declared: Effects, found: Effects) -> dict[str, dict[str, float]]:
 
 
 def _sum(declared: Values, found: Values) -> dict[str, float]:
-    """Return for each parameter the sum of its declared and its found value."""
+    """Add the declared and the identified value of each parameter."""
     return dict(declared) | {k: declared.get(k, 0.0) + v for k, v in found.items()}
 
 
 def _in_series(declared: Values, found: Values) -> dict[str, float]:
-    """Return the stiffnesses of springs in series; a missing spring is rigid."""
+    """Return the stiffness of springs in series; a missing spring is rigid."""
     both = {k: 1 / v for k, v in declared.items()}
     for k, v in found.items():
         both[k] = both.get(k, 0.0) + 1 / v
@@ -57,12 +57,12 @@ def _in_series(declared: Values, found: Values) -> dict[str, float]:
 
 
 def _product(declared: Values, found: Values) -> dict[str, float]:
-    """Return for each parameter the product of its declared and its found factor."""
+    """Multiply the declared and the identified factor of each parameter."""
     return dict(declared) | {k: declared.get(k, 1.0) * v for k, v in found.items()}
 
 
 def _load(declared: Values, found: Values) -> dict[str, float]:
-    """Return the combined load gains; the found gain acts after the declared gain."""
+    """Combine load gains; the identified gain acts after the declared one."""
     factor = found.get("factor", 1.0)
     offsets = {k: factor * v for k, v in declared.items() if k != "factor"}
     more = {k: v for k, v in found.items() if k != "factor"}
@@ -70,7 +70,7 @@ def _load(declared: Values, found: Values) -> dict[str, float]:
 
 
 def _eccentricity(declared: Values, found: Values) -> dict[str, float]:
-    """Return amplitude and phase of the sum of two sines of one angle."""
+    """Return amplitude and phase of the sum of two sines of the same angle."""
     both = dict(declared)
     for key, amplitude in found.items():
         name, _, kind = key.rpartition(".")
@@ -84,7 +84,7 @@ def _eccentricity(declared: Values, found: Values) -> dict[str, float]:
 
 
 def _registration(declared: Values, found: Values) -> dict[str, float]:
-    """Return the composition of the declared and the found registration."""
+    """Compose the declared and the identified registration."""
     first, second = (np.array([v.get(k, 0.0) for k in BASE]) for v in (declared, found))
     R = rotation_matrix(second[:3])
     turn = rotation_vector(R @ rotation_matrix(first[:3]))
@@ -94,26 +94,26 @@ def _registration(declared: Values, found: Values) -> dict[str, float]:
 
 
 def _drift(declared: Values, found: Values) -> dict[str, float]:
-    """Return the summed amplitudes, with the common time constant."""
+    """Add the amplitudes of drifts that share a time constant."""
     constant = declared["time_constant"]
     if not math.isclose(found["time_constant"], constant, rel_tol=1e-9):
         raise ValueError(
-            "two drifts of different time constants cannot be combined into one drift"
+            "two drifts with different time constants cannot be combined into one drift"
         )
     return {**_sum(declared, found), "time_constant": constant}
 
 
 def _contact(declared: Values, found: Values) -> dict[str, float]:
-    """Return the combined contact laws, which must be in different joints."""
+    """Combine contact laws, which must belong to different joints."""
     if set(declared) & set(found):
         raise ValueError(
-            "two contact laws of one joint in series cannot be combined into one law"
+            "two contact laws in series at one joint cannot be combined into one law"
         )
     return {**declared, **found}
 
 
 def _delayed(declared: Values, found: Values) -> dict[str, float]:
-    """Return the combined expansions; those of one body need equal time constants."""
+    """Combine expansions; those of the same body must have equal time constants."""
     both = _sum(declared, found)
     for key in set(declared) & set(found):
         if key.endswith(".time_constant"):

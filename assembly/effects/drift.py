@@ -11,7 +11,7 @@ from forcefit.stiffness.screws import SCREW
 
 _AMPLITUDE = tuple(f"amplitude.{axis.lower()}" for axis in SCREW)
 
-# start values of the time constant in a search, relative to the campaign's duration
+# initial guesses for the time constant, relative to the duration of the campaign
 _SCAN = (0.03, 0.1, 0.3, 1.0, 3.0)
 
 

@@ -1,4 +1,4 @@
-"""An effect: a property that a declared model lacks, as a change of conditions."""
+"""Definition of an effect, which modifies the conditions of a declared model."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -12,18 +12,18 @@ RIGID = 1e-12  # [rad/(N m), m/N] fitted compliance below which a part counts as
 
 @dataclass(frozen=True)
 class Unknown:
-    """An unknown of the fit, chosen so that the model is nearly linear in it.
+    """An unknown of a fit, chosen so that the model is nearly linear in it.
 
     Attributes:
-        name: name of a parameter, or of a part of a parameter.  For an effect that acts
-            at frames, the name is appended to the frame's name (``""`` if the frame's
-            name is sufficient).
-        scale: plausible absolute value, in the unit of the parameter or of its part.
+        name: name of a parameter, or of part of a parameter.  For an effect that acts
+            at frames, the name is appended to the name of the frame (``""`` if the
+            latter is sufficient).
+        scale: typical magnitude, in the unit of the parameter or its part.
         lower: smallest value that is physically possible.
         upper: largest value that is physically possible.
-        start: value that means no effect, at which the first derivative is computed.
-        scan: start values of the search, if the model is strongly nonlinear.
-        scan_by: name of a covariate whose range multiplies ``scan``, if any.
+        start: value without effect, at which the first derivative is evaluated.
+        scan: initial guesses, if the model is strongly nonlinear.
+        scan_by: name of the covariate by whose range ``scan`` is multiplied, if any.
     """
 
     name: str
@@ -36,7 +36,7 @@ class Unknown:
 
 
 def _as_they_are(robot: Robot, values: Values) -> dict[str, float]:
-    """Return the unknowns unchanged, because they are equal to the parameters."""
+    """Return the unknowns, which are identical to the parameters."""
     return dict(values)
 
 
@@ -49,34 +49,33 @@ class Effect:
         apply: function that adds the effect to conditions.  Its arguments are the
             conditions without the effect and the effect's parameters by public name
             (``<frame>``, ``<frame>.<component>`` or plain).
-        unit: function from the robot and a parameter's public name to the parameter's
-            unit.
-        frames: function from a robot to the frames at which the effect can act; None if
-            the effect does not act at frames.
-        device_alone: whether the effect is an error of the measuring device.  If a
-            function of the robot has the same influence on the readings, that function
-            is more probable.
-        refines: name of the effect that is a limiting case of this one; ``""`` for
-            none.
-        tried: function from a robot to the frames at which a diagnosis searches the
+        unit: function that returns the unit of a parameter, given the robot and its
+            public name.
+        frames: function that returns the frames of a robot at which the effect can act;
+            None if the effect does not act at frames.
+        device_alone: whether the effect is an error of the measuring device.  A
+            function of the robot with the same influence on the readings is considered
+            more probable.
+        refines: name of an effect that is a limiting case of this one; ``""`` for none.
+        tried: function that returns the frames at which a diagnosis searches for the
             effect; None for all frames at which it can act.
-        components: public parameters at each frame (``""`` for the frame's name
-            itself), or of the effect as a whole.
+        components: public parameters at each frame (``""`` for the frame name itself),
+            or of the effect as a whole.
         unknowns: unknowns of the fit, at each frame or for the effect as a whole.
-        public: function from unknowns by name (a frame's name, a dot, the unknown's
-            name) to parameters by public name.
-        needs: covariates that are required to apply or identify the effect.
+        public: function that converts unknowns (keys ``<frame>.<unknown>``) to
+            parameters by public name.
+        needs: covariates required to apply or identify the effect.
         linear: whether the platform's deviation is linear in the unknowns, to first
             order in all small motions.
-        by_row: whether the effect changes individual measurements (rows).  Such an
-            effect can act in only one session.  Otherwise the effect changes the robot.
+        by_row: whether the effect changes individual measurements, so that it can be
+            limited to one session, rather than the robot itself.
         finite: whether the effect requires finite motions.
         clearance: whether the effect adds clearance to joints.
-        device: unknowns that move the measuring frame as a whole.
-        splits: whether each unknown of the effect can act without the others.
+        device: unknowns that displace the measuring frame as a whole.
+        splits: whether each unknown can act without the others.
         follows_load: whether the unknowns ``offset.<c>`` correspond to the load
             components that a campaign records.
-        weighs: whether the effect acts only through gravity.
+        weighs: whether the effect acts through gravity alone.
     """
 
     name: str

@@ -26,7 +26,7 @@ def _apply(conditions: Conditions, values: Values) -> Conditions:
 
 
 def _public(robot: Robot, values: Values) -> dict[str, float]:
-    """Return amplitude and phase from the factors of sin and cos of the command."""
+    """Convert the coefficients of sin and cos of the command to amplitude and phase."""
     parameters: dict[str, float] = {}
     for name in {key.rpartition(".")[0]: None for key in values}:
         sine = values.get(f"{name}.sine", 0.0)

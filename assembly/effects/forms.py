@@ -1,8 +1,8 @@
 """Forms of a function of one or two variables.
 
-A form is linear in most of its coefficients: each coefficient multiplies one column, so
-a fit determines all of them together.  The other parameters, called *shapes* (a time
-constant, a period), change the columns nonlinearly.
+A form is linear in most of its coefficients, each of which multiplies one basis column,
+so that a single fit determines them all.  Its remaining parameters, called *shapes*
+(for example a time constant or a period), change the columns nonlinearly.
 
 ========== ============================== =====================================
 form       numbers of the columns         columns that they multiply
@@ -26,7 +26,7 @@ slip       ``size``                       -1 to 1: friction element that slips a
                                           a motion x of ``depth``
 scaled_    ``k.sine``, ``k.cosine``       of k turns of x, times y
 waves
-reversal_  ``k.sine``, ``k.cosine``       direction of x times waves of y, or of x
+reversal_  ``k.sine``, ``k.cosine``       direction of x times harmonics of y or x
 waves
 knee       ``below``, ``above``;          part of x within -``at`` to ``at``; part
            ``size``                       beyond; -1 to 1, reached at ``at``
@@ -46,26 +46,27 @@ from numpy.typing import NDArray
 
 Shapes = Mapping[str, float]
 Inputs = Sequence[NDArray]
-_MOST = 999  # largest number of powers, of waves and of knots
+_MOST = 999  # largest number of powers, harmonics or knots
 # pattern of an integer in the name of a column
 _INDEX = re.compile("0|-?[1-9][0-9]{0,8}")
 
 
 @dataclass(frozen=True)
 class Form:
-    """A form: the shape of a function of one or two variables.
+    """Parametric form of a function of one or two variables.
 
     Attributes:
         name: name of the form in robot files.
-        summary: description in one line.
+        summary: one-line description.
         most: largest number of variables.
-        shapes: names of the nonlinear parameters, and whether each is required.
-        indices: smallest and largest integer at the beginning of a column's name; None
-            if the names contain no integers.
-        words: possible ends of a column's name, such as ``"sine"``; ``""`` if a name
+        shapes: names of the nonlinear parameters, with True if required.
+        indices: smallest and largest integer at the beginning of a column name; None if
+            the names contain no integers.
+        words: allowed endings of a column name, such as ``"sine"``; ``""`` if a name
             can consist of integers only.
-        basis: function from column names, inputs (R,) and shapes to (R, p) columns.
-        remembers: whether earlier values of the first variable influence the result.
+        basis: function that evaluates the (R, p) columns, given column names, inputs
+            (R,) and shapes.
+        remembers: whether the result depends on earlier values of the first variable.
         least: smallest number of variables.
     """
 
@@ -80,7 +81,7 @@ class Form:
     least: int = 1
 
     def is_column(self, name: str, variables: int) -> bool:
-        """Return whether a name is a column of the form for a number of variables."""
+        """Return whether a name denotes a column for the given number of variables."""
         head, word = name, ""
         if self.words != ("",):
             head, _, word = name.rpartition(".")
@@ -97,7 +98,7 @@ class Form:
 
 
 def column_indices(name: str) -> list[int]:
-    """Return the integers at the beginning of a column's name."""
+    """Return the integers at the beginning of a column name."""
     return [int(part) for part in name.split(".") if _INDEX.fullmatch(part)]
 
 
@@ -150,14 +151,14 @@ def natural_spline(knots: NDArray, x: NDArray) -> NDArray:
 
 
 def roughness(count: int) -> NDArray:
-    """Return the integral of the squared curvature of a spline over n even knots.
+    """Return the roughness matrix of a spline with n evenly spaced knots.
 
     Args:
         count: number n of knots.
 
     Returns:
-        (n, n) [1/steps^3] matrix R with integral = v R v for the values v at the knots;
-        the distance between two knots is 1.
+        (n, n) [1/steps^3] matrix R such that v R v is the integral of the squared
+        second derivative for values v at the knots, with unit knot spacing.
 
     Sources:
         Green, Silverman, Nonparametric Regression, section 2.1.2 (R = Q B^-1 Q').
@@ -171,7 +172,7 @@ def roughness(count: int) -> NDArray:
 
 
 def _remembered(names: Sequence[str], inputs: Inputs, shapes: Shapes) -> NDArray:
-    """Return two columns: the lagged variable, and the decaying initial state."""
+    """Return the lagged variable and the decaying initial state as two columns."""
     return np.column_stack([inputs[name == "start"] for name in names])
 
 
@@ -182,18 +183,18 @@ def _step(names: Sequence[str], inputs: Inputs, shapes: Shapes) -> NDArray:
 
 
 def _reversal(names: Sequence[str], inputs: Inputs, shapes: Shapes) -> NDArray:
-    """Return columns of a direction, multiplied by powers of a second input if any."""
+    """Return direction columns, multiplied by powers of the second input if any."""
     size = inputs[1] if len(inputs) > 1 else np.ones_like(inputs[0])
     return _stacked([inputs[0] * size ** int(name) for name in names], inputs)
 
 
 def _scaled_waves(names: Sequence[str], inputs: Inputs, shapes: Shapes) -> NDArray:
-    """Return waves of an angle, multiplied by the second input."""
+    """Return harmonics of an angle, multiplied by the second input."""
     return _waves(names, inputs[:1], shapes) * inputs[1][:, None]
 
 
 def _reversal_waves(names: Sequence[str], inputs: Inputs, shapes: Shapes) -> NDArray:
-    """Return waves of an angle, multiplied by a direction."""
+    """Return harmonics of an angle, multiplied by a direction."""
     return _waves(names, inputs[1:], shapes) * inputs[0][:, None]
 
 
@@ -203,14 +204,14 @@ def _slip(names: Sequence[str], inputs: Inputs, shapes: Shapes) -> NDArray:
 
 
 def _knee(names: Sequence[str], inputs: Inputs, shapes: Shapes) -> NDArray:
-    """Return the parts of a load up to the knee and beyond it, in both directions."""
+    """Split a load into the parts below and above the knee, in both directions."""
     first = np.clip(inputs[0], -shapes["at"], shapes["at"])
     parts = {"below": first, "above": inputs[0] - first, "size": first / shapes["at"]}
     return _stacked([parts[name] for name in names], inputs)
 
 
 def _stacked(columns: Sequence[NDArray], inputs: Inputs) -> NDArray:
-    """Return the (R, p) columns, each of which is as long as the inputs."""
+    """Stack columns of the length of the inputs into an (R, p) array."""
     rows = len(inputs[0])
     if not columns:
         return np.zeros((rows, 0))
@@ -221,7 +222,7 @@ _WAVES = ("sine", "cosine")
 
 
 def _memory(name: str, summary: str) -> Form:
-    """Return a form in which the state lags behind the variable."""
+    """Define a form whose state lags behind the variable."""
     return Form(
         name, summary, 1, {"time_constant": True}, None, ("gain", "start"), _remembered,
         remembers=True,
@@ -232,31 +233,31 @@ FORMS: dict[str, Form] = {
     form.name: form
     for form in (
         Form("powers", "a polynomial", 2, {}, (0, 20), ("",), _powers),
-        Form("waves", "sine waves, whole periods per turn", 2, {"period": False},
+        Form("waves", "harmonics with whole periods per turn", 2, {"period": False},
              (-_MOST, _MOST), _WAVES, _waves),
-        Form("spline", "a smooth curve through values at even knots", 2,
+        Form("spline", "a cubic spline through values at evenly spaced knots", 2,
              dict.fromkeys(_ENDS, True), (1, _MOST), ("",), _spline),
-        _memory("lag", "what follows slowly"),
-        _memory("creep", "what yields slowly"),
+        _memory("lag", "a first-order lag"),
+        _memory("creep", "creep under a stepwise load"),
         Form("step", "a jump", 1, {"at": True}, None, ("size",), _step),
-        Form("slow_wave", "one slow wave", 1, {"period": True}, None, _WAVES,
+        Form("slow_wave", "a slow oscillation", 1, {"period": True}, None, _WAVES,
              _slow_wave),
-        Form("reversal", "a jump where the direction of motion reverses", 2, {},
+        Form("reversal", "a jump when the direction of motion reverses", 2, {},
              (0, 20), ("",), _reversal, remembers=True),
         Form("slip", "a slipping element, saturated after a reversal", 1,
              {"depth": True}, None, ("size",), _slip, remembers=True),
-        Form("scaled_waves", "sine waves times a second variable", 2, {"period": False},
+        Form("scaled_waves", "harmonics times a second variable", 2, {"period": False},
              (0, _MOST), _WAVES, _scaled_waves, least=2),
-        Form("reversal_waves", "sine waves with the sign of the direction", 2,
+        Form("reversal_waves", "harmonics with the sign of the direction", 2,
              {"period": False}, (0, _MOST), _WAVES, _reversal_waves, remembers=True),
-        Form("knee", "one slope up to a load, another beyond it", 1, {"at": True}, None,
+        Form("knee", "one slope up to a load, another beyond", 1, {"at": True}, None,
              ("below", "above", "size"), _knee),
     )
 }  # fmt: skip
 
 
 def shape_names(form: Form, variables: int) -> dict[str, bool]:
-    """Return the names of the shapes of a form, and whether each is required."""
+    """Return the shape names of a form, with True if required."""
     if form.name == "spline" and variables > 1:
         return {f"{end}.{k}": True for k in (1, 2) for end in _ENDS}
     return dict(form.shapes)

@@ -1,8 +1,8 @@
-"""Formulas written by users: a small grammar, evaluated without executing code.
+"""User-defined formulas in a small grammar, evaluated without executing code.
 
 The grammar allows numbers, names, ``+ - * / **``, brackets, ``pi`` and the functions
-below.  Units are checked: the terms of a sum must have equal units, and the argument of
-a function must be a pure number (rad counts as a pure number).  The units of the
+below.  Units are checked: the terms of a sum must have the same unit, and the argument
+of a function must be dimensionless (rad counts as dimensionless).  The units of the
 parameters follow from these conditions.
 
 Sources:
@@ -28,15 +28,15 @@ _OPERATIONS: dict[type, Callable[[NDArray, NDArray], NDArray]] = {
     ast.Add: np.add, ast.Sub: np.subtract, ast.Mult: np.multiply,
     ast.Div: np.divide, ast.Pow: np.power,
 }  # fmt: skip
-_LONGEST = 500  # largest number of characters of a formula
+_LONGEST = 500  # largest number of characters in a formula
 _DEEPEST = 50  # largest depth of nested brackets and operations
-_SAME = 1e-9  # difference below which two exponents of units count as equal
-# exponents of the units m, N, s, K ..; rad counts as a pure number
+_SAME = 1e-9  # difference below which two unit exponents count as equal
+# exponents of the units m, N, s, K ..; rad counts as dimensionless
 Unit = Mapping[str, float]
 
 
 def parse_formula(text: str) -> ast.expr:
-    """Return the syntax tree of a formula.
+    """Parse a formula into its syntax tree.
 
     Args:
         text: formula such as ``"a*sin(3*q) + b"``.
@@ -45,7 +45,7 @@ def parse_formula(text: str) -> ast.expr:
         The expression; it contains only nodes of the grammar.
 
     Raises:
-        BadInput: the text is not a formula; the message names the error.
+        BadInput: the text is not a valid formula; the message states the error.
     """
     if len(text) > _LONGEST:
         raise BadInput(f"found {len(text)} characters, expected at most {_LONGEST}")
@@ -89,7 +89,7 @@ def _check(node: ast.AST, depth: int) -> None:
 
 
 def names_in(tree: ast.expr) -> list[str]:
-    """Return the names of variables and parameters, in order of use."""
+    """Return the names of variables and parameters, in order of appearance."""
     called = {id(n.func) for n in ast.walk(tree) if isinstance(n, ast.Call)}
     nodes = [n for n in ast.walk(tree) if isinstance(n, ast.Name)]
     nodes.sort(key=lambda n: n.col_offset)
@@ -98,14 +98,14 @@ def names_in(tree: ast.expr) -> list[str]:
 
 
 def evaluate(tree: ast.expr, known: Mapping[str, NDArray]) -> NDArray:
-    """Return the value of a formula.
+    """Evaluate a formula.
 
     Args:
         tree: syntax tree of the formula.
         known: values of variables and parameters by name: numbers, or arrays (R,).
 
     Returns:
-        (R,) values, or a number; inf or NaN where the formula is not defined.
+        (R,) values, or a number; inf or NaN where the formula is undefined.
     """
     with np.errstate(all="ignore"):
         return _value(tree, known)
@@ -131,19 +131,21 @@ def _value(node: ast.AST, known: Mapping[str, NDArray]) -> NDArray:
 def parameter_units(
     tree: ast.expr, variables: Mapping[str, Unit], result: Unit
 ) -> dict[str, Unit]:
-    """Return the units of a formula's parameters that make all its units consistent.
+    """Infer the units of a formula's parameters from dimensional consistency.
 
     Args:
         tree: syntax tree of the formula.
         variables: units of its variables by name.
-        result: unit of the formula's value; a pure number counts as a value in SI.
+        result: unit of the result; a dimensionless result is interpreted as an SI
+            value.
 
     Returns:
-        Exponents of the units by parameter; a parameter that can have any unit counts
-        as a pure number.
+        Unit exponents by parameter; a parameter that can have any unit counts as
+        dimensionless.
 
     Raises:
-        BadInput: no units are consistent; the message names the conflict.
+        BadInput: the formula is dimensionally inconsistent; the message states the
+            conflict.
     """
     units = _Units(variables)
     whole = units.of(tree)
@@ -161,7 +163,7 @@ class _Units:
     known: dict[str, dict[str, float]] = field(default_factory=dict)
 
     def of(self, node: ast.AST) -> dict[str, float]:
-        """Return the unit of a part of a formula; BadInput if units contradict."""
+        """Return the unit of a subexpression; raise BadInput if units conflict."""
         match node:
             case ast.Name(id=name) if name in self.variables:
                 return dict(self.variables[name])
@@ -194,7 +196,7 @@ class _Units:
         return {}
 
     def reduced(self, unit: Mapping[str, float]) -> dict[str, float]:
-        """Return a unit in which the known units of parameters are substituted."""
+        """Substitute the known units of parameters in a unit."""
         reduction: dict[str, float] = {}
         for name, k in unit.items():
             reduction = _added(reduction, self.known.get(name, {name: 1.0}), k)
@@ -203,7 +205,7 @@ class _Units:
     def equal(
         self, one: Mapping[str, float], other: Mapping[str, float], where: str
     ) -> None:
-        """Equate two units, and store the resulting unit of a parameter."""
+        """Equate two units and store the resulting unit of a parameter."""
         left = self.reduced(_added(one, other, -1.0))
         free = next((name for name in left if name.startswith("?")), None)
         if free is not None:
@@ -217,7 +219,7 @@ class _Units:
             )
 
     def of_parameters(self, names: list[str]) -> dict[str, Unit]:
-        """Return the units of parameters; undetermined ones are pure numbers."""
+        """Return the units of parameters, dimensionless if undetermined."""
         reduced = {name: self.reduced({f"?{name}": 1.0}) for name in names}
         return {
             name: {k: v for k, v in unit.items() if not k.startswith("?")}
@@ -226,7 +228,7 @@ class _Units:
 
 
 def _number(node: ast.AST) -> float | None:
-    """Return the value of a part of a formula; None if the part contains names."""
+    """Return the value of a subexpression; None if it contains names."""
     if any(isinstance(n, ast.Name) and n.id != "pi" for n in ast.walk(node)):
         return None
     return float(_value(node, {}))
@@ -235,13 +237,13 @@ def _number(node: ast.AST) -> float | None:
 def _added(
     one: Mapping[str, float], other: Mapping[str, float], factor: float
 ) -> dict[str, float]:
-    """Return the exponents of one unit times a power of another."""
+    """Return the exponents of a unit times a power of another."""
     names = dict.fromkeys([*one, *other])
     return {name: one.get(name, 0.0) + factor * other.get(name, 0.0) for name in names}
 
 
 def unit_text(unit: Unit) -> str:
-    """Return a unit as text, such as ``1/N^2`` for rad/N^2; ``1`` without a unit."""
+    """Format a unit, such as ``1/N^2`` for rad/N^2; ``1`` if dimensionless."""
 
     def powers(sign: float) -> list[str]:
         parts = [(name, sign * k) for name, k in unit.items() if sign * k > _SAME]

@@ -26,8 +26,8 @@ def _apply(conditions: Conditions, values: Values) -> Conditions:
     C = joint_compliances(conditions.robot)
     for name, tau in values.items():
         row = conditions.robot.index(name)
-        # an internal torque of the joint moves the joint by compliance x torque without
-        # stress
+        # an internal torque of the joint causes a stress-free motion of compliance x
+        # torque
         deflection = C[row, :, conditions.robot.frames[row].own_axis]
         conditions = with_screws(
             conditions, name, -tau * conditions.approach[:, None] * deflection

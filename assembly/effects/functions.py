@@ -1,9 +1,9 @@
-"""Application of functions: general effects of a robot's file or of a diagnosis.
+"""Apply functions: general effects declared in a robot file or found by a diagnosis.
 
-A function changes one of these: the stress-free screws at a frame, the pose of the
-base, the reading, or the load.  If the function depends on a wrench, as every
-compliance does, its place is compliant.  Such a function is solved together with the
-equilibrium (:mod:`forcefit.assembly.measurement.yields`).
+A function changes the stress-free screws at a frame, the pose of the base, the reading,
+or the load.  A function that depends on a wrench, as every compliance does, makes its
+location compliant and is solved together with the equilibrium
+(:mod:`forcefit.assembly.measurement.yields`).
 """
 
 from collections.abc import Iterable, Sequence
@@ -33,13 +33,13 @@ _parsed = lru_cache(maxsize=256)(parse_formula)
 
 
 def along(robot: Robot, where: str, component: str, values: NDArray) -> NDArray:
-    """Return the component of screws or wrenches along one direction of a frame.
+    """Project screws or wrenches onto one direction of a frame.
 
     Args:
         robot: any robot.
-        where: a frame.
-        component: ``rx`` .. ``tz``, or ``rs`` of a helical joint.
-        values: (..., 6) by component of a frame's screw, or of the wrench on it.
+        where: name of a frame.
+        component: ``rx`` .. ``tz``, or ``rs`` for a helical joint.
+        values: (..., 6) components of the screw of the frame, or of the wrench on it.
 
     Returns:
         (...) products of the values with the unit screw.
@@ -50,22 +50,22 @@ def along(robot: Robot, where: str, component: str, values: NDArray) -> NDArray:
 
 
 def is_loaded(function: Function) -> bool:
-    """Return whether a function depends on wrenches that the robot transmits."""
+    """Return whether a function depends on wrenches transmitted by the robot."""
     wrench = any(name.startswith("wrench.") for name in function.variables)
     return wrench or function.kind == "compliance"
 
 
 def covariates_of(robot: Robot, sessions: Iterable[str]) -> dict[str, str]:
-    """Return the covariates on which a robot's functions depend, with titles.
+    """Return the covariates on which the functions of a robot depend.
 
     Args:
         robot: robot with its functions.
         sessions: sessions to consider.
 
     Returns:
-        For each covariate, named without ``cov.``, the title of a function that depends
-        on it.  ``time`` is included if a form depends on time, and ``approach`` if the
-        direction before the first rows is needed.
+        The title of one dependent function for each covariate, named without ``cov.``.
+        ``time`` is included if a form depends on time, and ``approach`` if the
+        direction before the first reading is needed.
     """
     owners: dict[str, str] = {}
     for function in robot.functions:
@@ -85,22 +85,22 @@ def _is_covariate(name: str) -> bool:
 
 
 def components_of(where: str, robot: Robot) -> tuple[str, ...]:
-    """Return the components that a function may have at a place.
+    """Return the components that a function may have at a given location.
 
     Args:
-        where: a frame, ``"base"``, ``"reading"`` or ``"load"``.
+        where: name of a frame, ``"base"``, ``"reading"`` or ``"load"``.
         robot: the robot on which it acts.
 
     Returns:
-        ``mx`` .. ``fz`` of the load, ``rx`` .. ``tz`` of other places, and ``rs`` of a
-        helical joint.
+        ``mx`` .. ``fz`` for the load, ``rx`` .. ``tz`` for other locations, and ``rs``
+        for a helical joint.
     """
     threads = [frame.name for frame in robot.frames if frame.pitch]
     return LOADS if where == "load" else (*AXES, *[THREAD] * (where in threads))
 
 
 def unit_screw(robot: Robot, where: str, component: str) -> NDArray:
-    """Return the (6,) unit screw, or wrench of the load, of a component at a place."""
+    """Return the (6,) unit screw, or unit load wrench, of a component."""
     if component == THREAD:
         return own_screw(robot.frame(where))
     return np.eye(6)[(LOADS if where == "load" else AXES).index(component)]
@@ -127,12 +127,12 @@ def columns_of(function: Function, component: str) -> list[str]:
 
 
 def basis(conditions: Conditions, function: Function, names: Sequence[str]) -> NDArray:
-    """Return the column of each linear coefficient of a function.
+    """Evaluate the basis column of each linear coefficient of a function.
 
     Args:
-        conditions: R rows.
-        function: function with a form (no formula) whose variables are not wrenches;
-            among its parameters, only the shapes are used.
+        conditions: conditions of R measurements.
+        function: function with a form (not a formula) whose variables are not wrenches;
+            only its shape parameters are used.
         names: p names of columns, such as ``"1.sine"``.
 
     Returns:
@@ -144,15 +144,15 @@ def basis(conditions: Conditions, function: Function, names: Sequence[str]) -> N
 
 
 def inputs_of(conditions: Conditions, function: Function) -> NDArray:
-    """Return the inputs of a function, computed from its variables and their past.
+    """Evaluate the inputs of a function from its variables and their history.
 
     Args:
-        conditions: R rows.
+        conditions: conditions of R measurements.
         function: the function.
 
     Returns:
         (R, k) inputs: the variables, NaN for wrenches.  For a form with memory, the
-        state replaces the first variable.
+        first variable is replaced by the state.
     """
     first, *further = function.variables
     inputs = [_now(conditions, name) for name in further]
@@ -167,7 +167,7 @@ def inputs_of(conditions: Conditions, function: Function) -> NDArray:
         angle = inputs[0] if inputs else _now(conditions, first)
         return np.column_stack([history.direction(first)[row], angle])
     if form.name == "reversal":
-        # friction depends on the magnitude of the load, not on its sign
+        # friction depends on the magnitude of the load, not its sign
         sizes = [
             np.abs(x) if name.startswith("load.") else x
             for name, x in zip(further, inputs, strict=True)
@@ -175,7 +175,7 @@ def inputs_of(conditions: Conditions, function: Function) -> NDArray:
         return np.column_stack([history.direction(first)[row], *sizes])
     shapes = parameters_of(function, function.components[0])
     late = shapes["time_constant"]
-    # the variable is a time, so the input is the lag of a unit step at time 0
+    # if the variable is time, the input is the lagged response to a unit step at time 0
     if first in CLOCKS:
         return np.column_stack([1.0 - history.fading(late), history.fading(late)])[row]
     lagged = history.lagged(first, late, held=form.name == "creep")
@@ -183,7 +183,7 @@ def inputs_of(conditions: Conditions, function: Function) -> NDArray:
 
 
 def _now(conditions: Conditions, name: str) -> NDArray:
-    """Return the (R,) values of a variable, from recorded rows if there are any."""
+    """Return the (R,) values of a variable, from recorded readings if available."""
     if name.startswith("wrench."):
         return np.full(len(conditions), np.nan)
     if conditions.history is not None and conditions.row is not None:
@@ -192,11 +192,11 @@ def _now(conditions: Conditions, name: str) -> NDArray:
 
 
 def value_of(function: Function, component: str, inputs: Sequence[NDArray]) -> NDArray:
-    """Return the values of one component of a function.
+    """Evaluate one component of a function.
 
     Args:
         function: the function.
-        component: one of the function's components.
+        component: one of the components of the function.
         inputs: (R,) values of each input, from :func:`inputs_of`.
 
     Returns:
@@ -215,15 +215,15 @@ def value_of(function: Function, component: str, inputs: Sequence[NDArray]) -> N
 
 
 def variable_names(variables: Sequence[str]) -> dict[str, int]:
-    """Return the names by which a formula can refer to its variables.
+    """Return the names that a formula can use for its variables.
 
     Args:
         variables: public names of the variables.
 
     Returns:
-        Index of the variable for each possible name: the last part of the public name;
-        its first part, if that is unique; and the whole public name with ``_`` in place
-        of dots.
+        Index of the variable by name.  Possible names are the last part of the public
+        name; its first part, if unique; and the whole public name with ``_`` instead of
+        dots.
     """
     indices: dict[str, list[int]] = {}
     for k, name in enumerate(variables):
@@ -238,18 +238,18 @@ def apply_functions(
     functions: Iterable[Function],
     recorded: Conditions | None = None,
 ) -> Conditions:
-    """Return the conditions with functions added, each in its session.
+    """Apply functions to the conditions, each in its session.
 
     Args:
-        conditions: R rows.
-        functions: the functions.
-        recorded: conditions before other effects, on which the functions depend.
+        conditions: conditions of R measurements.
+        functions: functions to apply.
+        recorded: conditions before other effects, from which the inputs are taken.
 
     Returns:
-        The conditions with all functions.
+        The conditions with all functions applied.
 
     Raises:
-        BadInput: a function has no finite value in some row.
+        BadInput: a function is not finite for one of the measurements.
     """
     recorded = conditions if recorded is None else recorded
     for function in functions:
@@ -261,7 +261,7 @@ def apply_functions(
 
 
 def in_session(conditions: Conditions, session: str | None) -> NDArray:
-    """Return (R,) bool, True for rows of a session; for None, True for all rows."""
+    """Return an (R,) mask of the readings of a session; all True for None."""
     if session is None:
         return np.ones(len(conditions), dtype=bool)
     if conditions.session is None:
@@ -272,7 +272,7 @@ def in_session(conditions: Conditions, session: str | None) -> NDArray:
 def _with_function(
     conditions: Conditions, function: Function, inputs: NDArray, acts: NDArray
 ) -> Conditions:
-    """Return conditions with one more function, which acts in the given rows."""
+    """Add a function that acts in the given measurements."""
     where = function.where
     named = [name.split(".")[1] for name in function.variables if "wrench" in name]
     if BASE in (where, *named):
@@ -293,7 +293,7 @@ def _with_function(
 
 
 def _check_finite(function: Function, values: NDArray, inputs: NDArray) -> None:
-    """Reject a function that has no finite value in a row where it acts."""
+    """Reject a function that is not finite for a measurement in which it acts."""
     for row in np.flatnonzero(~np.isfinite(values))[:1]:
         known = zip(function.variables, inputs[row], strict=False)
         where = ", ".join(f"{name} = {x:g}" for name, x in known)
@@ -310,7 +310,7 @@ def _yielding(
     inputs: NDArray,
     acts: NDArray,
 ) -> Conditions:
-    """Return conditions with a compliant place that depends on the wrench there."""
+    """Add a compliant location whose deflection depends on the local wrench."""
     slots: dict[int, int] = {}  # column of the inputs for each wrench, by its index
     through: list[tuple[str, int]] = []
     for k, name in enumerate(function.variables):
@@ -345,15 +345,16 @@ def _yielding(
 def in_session_alone(
     conditions: Conditions, changed: Conditions, session: str
 ) -> Conditions:
-    """Return the conditions with effects in the rows of one session only.
+    """Restrict effects to the measurements of one session.
 
     Args:
-        conditions: R rows without the effects.
-        changed: the same R rows with effects that change individual rows.
+        conditions: conditions of R measurements without the effects.
+        changed: conditions of the same measurements with these effects.
         session: name of the session in which the effects act.
 
     Returns:
-        The rows of ``changed`` in this session, and those of ``conditions`` elsewhere.
+        The entries of ``changed`` in this session, and those of ``conditions``
+        elsewhere.
     """
     acts = in_session(conditions, session)[:, None]
 

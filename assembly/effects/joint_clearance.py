@@ -1,4 +1,4 @@
-"""Clearance of joints that are declared without; loads close this clearance."""
+"""Clearance of joints that are declared without clearance; it is closed by the load."""
 
 from dataclasses import replace
 from functools import partial
@@ -44,7 +44,7 @@ def _apply(conditions: Conditions, values: Values) -> Conditions:
 
 
 def _public(robot: Robot, values: Values) -> dict[str, float]:
-    """Return the fitted clearances, without those that are zero."""
+    """Return the nonzero fitted clearances."""
     return {key: size for key, size in values.items() if size > _NONE_BELOW}
 
 

@@ -1,11 +1,11 @@
-"""The library of effects: effects of forcefit, and effects of other distributions.
+"""Library of effects provided by forcefit and by other distributions.
 
-A distribution names an :class:`forcefit.assembly.effects.effect.Effect`::
+A distribution registers an :class:`forcefit.assembly.effects.effect.Effect`::
 
     [project.entry-points."forcefit.effects"]
     drive_gain = "their_package:DRIVE_GAIN"   # an Effect of this name
 
-The effect is imported at its first use.  It cannot have the name of an effect of
+The effect is imported on first use.  Its name must differ from the names of effects of
 forcefit.
 """
 
@@ -28,11 +28,11 @@ GROUP = "forcefit.effects"
 class Library(Mapping[str, Effect]):
     """Effects by name, in the order in which they are applied.
 
-    Effects of other distributions are applied before the last effect of forcefit, the
-    foundation, which adds a frame.
+    Effects of other distributions are applied before the foundation, which is the last
+    effect of forcefit and adds a frame.
 
     Args:
-        own: effects of forcefit, in their order.
+        own: effects of forcefit, in the order of application.
     """
 
     def __init__(self, own: Sequence[Effect]) -> None:
@@ -45,7 +45,7 @@ class Library(Mapping[str, Effect]):
         return tuple(name for name in found if name not in self._own)
 
     def version(self, name: str) -> str:
-        """Return name and version of an effect's distribution; empty for forcefit's."""
+        """Return name and version of a distribution; empty for forcefit itself."""
         return "" if name in self._own else version_of_installed(GROUP, name)
 
     def __getitem__(self, name: str) -> Effect:
@@ -76,7 +76,7 @@ class Library(Mapping[str, Effect]):
 
 
 def _naming_owner(effect: Effect, words: str) -> Effect:
-    """Return an effect whose errors name the distribution that defines it."""
+    """Make the errors of an effect name the distribution that defines it."""
     functions = {
         one.name: getattr(effect, one.name) for one in fields(effect)
         if callable(getattr(effect, one.name))

@@ -1,4 +1,4 @@
-"""Scale of a link's modulus: Young's modulus = factor x declared modulus."""
+"""Scale factor on a link's modulus: Young's modulus = factor x declared modulus."""
 
 from dataclasses import replace
 from functools import partial
@@ -10,7 +10,7 @@ from forcefit.assembly.model.robot import BeamLink, Frame, MatrixLink, MeshLink,
 
 
 def links(robot: Robot) -> tuple[str, ...]:
-    """Return the frames whose elastic body has its own material constants."""
+    """Return the frames whose elastic body declares material constants."""
     own = BeamLink | MeshLink | MatrixLink
     return tuple(f.name for f in robot.frames if isinstance(f.link, own))
 
@@ -36,7 +36,7 @@ def _apply(conditions: Conditions, values: Values) -> Conditions:
 
 
 def _public(robot: Robot, values: Values) -> dict[str, float]:
-    """Return factors on the modulus from relative changes 1 / factor - 1."""
+    """Convert relative changes 1 / factor - 1 to factors on the modulus."""
     ends = len(".softer")
     return {name[:-ends]: 1 / (1 + s) for name, s in values.items()}
 

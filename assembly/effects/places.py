@@ -1,4 +1,4 @@
-"""Frames at which effects act, and changes of the conditions at one frame."""
+"""Frames at which effects can act, and changes of the conditions at a frame."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -29,7 +29,7 @@ def beams(robot: Robot) -> tuple[str, ...]:
 
 
 def bodies(robot: Robot) -> tuple[str, ...]:
-    """Return the frames whose bodies have a length: beams, or two distinct origins."""
+    """Return the frames whose bodies have a length: beams, or distinct end points."""
     return tuple(
         f.name
         for f in robot.frames
@@ -38,7 +38,7 @@ def bodies(robot: Robot) -> tuple[str, ...]:
 
 
 def growing(robot: Robot) -> tuple[str, ...]:
-    """Return the bodies whose length can differ: beams, or all if there are none."""
+    """Return the bodies whose length can vary: beams, or all bodies without beams."""
     return beams(robot) or bodies(robot)
 
 
@@ -46,12 +46,12 @@ def body_axis(frame: Frame) -> tuple[float, NDArray]:
     """Return the length and direction of a body.
 
     Args:
-        frame: the frame of the body.
+        frame: frame of the body.
 
     Returns:
-        Length [m] of the beam, and its direction as a (3,) unit vector in the frame's
-        axes.  Without a beam, both describe the line from the parent's origin to the
-        frame's.
+        Length [m] and direction of the beam, a (3,) unit vector in the frame's axes.
+        Without a beam, both refer to the line from the parent's origin to the frame's
+        origin.
     """
     if isinstance(frame.link, BeamLink):
         return beam_axis(frame)
@@ -61,15 +61,15 @@ def body_axis(frame: Frame) -> tuple[float, NDArray]:
 
 
 def with_screws(conditions: Conditions, frame: str, screws: NDArray) -> Conditions:
-    """Return the conditions with additional stress-free screws at a frame.
+    """Add stress-free screws at a frame to the conditions.
 
     Args:
-        conditions: conditions of R rows.
+        conditions: conditions of R measurements.
         frame: name of the frame.
         screws: (R, 6) or (6,) [rad, m] screws in the frame's axes.
 
     Returns:
-        The changed conditions.
+        The modified conditions.
     """
     errors = conditions.errors.copy()
     errors[:, conditions.robot.index(frame)] += screws
@@ -79,7 +79,7 @@ def with_screws(conditions: Conditions, frame: str, screws: NDArray) -> Conditio
 def with_frame(
     conditions: Conditions, frame: str, change: Callable[[Frame], Frame]
 ) -> Conditions:
-    """Return the conditions of a robot with one frame changed."""
+    """Replace one frame of the robot in the conditions."""
     row = conditions.robot.index(frame)
     frames = list(conditions.robot.frames)
     frames[row] = change(frames[row])

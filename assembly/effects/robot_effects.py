@@ -1,4 +1,4 @@
-"""Known effects in a robot file, applied at one posture."""
+"""Apply the effects declared in a robot file at one posture."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -18,14 +18,14 @@ from forcefit.results.display import html_table, short_repr
 
 @dataclass(frozen=True, eq=False)
 class AppliedEffects:
-    """A posture, load and gravity with the effects of the robot's file applied.
+    """Posture, load and gravity after the effects in the robot file are applied.
 
     Attributes:
-        posture: posture of the robot with the errors, springs, clearances and
-            foundation that result from the effects.
+        posture: posture of the robot, with the resulting errors, springs, clearances
+            and foundation.
         load: (6,) [N m, N] wrench on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] gravity vector in base axes; None without weight.
-        conditions: one row with all of these data and the errors of the measuring
+        conditions: conditions of one measurement, including the errors of the measuring
             device.
     """
 
@@ -37,7 +37,7 @@ class AppliedEffects:
     __repr__, _repr_html_ = short_repr, html_table
 
     def reading(self, platform_screw: ArrayLike) -> NDArray:
-        """Return the (6,) [rad, m] reading of a device for a platform screw."""
+        """Return the (6,) [rad, m] device reading for a platform screw."""
         return read(self.conditions, np.array(platform_screw, dtype=float)[None])[0]
 
 
@@ -49,23 +49,23 @@ def apply_robot_effects(
     *,
     finite: bool = False,
 ) -> AppliedEffects:
-    """Apply the effects of a robot's file at one posture.
+    """Apply the effects declared in a robot file at one posture.
 
     Args:
         posture: posture of the declared robot.
         load: (6,) [N m, N] wrench on the platform at its origin, base axes.
-        gravity: (3,) [m/s^2] gravity vector in base axes, added to the gravity of the
-            effects.
+        gravity: (3,) [m/s^2] gravity vector in base axes, in addition to gravity
+            introduced by effects.
         covariates: values by name: ``temperature`` [K] above calibration, ``time`` [s],
             ``approach``, other variables of functions, and ``session``.
         finite: whether the exact model is used.
 
     Returns:
-        Posture, loads and conditions with the effects; unchanged without effects.
+        Posture, loads and conditions with the effects applied.
 
     Raises:
-        BadInput: an effect needs a covariate that is not given, or needs finite motions
-            while ``finite`` is False.
+        BadInput: an effect requires a covariate that is missing, or requires finite
+            motions while ``finite`` is False.
     """
     given = dict(covariates or {})
     robot = posture.robot
@@ -96,13 +96,13 @@ def check_covariates(
     """Reject effects that cannot be applied with the given covariates.
 
     Args:
-        robot: robot with the effects of its file.
+        robot: robot with its declared effects.
         given: values of the covariates by name.
         finite: whether the exact model is used.
 
     Raises:
-        BadInput: a covariate is unknown, an effect needs a covariate that is missing,
-            or an effect needs finite motions.
+        BadInput: a covariate is unknown, an effect requires a covariate that is
+            missing, or an effect requires finite motions.
     """
     session = given.get("session")
     needed = covariates_of(robot, [str(session)])

@@ -1,4 +1,4 @@
-"""Weight of links and bodies, for a model that is declared without gravity."""
+"""Weight of links and bodies, for a model declared without gravity."""
 
 from dataclasses import replace
 

@@ -1,6 +1,6 @@
-"""Thermal expansion: a body becomes longer by coefficient x length x temperature.
+"""Thermal expansion: a body expands by coefficient x length x temperature.
 
-The body becomes longer along its beam, or along the line between its joints.
+The body expands along its beam, or along the line between its joints.
 """
 
 from forcefit.assembly.effects.effect import Effect, Unknown, Values

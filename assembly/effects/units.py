@@ -1,4 +1,4 @@
-"""Units of a function's variables, results and parameters."""
+"""Units of the variables, results and parameters of functions."""
 
 from forcefit.assembly.effects.forms import FORMS, column_indices, shape_names
 from forcefit.assembly.effects.formula import (
@@ -17,11 +17,11 @@ from forcefit.assembly.model.function import Function
 from forcefit.assembly.model.robot import Robot
 
 _COVARIATES: dict[str, Unit] = {"temperature": {"K": 1}, "time": {"s": 1}}
-_ANGLE: Unit = {}  # rad counts as a pure number
+_ANGLE: Unit = {}  # rad counts as dimensionless
 
 
 def variable_unit(robot: Robot, name: str) -> Unit:
-    """Return a variable's unit, as exponents of m, N, s, K or of a covariate's name.
+    """Return the unit of a variable as exponents of m, N, s, K or of a covariate name.
 
     Args:
         robot: robot with the variable.
@@ -45,7 +45,7 @@ def variable_unit(robot: Robot, name: str) -> Unit:
 
 
 def result_unit(function: Function, component: str) -> Unit:
-    """Return the unit of one component of a function's result."""
+    """Return the unit of one component of the result of a function."""
     turns = component.startswith(("r", "m"))
     if function.where == "load":
         return {"N": 1, "m": 1} if turns else {"N": 1}
@@ -58,11 +58,11 @@ def result_unit(function: Function, component: str) -> Unit:
 
 
 def units_of(robot: Robot, function: Function) -> dict[str, str]:
-    """Return the units of a function's parameters as written in robot files.
+    """Return the units of the parameters of a function, as written in robot files.
 
     Args:
-        robot: the robot on which the function acts.
-        function: the function.
+        robot: robot on which the function acts.
+        function: any function.
 
     Returns:
         Unit by parameter, such as ``"rad/K"``.
@@ -114,7 +114,7 @@ def _parameter_unit(
 
 
 def turning_variables(function: Function) -> tuple[str, ...]:
-    """Return the variables of which one ``period`` is one full wave."""
+    """Return the variables whose ``period`` is the period of a harmonic."""
     if function.form == "reversal_waves":
         return function.variables[-1:]
     if function.form == "scaled_waves":
@@ -123,5 +123,5 @@ def turning_variables(function: Function) -> tuple[str, ...]:
 
 
 def whole_unit(unit: Unit) -> str:
-    """Return the unit of a variable as text; ``rad`` if it has none."""
+    """Format the unit of a variable; ``rad`` if it is dimensionless."""
     return unit_text(unit) if unit else "rad"

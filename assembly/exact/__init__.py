@@ -1,4 +1,4 @@
-"""Equilibrium with finite motions: the closures hold exactly, on SE(3).
+"""Equilibrium with finite motions; loop closure is imposed exactly, on SE(3).
 
 Start with ``exact.py``.
 """

@@ -1,14 +1,15 @@
-r"""Minimum of a quadratic energy, convex or not, with clearances within their cones.
+r"""Minimise a quadratic energy, convex or not, with clearances confined to cones.
 
-A step of the exact equilibrium requires the change v of the clearances u that minimises
+Each step towards the exact equilibrium requires the change v of the clearances u that
+minimises
 
         s . v + v . S v / 2   subject to   |u_k + v_k| <= 1,  H (u + v) = k.
 
-S has directions of negative curvature.  Directions normal to the boundaries of active
-constraints are harmless, but other directions occur too.  Far from the solution, S is
-made convex, and :mod:`forcefit.assembly.solvers.conic` solves the problem.  Near the
-solution, Newton's method on the active boundaries is accurate to rounding, while the
-conic solver reaches only half of the digits.
+S can have directions of negative curvature.  Those normal to the boundaries of active
+constraints are harmless, but others occur as well.  Far from the solution, S is made
+convex, and :mod:`forcefit.assembly.solvers.conic` solves the problem.  Near the
+solution, Newton's method on the active boundaries is accurate to machine precision,
+while the conic solver reaches only half of the digits.
 
 ======  ===========  =========  =====================================================
 symbol  code         shape      meaning
@@ -36,7 +37,7 @@ from forcefit.assembly.solvers.method import Method
 
 AT_BOUNDARY = 1e-5  # [-] distance from the boundary within which a cone can be active
 _STEPS = 15  # largest number of Newton steps on the active boundaries
-# [-] size of the last step of a solution, relative to the size of the cones
+# [-] size of the last step at convergence, relative to the size of the cones
 _STILL = 1e-6
 # relative to the largest multiplier: a cone with a smaller negative multiplier remains
 # active
@@ -57,7 +58,7 @@ _LEAST_CURVATURE = 1e-10
 
 @dataclass(frozen=True, eq=False)
 class ClearanceProblem:
-    """Quadratic problem of a step; for the symbols see the head of the module.
+    """Quadratic problem of a step; see the module docstring for the symbols.
 
     Attributes:
         S: (nu, nu) symmetric curvature of the energy.
@@ -107,30 +108,31 @@ def boundary_normals(u: NDArray, active: NDArray, group: NDArray) -> NDArray:
 def clearance_step(
     problem: ClearanceProblem, near: bool, method: Method = "compiled"
 ) -> tuple[NDArray, NDArray] | None:
-    """Return the change of clearances that minimises the energy within the cones.
+    """Minimise the energy over the clearances within their cones.
 
     Args:
         problem: the quadratic problem.
-        near: whether the solution is so close that Newton's method is tried first.
+        near: whether the solution is close enough to try Newton's method first.
         method: method of :func:`forcefit.assembly.solvers.conic.minimise_energy`.
 
     Returns:
-        The change (nu,) and the multipliers (p,) of ``rows``; None if no clearances
-        within the cones satisfy the closures.
+        The change (nu,) of the clearances and the multipliers (p,) of ``rows``; None if
+        no clearances within the cones satisfy the closures.
     """
     step = _newton(problem) if near else None
     return step or _convex(problem, method)
 
 
 def _convex(p: ClearanceProblem, method: Method) -> tuple[NDArray, NDArray] | None:
-    """Return the step for S made convex, if possible without changing the minimum."""
+    """Return the step for a convexified S, if possible without changing the minimum."""
     least = float(np.linalg.eigvalsh(p.S).min(initial=0.0))
     force, _ = p.multipliers
     active = force[p.group]
     if least >= 0.0 or not active.any():
         return _conic(p, p.S, p.s, method)
     # the term f (|u_k|^2 - 1) / 2 is zero at the boundary, and its normal is constant
-    # to first order; adding the term makes S convex where needed and keeps the minimum
+    # to first order; adding the term makes S convex where needed and preserves the
+    # minimum
     normals = boundary_normals(p.start, force > 0.0, p.group)
     held = 0.99 * active
     convex = p.S + np.diag(held) - 10.0 * least * normals @ normals.T
@@ -145,7 +147,7 @@ def _convex(p: ClearanceProblem, method: Method) -> tuple[NDArray, NDArray] | No
 def _conic(
     p: ClearanceProblem, S: NDArray, s: NDArray, method: Method
 ) -> tuple[NDArray, NDArray] | None:
-    """Return the step computed by the conic solver, with S made convex."""
+    """Return the step computed by the conic solver for a convexified S."""
     values, vectors = np.linalg.eigh(S)
     floor = _LEAST_CURVATURE * max(float(np.abs(values).max(initial=0.0)), 1e-150)
     G = np.sqrt(np.maximum(values, floor))[:, None] * vectors.T
@@ -156,7 +158,7 @@ def _conic(
 
 
 def _newton(p: ClearanceProblem) -> tuple[NDArray, NDArray] | None:
-    """Return Newton's step on the boundaries of active cones; None if it fails."""
+    """Return the Newton step on the boundaries of active cones; None if it fails."""
     force, rigid = p.multipliers
     u, active = p.start, force > 0.0
     for _ in range(_STEPS):

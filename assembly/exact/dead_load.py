@@ -1,11 +1,12 @@
-r"""Dead loads on finite motions: constant forces at points fixed to moving bodies.
+r"""Dead loads under finite motions: constant forces at points fixed to moving bodies.
 
 The work of a dead load is linear in the pose of its body, <G, T - T_nominal>, where T
 contains the first three rows of the body's transform.  For a force f at the point a of
-the body, in the body's axes, G is f [a, 1]^T.  A couple m consists of two opposite
-forces; its G is [m]x R_nominal / 2, and its work is m . (axis sin angle).  The weight W
-of a beam acts at the middle of the cubic curve between its clamped ends.  This point is
-(p1 + p2) / 2 + (t1 - t2) / 12, where t are the end tangents times the length.
+the body, in the body's axes, G is f [a, 1]^T.  A couple m is represented by two
+opposite forces, for which G is [m]x R_nominal / 2 and the work is m . (axis sin angle).
+The weight W of a beam acts at the middle of the cubic curve between its clamped ends.
+This point is (p1 + p2) / 2 + (t1 - t2) / 12, where t are the end tangents times the
+length.
 
 ======  =============  ==========  ==================================================
 symbol  code           shape       meaning
@@ -39,7 +40,7 @@ from forcefit.stiffness.screws import rotation_matrix, skew, transform
 
 @dataclass(frozen=True, eq=False)
 class DeadLoads:
-    """All dead loads on a robot that makes finite motions.
+    """All dead loads on a robot that undergoes finite motions.
 
     Attributes:
         load: (6,) [N m, N] wrench on the platform at its origin, base axes.
@@ -70,7 +71,7 @@ def dead_loads(
     gravity: ArrayLike | None = None,
     point: ArrayLike = (0.0, 0.0, 0.0),
 ) -> DeadLoads:
-    """Return the given loads as dead loads.
+    """Convert the given loads to dead loads.
 
     Args:
         posture: configuration of a robot of n frames.
@@ -105,7 +106,7 @@ def dead_loads(
 def dead_loads_of_rows(
     postures: Posture, errors: NDArray, load: NDArray, gravity: NDArray, point: NDArray
 ) -> DeadLoads:
-    """Return the dead loads under many conditions.
+    """Return the dead loads in each of R measurements.
 
     Args:
         postures: R postures in one object.
@@ -115,7 +116,7 @@ def dead_loads_of_rows(
         point: (3,) [m] point of the platform at which the load acts, platform axes.
 
     Returns:
-        Loads whose arrays have R rows.
+        Loads whose arrays have a leading axis of length R.
     """
     robot = postures.robot
     on_bodies, carried = np.zeros((2, *errors.shape[:2], 3, 4))
@@ -149,8 +150,8 @@ def _add_weights(
         on_bodies[..., i, :, :] += at_tip
         parent = robot.parents[i]
         if parent >= 0:  # otherwise the base carries it
-            # the beam's start and tangent in the parent's frame after the parent's
-            # joint; the beam is straight up to the tip with its geometric error
+            # start and tangent of the beam in the parent's frame, after the parent's
+            # joint; the beam is straight up to its tip, including the geometric error
             error = errors[..., i, :]
             off = transform(error[..., 3:], rotation_matrix(error[..., :3]))
             T = np.linalg.inv(nominal[..., parent, :, :])
@@ -164,7 +165,7 @@ def _add_weights(
 
 
 def work_of(place: Placement, loads: DeadLoads) -> float:
-    """Return the work [J] of all loads from the nominal posture."""
+    """Return the work [J] done by all loads since the nominal posture."""
     work = 0.0
     if loads.load.any():
         work += float(loads.load @ place.platform_screw)

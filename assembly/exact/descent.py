@@ -1,4 +1,4 @@
-r"""One step to the exact equilibrium: expand, solve, restore, then accept or damp.
+r"""One step towards the exact equilibrium: expand, solve, restore, accept or damp.
 
 Near a placement x, the closures are linearised.  The Lagrangian
 
@@ -6,12 +6,12 @@ Near a placement x, the closures are linearised.  The Lagrangian
 
 is expanded to second order with its exact Hessian.  The Hessian contains the curvature
 of the closures, multiplied by their wrenches.  This term can exceed the stiffness of
-compliant springs.  Gauss-Newton steps omit it and then make no progress.  Springs and
-free motions are eliminated, and :mod:`forcefit.assembly.exact.contact_qp` solves the
-problem in the clearances.  A restoration (retraction) moves the result of the step back
+compliant springs, in which case Gauss-Newton steps, which omit it, make no progress.
+Springs and free motions are eliminated, and :mod:`forcefit.assembly.exact.contact_qp`
+solves the problem in the clearances.  A restoration (retraction) moves the result back
 onto the closures.  The step is accepted if it reduces the energy plus a penalty on the
-residual.  Otherwise a proximal term damps the next attempt, as in the method of
-Levenberg and Marquardt; the term measures every screw in radians and reference lengths.
+residual.  Otherwise the next attempt is damped by a proximal term, as in the
+Levenberg-Marquardt method, which measures every screw in radians and reference lengths.
 
 ======  =============  =============  ===============================================
 symbol  code           shape          meaning
@@ -19,7 +19,7 @@ symbol  code           shape          meaning
 A r     ``rows`` ..    (6 K, N)       closures' derivative and residual, scaled
 lambda  multipliers    (6 K,)         wrenches of the closures, scaled
 H g     ``hessian`` .. (N, N), (N,)   second derivative of L, gradient of the energy
-B       ``basis``      (N, nu + nv)   clearances with the motions that keep closures,
+B       ``basis``      (N, nu + nv)   clearances with the motions required by closures,
                                       and motions that change no closure
 ======  =============  =============  ===============================================
 
@@ -51,7 +51,7 @@ from forcefit.results.display import numbers
 
 CLOSED = 1e-12  # [rad, reference lengths] largest residual of a solution
 LONGEST_STEP = 1.0  # [rad, reference lengths] largest change in a step
-# [rad, reference lengths] residual that defines which wrenches count as small
+# [rad, reference lengths] residual that defines a small wrench
 _SMALL_RESIDUAL = 1e-9
 _LEAST_DAMPING = 1e-9  # smallest damping, relative to the largest closure wrench
 # damping after the first rejected step, relative to the largest closure wrench
@@ -61,11 +61,11 @@ _RESTORATIONS = 4  # number of corrections that move a step back onto the closur
 
 
 class NotConverged(SolverFailed):
-    """Raised if no equilibrium with finite motions is found near the linear solution.
+    """Raised if no finite-motion equilibrium is found near the linear solution.
 
     Attributes:
         problem: name of the problem.
-        status: text on the remaining residual and imbalance.
+        status: description of the remaining residual and imbalance.
     """
 
     def __init__(self, problem: str, status: str) -> None:
@@ -85,10 +85,10 @@ class Expansion:
         multipliers: (6 K,) multipliers of the closures.
         unbounded: (N,) bool, True for unknowns without cones.
         inverse: (nw, 6 K) pseudoinverse of the closure columns of these unknowns.
-        basis: (N, nu + nv) matrix B of the module's docstring.
+        basis: (N, nu + nv) matrix B, see the module docstring.
         rigid_rows: (p, nu) closure rows without springs and free motions.
         rigid_right: (p,) right side of these rows.
-        rigid_basis: (6 K, p) combinations of the closures' rows that form these rows.
+        rigid_basis: (6 K, p) combinations of the closure rows that form these rows.
     """
 
     placement: Placement
@@ -105,14 +105,14 @@ class Expansion:
 
     @property
     def small_wrench(self) -> float:
-        """[N m] scaled wrench that a residual of 1e-9 causes in the stiffest spring."""
+        """[N m] scaled wrench in the stiffest spring due to a residual of 1e-9."""
         model = self.placement.model
         softness = np.diag(model.metric)[model.springs]  # [rad^2/J]
         return _SMALL_RESIDUAL / float(softness.min(initial=1.0))
 
     @property
     def small_energy(self) -> float:
-        """[J] energy that a residual of 1e-9 causes."""
+        """[J] energy caused by a residual of 1e-9."""
         return _SMALL_RESIDUAL * self.small_wrench / 2
 
 
@@ -145,7 +145,7 @@ def expand(at: Placement, loads: DeadLoads, rigid: NDArray) -> Expansion:
         at: placement at which the problem is expanded.
         loads: loads on the robot.
         rigid: (6 K,) estimate of the multipliers of closures that depend only on
-            clearances.  The other multipliers are computed from the equilibrium of
+            clearances.  The remaining multipliers follow from the equilibrium of
             springs and free motions by least squares.
 
     Returns:
@@ -160,9 +160,9 @@ def expand(at: Placement, loads: DeadLoads, rigid: NDArray) -> Expansion:
     U, S, Vt = svd(A[:, unbounded] * unit, full_matrices=True)
     tolerance = rank_tolerance(model.posture.mismatch)
     rank = int(np.sum(S > tolerance * S.max(initial=0.0)))
-    # three parts of a singular value decomposition: left vectors of the range, divided
-    # by their singular values; left vectors of the complement; right vectors in the
-    # units of the unknowns
+    # from the singular value decomposition: left vectors of the range, divided by their
+    # singular values; left vectors of the complement; right vectors in the units of the
+    # unknowns
     range_, rigid_space, V = U[:, :rank] / S[:rank], U[:, rank:], unit[:, None] * Vt.T
     inverse = V[:, :rank] @ range_.T
     multipliers = inverse.T @ gradient[unbounded]
@@ -196,7 +196,7 @@ def _basis(unbounded: NDArray, closing: NDArray, null_space: NDArray) -> NDArray
 
 
 def _independent(rows: NDArray) -> tuple[NDArray, NDArray]:
-    """Return p independent rows that span m given rows (m, nu), and the map (m, p)."""
+    """Return p independent rows with the span of (m, nu) rows, and the map (m, p)."""
     if not rows.size:
         return np.zeros((0, rows.shape[1])), np.zeros((rows.shape[0], 0))
     U, S, _ = svd(rows, full_matrices=False)
@@ -225,14 +225,14 @@ def advance(
         local: the expanded problem.
         penalty: [N m] factor on the norm of the scaled residual, above the multipliers.
         damping: [J/rad^2] damping of the last step.
-        near: whether Newton's method is tried for the clearances.
+        near: whether to try Newton's method for the clearances.
         method: method of :func:`forcefit.assembly.exact.contact_qp.clearance_step`.
 
     Returns:
         The step.
 
     Raises:
-        NotConverged: no step, however short, reduces this sum.
+        NotConverged: no step, however short, reduces potential plus penalty.
     """
     start = local.placement
     penalised = penalty * float(np.linalg.norm(start.residual))
@@ -241,11 +241,10 @@ def advance(
     least = max(least, pull)
     before = potential(start, local.loads) + penalised
     noise = 1e-13 * (abs(before) + abs(energy_of(start)))
-    # rounding errors of angles and positions, multiplied by the forces on them
+    # round-off in angles and positions, multiplied by the forces that act on them
     noise += 1e-14 * (penalty + pull)
     for attempt in range(_ATTEMPTS):
-        # if a Newton step is rejected, the conic solver repeats the step before the
-        # step is damped
+        # a rejected Newton step is repeated by the conic solver before it is damped
         newton = near and attempt != 1
         step = _solve(local, damping + _LEAST_DAMPING * least, newton, method)
         if step is not None and step.length <= LONGEST_STEP:
@@ -267,7 +266,7 @@ def advance(
 
 
 def problem_name(at: Placement, loads: DeadLoads) -> str:
-    """Return the name of the problem for messages."""
+    """Return the name of the problem, for error messages."""
     under = f" under {numbers(loads.load)} N m, N" if loads.load.any() else ""
     return f"exact equilibrium of {at.model.posture.robot.name}{under}"
 

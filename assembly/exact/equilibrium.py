@@ -17,7 +17,7 @@ from forcefit.assembly.exact.dead_load import load_magnitudes
 from forcefit.assembly.exact.descent import Expansion
 from forcefit.assembly.solvers.cones import cone_sizes
 
-# [-] rounding error of an angle, relative to the residual that counts as small
+# [-] round-off in an angle, relative to the residual that counts as small
 _ANGLE_ROUNDING = 1e-5
 
 
@@ -28,16 +28,16 @@ def imbalance(local: Expansion) -> float:
         local: expansion at the placement.
 
     Returns:
-        [-] largest unbalanced generalised force on an unknown.  Each force is divided
-        by the sum of the forces on the unknown, or by the forces due to a residual of
-        1e-9 in closures or in the unknown if these are larger.
+        [-] largest unbalanced generalised force on any unknown.  Each force is divided
+        by the sum of the forces on that unknown, or by the forces due to a residual of
+        1e-9 in the closures or the unknown, whichever is larger.
     """
     at, A, model = local.placement, local.placement.rows, local.placement.model
     unbalanced = local.gradient - A.T @ local.multipliers
     wrench = float(np.linalg.norm(local.multipliers)) + local.small_wrench
     loads = load_magnitudes(at, local.loads)
     acting = np.linalg.norm(A, axis=0) * wrench + np.abs(local.gradient) + loads
-    # in an open chain, the forces on unloaded parts are only rounding errors
+    # in an open chain, the forces on unloaded parts are only round-off
     unit = np.sqrt(np.diag(model.metric))
     acting = np.maximum(acting, local.small_wrench * unit)
     # a clearance inside its cone carries no force; at the boundary, its force is normal
@@ -52,16 +52,16 @@ def imbalance(local: Expansion) -> float:
 
 
 def least_curvature(local: Expansion) -> float:
-    """Return the least curvature of the potential, which shows stability.
+    """Return the smallest curvature of the potential, as a measure of stability.
 
     Args:
         local: expansion at the equilibrium.
 
     Returns:
-        [J/rad^2] smallest second derivative of the potential along the motions that
-        keep closures and active constraints, per squared rad and reference length of
-        all screws.  The curvature is positive at a strict minimum, and inf if no motion
-        is possible.
+        [J/rad^2] smallest second derivative of the potential along motions that
+        preserve closures and active constraints, per squared rad and reference length
+        of all screws.  It is positive at a strict minimum, and inf if no motion is
+        possible.
     """
     D, H = tangent_space(local)
     if not D.shape[1]:
@@ -73,16 +73,16 @@ def least_curvature(local: Expansion) -> float:
 def tangent_space(
     local: Expansion, hold_touching: bool = False
 ) -> tuple[NDArray, NDArray]:
-    """Return the motions at an equilibrium that keep closures and active clearances.
+    """Return the admissible motions at an equilibrium and their curvature.
 
     Args:
         local: expansion at the equilibrium.
-        hold_touching: whether clearances that touch their bound without a force are
-            also fixed at the bound.
+        hold_touching: whether to also fix clearances that touch their bound without a
+            force.
 
     Returns:
-        (N, k) basis of the motions, and (k, k) [J] second derivative of the potential
-        in this basis.
+        (N, k) basis of the motions that preserve closures and active clearances, and
+        (k, k) [J] second derivative of the potential in this basis.
     """
     at, model = local.placement, local.placement.model
     u, group = at.x[model.bounded], model.joints.group
@@ -99,7 +99,7 @@ def tangent_space(
 
 
 def curvature_modes(D: NDArray, H: NDArray, units: NDArray) -> tuple[NDArray, NDArray]:
-    """Return motions that diagonalise the second derivative (eigenmodes).
+    """Return the eigenmodes, which diagonalise the second derivative.
 
     Args:
         D: (N, k) basis of motions.

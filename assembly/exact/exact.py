@@ -1,14 +1,14 @@
-r"""Forced assembly of least energy with finite motions, whose closures hold on SE(3).
+r"""Minimum-energy assembly with finite motions; loop closure is imposed on SE(3).
 
 Springs, clearance cones and geometric errors are those of the linear virtual-joint
 model (:mod:`forcefit.assembly.linear.energy`).  Only the closures differ, because
 finite motions are composed as in :mod:`forcefit.assembly.exact.finite_robot`.  The
-springs' energy minus the work of the loads is minimised,
+elastic energy minus the work of the loads is minimised,
 
     minimise  |y|^2 / 2 - w . x_p(y, u, q) - W(y, u, q)
     subject to  r(y, u, q) = 0,   |u_k| <= 1 for each cone k.
 
-The iteration starts from the linear solution and makes the steps of
+The iteration starts from the linear solution and takes the steps described in
 :mod:`forcefit.assembly.exact.descent`.
 
 ======  ====================  ========  ==============================================
@@ -21,7 +21,7 @@ W       ``loads``             J         work of weights and of loads on bodies
 r       ``closure_residual``  (6 K,)    logarithms of the open closures
 ======  ====================  ========  ==============================================
 
-The problem is not convex: the solution is a local minimum, see ``docs/exact.md``.
+The problem is not convex, so the solution is a local minimum; see ``docs/exact.md``.
 """
 
 from collections.abc import Callable
@@ -79,31 +79,31 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-# largest number of steps; usually 3 to 5 are needed, and 80 for motions of metres
+# largest number of steps; usually 3 to 5 suffice, but motions of metres need 80
 _STEPS = 160
 # predicted decrease of the potential, relative to its scale, below which Newton's
 # method is tried
 _NEAR = 1e-2
 # largest relative decrease of the potential predicted at the last step
 _DECREMENT = 1e-14
-# number of steps after which an equilibrium is accepted even if clearances still move
+# number of steps after which an equilibrium is accepted although clearances still move
 _RESTLESS = 100
 _STILL = 1e-9  # [rad, reference lengths] size of a last step without damping
 # [-] largest accepted relative imbalance of a solution; usually it is 1e-12
 _STATIONARY = 1e-7
-# [J] energies below this are rounding errors; without errors they are about 1e-48 J
+# [J] energies below this are round-off; without errors they are about 1e-48 J
 _ROUNDING = 1e-30
 
 
 @dataclass(frozen=True, eq=False)
 class LinearisationError:
-    """Error of the linear model: linear minus exact result.
+    """Linearisation error: linear minus exact result.
 
     Attributes:
         rotation: (3,) [rad] difference of the platform's rotation.
         translation: (3,) [m] difference of the displacement of the platform's origin.
         energy: [J] difference of the energy.
-        relative_energy: [-] difference relative to the exact energy.
+        relative_energy: [-] energy difference relative to the exact energy.
     """
 
     rotation: NDArray
@@ -114,23 +114,23 @@ class LinearisationError:
 
 @dataclass(frozen=True, eq=False)
 class ExactAssembly:
-    """Converged solution of a manipulator assembled with finite motions.
+    """Equilibrium of a manipulator assembled with finite motions.
 
-    The solution is an equilibrium: stationary, closed and within the cones, with the
-    reported residuals.  The sign of ``least_curvature`` shows whether the equilibrium
-    is a local minimum.  A lower minimum can exist elsewhere.
+    The solution is stationary, closed and within the cones, up to the reported
+    residuals.  The sign of ``least_curvature`` shows whether the equilibrium is a local
+    minimum.  A lower minimum may exist elsewhere.
 
     Attributes:
         whole: the robot's nominal configuration, with uncut beams.
-        cut: the robot with beams cut into pieces, and the map to its frames.
+        cut: the robot with its beams cut into pieces, and the map to its frames.
         linear: solution of the linear model, from which the iteration starts.
         expansion: expansion of the problem at the solution, with the multipliers of the
             scaled closures.
-        stationarity: [-] largest relative imbalance of an unknown.
+        stationarity: [-] largest relative imbalance over all unknowns.
         iterations: number of steps.
-        method: method of all cone programmes: ``"compiled"``, with Clarabel if the
-            compiled solution is not proved; or ``"reference"``, with numpy and Clarabel
-            only.
+        method: method used for all cone programs: ``"compiled"``, which falls back on
+            Clarabel if a solution cannot be certified; or ``"reference"``, which uses
+            only numpy and Clarabel.
     """
 
     whole: Posture
@@ -221,8 +221,8 @@ class ExactAssembly:
     def link_screws(self) -> NDArray:
         """(n, 6) [rad, m] deformations of the bodies, as logarithms.
 
-        For a beam in pieces, the deformation is the screw of its end relative to its
-        base.
+        For a beam cut into pieces, the deformation is the screw of its end relative to
+        its base.
         """
         screws = self.placement.screws[LINK, self.cut.last]
         pieces = np.bincount(self.cut.owner)
@@ -293,10 +293,10 @@ class ExactAssembly:
 
     @cached_property
     def linearisation_error(self) -> LinearisationError:
-        """Difference of platform screw and energy: linear minus exact result."""
+        """Linear minus exact platform screw and energy."""
         screw = self.linear.platform_screw - self.platform_screw
         energy = self.linear.energy - self.energy
-        # inside an assembly zone both energies are zero except for rounding errors
+        # inside an assembly zone both energies vanish up to round-off
         scale = max(self.energy, 1e-6 * self.linear.energy_without_clearance, _ROUNDING)
         return LinearisationError(screw[:3], screw[3:], energy, energy / scale)
 
@@ -322,33 +322,37 @@ def solve_exact(
     progress: Callable[[int, int], None] = lambda done, most: None,
     method: Method = "compiled",
 ) -> ExactAssembly:
-    """Close a manipulator with least energy and finite motions, from the linear model.
+    """Close a manipulator with minimum energy and finite motions.
+
+    The iteration starts from the solution of the linear model.
 
     Args:
         posture: configuration of the robot, with its errors, clearances, links and
             joint springs.
         load: (6,) [N m, N] wrench on the platform at ``point``, base axes; or a mapping
-            of components such as ``{"fz": -50}``.  The force is dead; the work of the
-            moment is its product with the rotation vector.
-        start: linear solution for this posture and these loads; computed if not given.
+            of components such as ``{"fz": -50}``.  The force is a dead load; the work
+            of the moment is its product with the rotation vector.
+        start: linear solution for the same posture and loads; computed by default.
         bodies: (n, 6) [N m, N] dead loads on the bodies of all frames, each at its
             frame's origin, base axes; moments are couples of dead forces.
         gravity: (3,) [m/s^2] gravity vector in base axes; for links see
             :mod:`forcefit.assembly.exact.dead_load`.
         point: (3,) [m] point of the platform, in platform axes; the force moves with
             it.
-        near: equilibrium of the same posture under another load, used as the start.
-        progress: function called with the number of steps made and the largest number
-            of steps.
-        method: method of the linear solution and of every step: ``"compiled"``, with
-            Clarabel if the compiled solution is not proved; or ``"reference"``, with
-            numpy and Clarabel only.
+        near: equilibrium of the same posture under another load, used as the initial
+            guess.
+        progress: function called with the number of completed steps and the largest
+            number of steps.
+        method: method for the linear solution and for every step: ``"compiled"``, which
+            falls back on Clarabel if a solution cannot be certified; or
+            ``"reference"``, which uses only numpy and Clarabel.
 
     Returns:
-        The assembled manipulator: closed, stationary and within its cones.
+        The assembled manipulator.
 
     Raises:
-        CannotAssemble: the linear model has no solution to start from.
+        CannotAssemble: the linear model, which provides the initial guess, has no
+            solution.
         FreeMotion: a load acts along a motion without stiffness.
         NotConverged: no equilibrium was found near the linear solution; a subclass of
             :class:`SolverFailed`.
@@ -367,7 +371,7 @@ def solve_exact(
     ):
         raise ValueError(
             "solve_exact: start: found the linear solution of another posture "
-            "or load, expected that of this posture and load; leave start out "
+            "or load, expected that of this posture and load; omit start "
             "to have it computed"
         )
     placed = posture
@@ -393,11 +397,11 @@ def solve_exact(
 
 
 def _refuse_compiled(*starts: Assembly | ExactAssembly | None) -> None:
-    """Raise ValueError for a compiled solution as start of the reference method."""
+    """Raise ValueError if the reference method would start from a compiled solution."""
     if any(start is not None and start.method != "reference" for start in starts):
         raise ValueError(
             "solve_exact: start or near: found a solution of the compiled "
-            "kernels, expected one of method 'reference'; leave it out to have "
+            "kernels, expected one of method 'reference'; omit it to have "
             "it computed"
         )
 

@@ -1,14 +1,13 @@
 r"""Robot at a posture, with unknowns that move its frames by finite screws.
 
-The motions at a frame are composed in its axes.  Each motion is the exponential of a
-screw:
+The motions at a frame are composed in its axes.  Each one is an exponential of a screw:
 
     T_i = T_parent  F_i  exp(dl)^  exp(de)  exp(dc)  exp(db)  (motion of the joint).
 
 F_i is the nominal body.  exp(dl)^ is the geometric error: a rotation vector and a
 translation, both in the frame's axes.  The motion of the joint is a rotation about z or
-a translation along z.  Its size is the nominal joint coordinate, plus the additional
-motion if the joint is passive.
+a translation along z.  Its magnitude is the nominal joint coordinate, plus an
+additional motion if the joint is passive.
 """
 
 from dataclasses import dataclass
@@ -91,7 +90,7 @@ class FiniteRobot:
 
     @cached_property
     def units(self) -> NDArray:
-        """(N,) scale of the unknowns: 1 for springs; screws of motions get size 1."""
+        """(N,) scale of the unknowns: 1 for springs, unit screws for motions."""
         units = np.ones(len(self.frame))
         units[self.bounded.stop :] /= np.linalg.norm(
             self.columns[self.bounded.stop :] * self.scale, axis=1
@@ -110,7 +109,7 @@ class FiniteRobot:
 
     @cached_property
     def metric(self) -> NDArray:
-        """(N, N) scalar products of the unknowns' screws, in rad and lengths."""
+        """(N, N) scalar products of the screws of the unknowns, in rad and lengths."""
         together = self.same_motion & (self.frame[:, None] == self.frame)
         scaled = self.columns * self.scale
         return (scaled @ scaled.T) * together
@@ -127,12 +126,12 @@ class FiniteRobot:
 
     @cached_property
     def signs(self) -> NDArray:
-        """(K, N) +1 on a closure's first chain, -1 on its second, 0 on both or none."""
+        """(K, N) +1 on the first chain of a closure, -1 on the second, otherwise 0."""
         return closure_signs(self.posture.robot)[:, self.frame]
 
     @cached_property
     def chains(self) -> tuple[NDArray, NDArray]:
-        """(K, N) bool for each of a closure's two chains: unknowns on that chain."""
+        """(K, N) bool for each chain of a closure: unknowns on that chain."""
         robot = self.posture.robot
         ends = self.closed_frames
         first, second = (robot.on_path[ends[:, k]][:, self.frame] for k in (0, 1))
@@ -162,7 +161,7 @@ class FiniteRobot:
 
     @cached_property
     def comes_before(self) -> NDArray:
-        """(N, N) 1 if the first unknown moves the second, 1/2 within one motion."""
+        """(N, N) 1 if the first unknown moves the second, 1/2 in the same motion."""
         above = self.posture.robot.on_path[self.frame][:, self.frame].T
         return above * (1.0 - np.sign(self._order[:, None] - self._order)) / 2
 
@@ -178,7 +177,7 @@ class FiniteRobot:
     def nominal_closures(self) -> NDArray:
         """(K, 4, 4) nominal second frame of each closure relative to the first."""
         first, second = self.posture.transforms[self.closed_frames.T]
-        # not exactly the identity, because robot files are rounded
+        # close to the identity, but not exactly, because robot files are rounded
         return inverse(first) @ second
 
 

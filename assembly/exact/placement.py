@@ -1,4 +1,4 @@
-r"""Robot displaced by finite screws, with first and second derivatives of its closures.
+r"""Robot displaced by finite screws, with derivatives of its closures up to order two.
 
 ======  =================  ==========  =============================================
 symbol  code               shape       meaning
@@ -60,7 +60,7 @@ class Placement:
 
     @cached_property
     def own(self) -> NDArray:
-        """(n,) [rad or m] motion of passive joints in addition to their coordinate."""
+        """(n,) [rad or m] additional motion of passive joints."""
         m = self.model
         rows = m.motion == OWN
         axes = np.array([frame.own_axis for frame in m.posture.robot.frames])
@@ -143,7 +143,7 @@ class Placement:
 
     @cached_property
     def _readings(self) -> NDArray:
-        """(N, 6, 6) maps that move each unknown's screw to the platform's origin."""
+        """(N, 6, 6) maps from each unknown's screw to the platform's origin."""
         m = self.model
         before = self._poses[m.motion, m.frame]
         offset = before[:, :3, 3] - m.posture.platform[:3, 3]
@@ -188,10 +188,10 @@ class Placement:
         return np.concatenate([turn, W[3:]])
 
     def curvature(self, multipliers: NDArray, load: NDArray) -> NDArray:
-        """Return second derivative of multipliers . residual + load . platform screw.
+        """Return the Hessian of multipliers . residual + load . platform screw.
 
-        The result is exact if the closures hold.  Otherwise its error is of the order
-        of the residual.
+        The result is exact if the closures hold; otherwise its error is of the order of
+        the residual.
 
         Args:
             multipliers: (6 K,) multipliers of the scaled residual.
@@ -214,7 +214,7 @@ class Placement:
         return H + self.exponential_curvature(through)
 
     def exponential_curvature(self, through: NDArray) -> NDArray:
-        """Return the part of the curvature that the individual exponentials cause.
+        """Return the curvature due to the individual exponentials.
 
         Args:
             through: (N, 6) wrench on all parts that each unknown moves, at the
@@ -233,7 +233,7 @@ class Placement:
         return (rows @ m.columns.T) * m.same_motion
 
     def load_wrench(self, load: NDArray) -> NDArray:
-        """Return the (6,) wrench at the nominal origin that does the load's work."""
+        """Return the (6,) equivalent wrench of a load at the nominal origin."""
         moment = np.linalg.solve(turn_jacobian(self.platform_screw[:3]).T, load[:3])
         arm = self.platform_screw[3:]
         return np.concatenate([moment + np.cross(arm, load[3:]), load[3:]])
@@ -258,13 +258,13 @@ class Placement:
 
 
 def place(model: FiniteRobot, x: NDArray) -> Placement:
-    """Return the robot moved by finite screws.
+    """Place a robot that is moved by finite screws.
 
     Args:
         model: robot with its unknowns.
         x: (N,) values of the unknowns.
 
     Returns:
-        The placement, which computes the positions of all frames.
+        The placement, which evaluates the positions of all frames on demand.
     """
     return Placement(model, np.array(x, dtype=float))

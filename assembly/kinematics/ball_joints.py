@@ -1,9 +1,9 @@
-"""Detection of ball joints that are modelled as three revolute frames.
+"""Detect ball joints that are modelled as three revolute frames.
 
 In the home pose, the three axes are at right angles.  If the middle joint rotates by 90
-degrees, two axes coincide, and the model loses a freedom.  A real ball joint does not:
-it can rotate about any axis through its centre.  This module therefore treats such
-frames as a ball joint at every posture.
+degrees, two axes coincide, and the model loses a degree of freedom.  A real ball joint
+has no such singularity, because it can rotate about any axis through its centre.  Such
+frames are therefore treated as a ball joint at every posture.
 """
 
 from collections import Counter
@@ -75,8 +75,8 @@ def with_balls(robot: Robot, T: NDArray, screws: NDArray) -> NDArray:
         screws: (n, 6) screws of unit joint motions, at the base's origin.
 
     Returns:
-        (n, 6) screws that span the same motions, and three rotations for every ball
-        joint at every posture.
+        (n, 6) screws that span the same motions, with three independent rotations for
+        every ball joint at every posture.
     """
     screws = screws.copy()
     for ball in ball_joints(robot):

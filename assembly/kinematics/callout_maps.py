@@ -1,13 +1,12 @@
-"""Geometric errors delta l of the frames that tolerance callouts of drawings cause.
+"""Map tolerance callouts of drawings to geometric errors delta l of the frames.
 
-Each feature of a body deviates from its nominal position by a small screw.  The screw
-of a feature is its screw within its tolerance zone plus the screw of the datum frame.
-The datum frame is built from the datums A, B and C in this order: A fixes the
-components that its shape determines, B fixes components that A leaves free, and C the
-remaining ones.  A feature before its joint is the end of a body; its screw is the
-geometric error delta l of the frame.  A feature after its joint is the start of the
-next body.  All frames that the joint carries then move relative to the feature by the
-negative screw.
+Each feature of a body deviates from its nominal position by a small screw: the screw
+within its tolerance zone plus the screw of its datum frame.  The datum frame is built
+from the datums A, B and C in this order: A fixes the components that its shape
+determines, B fixes components that A leaves free, and C the remaining ones.  A feature
+before its joint is the end of a body; its screw is the geometric error delta l of the
+frame.  A feature after its joint is the start of the next body.  All frames carried by
+the joint then move relative to the feature by the opposite screw.
 """
 
 from collections.abc import Mapping
@@ -38,20 +37,20 @@ from forcefit.assembly.model.robot import Robot
 from forcefit.inputs.table import BadInput, quoted
 from forcefit.stiffness.screws import screw_map, transform
 
-_RANK = 1e-9  # singular values below this are rounding errors
+_RANK = 1e-9  # singular values below this are round-off
 
-# name of a frame; True for the body after its joint, False for that before
+# name of a frame; True for the body after its joint, False for the body before it
 Side = tuple[str, bool]
 
 
 @dataclass(frozen=True, eq=False)
 class _Bodies:
-    """Rigid bodies of a robot in its home pose, and the frames at their features."""
+    """Rigid bodies of a robot in its home pose, with the frames at their features."""
 
     robot: Robot
     before: NDArray  # (n, 4, 4) frames before the motion of their joints, base axes
     after: NDArray  # (n, 4, 4) frames after the motion of their joints, base axes
-    groups: tuple[int, ...]  # body that each frame's joint carries; the base is last
+    groups: tuple[int, ...]  # body carried by each frame's joint; the base is last
 
     def body(self, side: Side) -> int:
         """Return the number of the body on a side of a frame."""
@@ -64,19 +63,18 @@ class _Bodies:
 
 
 def place_callouts(home: Posture) -> tuple[PlacedCallout, ...]:
-    """Return the callouts of a robot, with their effect on the errors of its frames.
+    """Compute the effect of a robot's tolerance callouts on its frame errors.
 
     Args:
         home: home posture of the robot.
 
     Returns:
-        The callouts in the order of the robot, followed by the shifts of datums at
-        maximum material.
+        The callouts in the order of the robot, followed by datum shifts at maximum
+        material.
 
     Raises:
         BadInput: a feature has two callouts, a datum is not on the body of the feature,
-            datums refer to each other in a circle, or a callout contradicts the nominal
-            geometry.
+            datums form a cycle, or a callout contradicts the nominal geometry.
     """
     callouts = home.robot.callouts
     if not callouts:
@@ -166,7 +164,7 @@ def _bodies(home: Posture) -> _Bodies:
 def _datum_sides(
     bodies: _Bodies, callout: Callout, sides: Mapping[Side, int]
 ) -> list[Side]:
-    """Return for each datum its frame, and the side of it on the feature's body."""
+    """Return the frame of each datum, and its side on the body of the feature."""
     body = bodies.body((callout.feature, callout.after))
     found = []
     for name in (datum.frame for datum in callout.datums):
@@ -179,8 +177,7 @@ def _datum_sides(
             fault = f"found the datum {quoted(name)}, which is the feature itself"
             fault += ", expected another feature of the body"
             raise BadInput(fault_of(callout, fault))
-        # if both sides of a rigid connection are possible, prefer the side that has
-        # callouts
+        # if both sides of a rigid connection qualify, prefer the one with callouts
         found.append(next((side for side in here if side in sides), here[0]))
     return found
 
@@ -197,7 +194,7 @@ def _order(
         return list(TopologicalSorter(needs).static_order())
     except CycleError as error:
         names = " -> ".join(quoted(callouts[k].name) for k in error.args[1])
-        fault = f"found datums that depend on each other: {names}; expected none"
+        fault = f"found datums that depend on each other: {names}; expected no cycle"
         raise BadInput(fault_of(callouts[error.args[1][0]], fault)) from None
 
 
@@ -211,7 +208,7 @@ def _datum_pose(
     bodies: _Bodies, datum: Datum, side: Side, callouts: tuple[Callout, ...],
     sides: Mapping[Side, int],
 ) -> NDArray:  # fmt: skip
-    """Return the (4, 4) home pose of a datum, in the axes of its callouts if any."""
+    """Return the (4, 4) home pose of a datum, in the axes of its own callouts."""
     if side in sides:
         return _feature_pose(bodies, callouts[sides[side]])
     return bodies.pose(side) @ transform(np.array(datum.at), axes_along(datum.axis))
@@ -279,7 +276,7 @@ def _datum_frame(
 def _add_errors(
     errors: NDArray, bodies: _Bodies, callout: Callout, screw: NDArray
 ) -> None:
-    """Add the errors delta l of frames that a feature's screw (6, M) causes."""
+    """Add the frame errors delta l caused by a feature's screw (6, M)."""
     robot, row = bodies.robot, bodies.robot.index(callout.feature)
     pose = _feature_pose(bodies, callout)
     if not callout.after:
@@ -287,7 +284,7 @@ def _add_errors(
         return
     children = np.flatnonzero(robot.parents == row)
     if not len(children):
-        fault = "found no frame that its joint carries, expected one or more"
+        fault = "found no frame carried by its joint, expected at least one"
         raise BadInput(fault_of(callout, fault))
     for child in children:
         errors[child] -= _carried(pose, bodies.before[child]) @ screw

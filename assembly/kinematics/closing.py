@@ -1,9 +1,10 @@
-"""Robots whose nominal closures do not hold: the mismatch becomes a geometric error.
+"""Close robots whose nominal loops are open, by assigning the mismatch to a part.
 
-Published dimensions and coordinates of redundant drives are rounded, so closures can be
-open.  The mismatch is assigned to the body of a frame as a geometric error, or to the
-elastic drives as a preload.  The nominal geometry of the returned robot closes.
-Nominal geometry and geometric errors together equal the given robot.
+Published dimensions and coordinates of redundant drives are rounded, so closures may
+not hold exactly.  The mismatch is assigned either to the body of a frame, as a
+geometric error, or to the elastic drives, as a preload.  The nominal geometry of the
+returned robot closes.  Together, its nominal geometry and geometric errors reproduce
+the given robot.
 """
 
 from collections.abc import Callable, Mapping
@@ -34,19 +35,19 @@ def closing_of(
     joints: Mapping[str, float] | None = None,
     own_errors: bool = True,
 ) -> Callable[[Robot], Robot] | None:
-    """Return a function that closes a robot, as ``--rest`` and ``--mismatch`` specify.
+    """Return the function selected by ``--rest`` or ``--mismatch`` to close a robot.
 
     Args:
         rest: name of a frame, see :func:`rest_in`.
         mismatch: ``"spring"``, see :func:`preloaded`.
         joints: coordinates of drives for ``mismatch``.
-        own_errors: whether the robot keeps its geometric errors.  If not, it keeps only
-            the errors due to its closures, because randomly drawn errors replace the
-            others.
+        own_errors: whether to retain the geometric errors of the robot.  If False, only
+            the errors due to its closures are retained, because random samples replace
+            the others.
 
     Returns:
-        A function that returns the closed robot for a declared robot; None if neither
-        ``rest`` nor ``mismatch`` is given.
+        A function that maps a declared robot to a closed one; None if neither ``rest``
+        nor ``mismatch`` is given.
 
     Raises:
         BadInput: ``mismatch`` is not ``"spring"``.
@@ -69,18 +70,18 @@ def closing_of(
 
 
 def rest_in(robot: Robot, name: str) -> Robot:
-    """Return the robot with its closure's mismatch as a geometric error of a frame.
+    """Assign the closure mismatch of a robot to a frame as a geometric error.
 
     Args:
         robot: any robot.  Its drives are at their ``position``, and its passive joints
-            are moved as near to closing as possible.
+            minimise the mismatch.
         name: name of a frame, or of a joint of several frames, in the loop that does
             not close.  For a universal joint, the mismatch is assigned to its first
             bearing.
 
     Returns:
-        A robot whose nominal geometry closes.  With its geometric errors, it equals the
-        given robot.
+        A robot whose nominal geometry closes.  Including its geometric errors, it is
+        identical to the given robot.
 
     Raises:
         BadInput: there is no such frame, no loop through it is open, or the mismatch is
@@ -107,7 +108,7 @@ def rest_in(robot: Robot, name: str) -> Robot:
 
 
 def _corrected(robot: Robot, row: int, X: NDArray) -> Robot:
-    """Return the robot with a frame moved by X, and the inverse of X as its error."""
+    """Move a frame by X and assign the inverse of X as its geometric error."""
     frame = robot.frames[row]
     body = transform(frame.translation, rotation_matrix(frame.rotation)) @ X
     error = frame.geometric_error
@@ -115,7 +116,7 @@ def _corrected(robot: Robot, row: int, X: NDArray) -> Robot:
     screw = np.concatenate([rotation_vector(D[:3, :3]), D[:3, 3]])
     if np.abs(screw).max() > _SMALL:
         raise BadInput(
-            f"--rest: frame {frame.name}: closing the loop needs a motion of "
+            f"--rest: frame {frame.name}: closing the loop requires a motion of "
             f"{np.abs(screw).max():.3g} rad or m, expected a small motion, < "
             f"{_SMALL:g}"
         )
@@ -133,21 +134,21 @@ def _corrected(robot: Robot, row: int, X: NDArray) -> Robot:
 
 
 def preloaded(robot: Robot, joints: Mapping[str, float] | None = None) -> Robot:
-    """Return a robot whose elastic drives are preloaded by the closures' mismatch.
+    """Preload the elastic drives of a robot by its closure mismatch.
 
     Args:
         robot: robot with redundant drives that are elastic.
-        joints: coordinates [rad or m] of drives by frame; other drives keep their
+        joints: coordinates [rad or m] of drives by frame; other drives stay at their
             ``position``.
 
     Returns:
         A robot whose home pose is the nearest pose that closes.  The error of each
-        drive is the difference from its requested coordinate; the drive's spring takes
-        up this difference.
+        drive is the difference from its requested coordinate, which is taken up by the
+        spring of the drive.
 
     Raises:
-        BadInput: a drive is unknown; there are no closing coordinates nearby; or a
-            drive with a difference is rigid.
+        BadInput: a drive is unknown, no closing coordinates exist nearby, or a drive
+            that must take up a difference is rigid.
     """
     target = joint_target(robot, joints or {})
     assert target.coordinates is not None
@@ -164,8 +165,7 @@ def preloaded(robot: Robot, joints: Mapping[str, float] | None = None) -> Robot:
     if not closes or np.abs(differs).max() > _SMALL:
         raise BadInput(
             f"{robot.name}: no posture near these drive coordinates closes; "
-            "expected coordinates at which all loops close except for their "
-            "rounding"
+            "expected coordinates at which all loops close except for rounded digits"
         )
     closed = _positioned(robot, there.coordinates[0])
     frames = []
@@ -190,7 +190,7 @@ def preloaded(robot: Robot, joints: Mapping[str, float] | None = None) -> Robot:
 
 
 def _positioned(robot: Robot, q: NDArray) -> Robot:
-    """Return the robot with the coordinates q in its home pose."""
+    """Return the robot with home coordinates q."""
     moves = mobile(robot)
     frames = tuple(
         replace(frame, position=float(value)) if moving else frame
@@ -200,12 +200,12 @@ def _positioned(robot: Robot, q: NDArray) -> Robot:
 
 
 def _independent(robot: Robot, T: NDArray) -> NDArray:
-    """Return (n,) bool, True for the first drives in the file that fix the robot."""
+    """Return (n,) bool, True for a set of non-redundant drives, in file order."""
     A = closure_matrices(robot, T)[0][0]
     driven = np.array([f.actuated for f in robot.frames])[mobile(robot)]
     loose = ~driven
     for column in np.flatnonzero(driven)[::-1]:
-        # a drive is redundant if the other drives fix it through the closures
+        # a drive is redundant if the other drives determine it through the closures
         others = np.append(np.flatnonzero(loose), column)
         if _rank(A[:, others]) > _rank(A[:, loose]):
             loose[column] = True
@@ -215,5 +215,5 @@ def _independent(robot: Robot, T: NDArray) -> NDArray:
 
 
 def _rank(A: NDArray) -> int:
-    """Return the number of singular values above rounding."""
+    """Return the number of singular values above round-off."""
     return int(np.linalg.matrix_rank(A, tol=1e-6)) if A.size else 0

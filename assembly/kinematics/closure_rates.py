@@ -9,8 +9,7 @@ from forcefit.assembly.kinematics.nominal import mobile, motion_screws, size_of
 from forcefit.assembly.model.robot import Robot
 
 # relative size below which a singular value of the closures counts as zero. Closures
-# hold to 1e-10; near a singularity, the error of the posture is the square root of this
-# error
+# hold to 1e-10; near a singularity, the posture error is the square root of this value
 SINGULAR = 1e-6
 _NOISE = 30.0  # assumed noise of the singular values divided by the closure error
 
@@ -76,12 +75,12 @@ def locked_ranks(robot: Robot, T: NDArray) -> NDArray:
 
 
 def redundant_drives(robot: Robot, T: NDArray, left_open: float = 0.0) -> int:
-    """Return the number of drives that are not needed to fix the robot.
+    """Return the number of redundant drives.
 
     Args:
         robot: robot of n frames.
         T: (n, 4, 4) frames seen from the base.
-        left_open: [rad, m] closure error at this posture: singular values of this size
+        left_open: [rad, m] closure error at this posture; singular values of this size
             count as zero.
 
     Returns:

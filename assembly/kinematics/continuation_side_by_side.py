@@ -1,7 +1,7 @@
-"""Continuation to several targets in parallel, compiled.
+"""Compiled continuation to several targets in parallel.
 
-Each lane of the processor's vector registers follows one target.  Lanes do not depend
-on each other.
+Each lane of the processor's vector registers follows one target, independently of the
+others.
 """
 
 from typing import Any
@@ -32,7 +32,7 @@ def follow_side_by_side(
     tree: Any, start: NDArray, poses: NDArray, held: NDArray, guess: bool,
     track: Track,
 ) -> None:  # fmt: skip
-    """Follow the robot to every target along a straight line.
+    """Move the robot to every target along a straight line.
 
     Args:
         tree: tree of the robot.
@@ -41,7 +41,7 @@ def follow_side_by_side(
             poses are given.
         held: (k, n) coordinates, NaN for free coordinates.
         guess: whether ``start`` is a guess at which the closures are open.  In this
-            case, one step of any length is made.
+            case, a single step of unlimited length is made.
         track: track to fill.
     """
     out = (track.coordinates, track.progress, track.transforms, track.closure_mismatch)

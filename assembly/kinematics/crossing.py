@@ -1,9 +1,9 @@
 """Test whether a posture is separated from the home pose by a singularity.
 
-With drives locked, the closure matrix A (6 c, p) of the passive joints has the rank r
-at almost all postures.  Expressed in bases of its range and its row space, which are
-carried along a path from home, A is a square matrix with a determinant.  A change of
-sign of this determinant shows that the path crossed a singularity.
+With drives locked, the closure matrix A (6 c, p) of the passive joints has rank r at
+almost all postures.  In bases of its range and row space that are transported along a
+path from home, A is a square matrix.  A sign change of its determinant shows that the
+path crossed a singularity.
 """
 
 from functools import lru_cache
@@ -17,11 +17,11 @@ from forcefit.assembly.kinematics.posture import Posture, home_posture, pose_com
 from forcefit.assembly.kinematics.singular_posture import rank_near
 from forcefit.assembly.model.robot import Robot
 
-_ALIKE = 0.3  # least accepted overlap of the bases at the start and the end of a step
+_ALIKE = 0.3  # smallest accepted overlap of the bases at both ends of a step
 _STEPS = (
     4,
     32,
-)  # numbers of steps of a path, tried in this order if the bases rotate too far
+)  # numbers of steps per path, tried in this order if the bases rotate too far
 
 
 def beyond_singularity(robot: Robot, target: Target, T: NDArray) -> NDArray:
@@ -33,7 +33,7 @@ def beyond_singularity(robot: Robot, target: Target, T: NDArray) -> NDArray:
         T: (k, n, 4, 4) frames at these targets.
 
     Returns:
-        (k,) bool.  All False if the home pose is singular.
+        (k,) bool; all False if the home pose is singular.
     """
     home = home_posture(robot)
     start = locked_closures(robot, home.transforms[None])
@@ -83,7 +83,7 @@ def _compared(A: NDArray, B: NDArray, rank: int) -> tuple[NDArray, NDArray]:
 def _along(
     robot: Robot, home: Posture, target: Target, steps: int, rank: int, ends: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Return signs and least overlaps of bases carried along the paths from home."""
+    """Return signs and smallest overlaps of bases transported along paths from home."""
     before = locked_closures(robot, home.transforms[None]).repeat(len(ends), axis=0)
     signs, alike = np.ones(len(ends)), np.ones(len(ends))
     for k in range(1, steps + 1):

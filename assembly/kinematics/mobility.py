@@ -1,8 +1,8 @@
-"""Mobility and redundant constraints of the perfect robot, from ranks of its closures.
+"""Mobility and redundant constraints of the ideal robot, from ranks of its closures.
 
-:func:`mobility` counts freedoms at one posture.  :func:`platform_screws` returns the
-free motions of the platform there.  :func:`mobility_near` counts freedoms at postures
-close to it.
+:func:`mobility` counts the degrees of freedom at one posture.  :func:`platform_screws`
+returns the free motions of the platform there.  :func:`mobility_near` counts the
+degrees of freedom at postures close to it.
 """
 
 from collections import Counter
@@ -21,52 +21,52 @@ from forcefit.assembly.model.contact_closures import contact_closures
 from forcefit.results.display import html_table
 
 # relative size below which singular values count as zero: files are rounded to 6
-# digits, and the error of singular postures is the square root of the closure error
-# 1e-10
+# digits, and singular postures have errors of sqrt(1e-10), the closure error
 ZERO = 1e-5
-# [rad, lengths] least motion of the platform for unit joint rates
+# [rad, lengths] smallest platform motion that counts, for unit joint rates
 _PLATFORM_RANK = 1e-6
 _ERROR = 10.0  # assumed error of free motions times the ratio of singular values
-_NOISE = 1e-14  # relative rounding error of singular values
+_NOISE = 1e-14  # relative round-off error of singular values
 _DISTANCE = 0.05  # [rad or reference lengths] distance to nearby postures
 _NEIGHBOURS = 16  # largest number of nearby postures
 _AGREEING = 3  # number of nearby postures whose counts must agree
-_EXACT = 1e-12  # [rad, m] closure error that is only rounding
+_EXACT = 1e-12  # [rad, m] closure error that is only round-off
 _LEAST = 1e-8  # relative size below which singular values count as zero at _EXACT
 _CLOSED = 1e-6  # [rad, m] largest closure error of a nearby posture
-_BACK = 0.1  # share of the distance; a posture that moved less counts as not moved
+_BACK = 0.1  # fraction of the distance; a posture that moved less counts as unchanged
 
 
 @dataclass(frozen=True)
 class Mobility:
-    """Degrees of freedom at one posture, if joints are rigid except for their motion.
+    """Degrees of freedom at one posture, with joints rigid except for their motion.
 
     Attributes:
-        freedoms: number of independent joint motions that keep all closures, with the
-            drives free.
+        freedoms: number of independent joint motions that preserve all closures, with
+            the drives free.
         platform_freedoms: number of independent motions of the platform among them.
-            The others are local motions of the legs, during which the platform is at
+            The remaining ones are local motions of the legs that leave the platform at
             rest.
-        freedoms_drives_locked: number of independent joint motions that keep all
+        freedoms_drives_locked: number of independent joint motions that preserve all
             closures, with the drives locked.
         platform_freedoms_drives_locked: number of independent motions of the platform,
             with the drives locked.
         redundant_constraints: number of constraints of all joints with drives locked,
-            minus their rank: number of independent internal loads of the rigid robot.
+            minus their rank.  It equals the number of independent internal loads of the
+            rigid robot.
         drives: number of actuated joints.
         locked_freedoms: equal to ``freedoms_drives_locked``.
         overconstraint: number of closure equations that depend linearly on the others,
             with the drives free.
-        smallest_singular_value: [-] least nonzero singular value of the constraint
-            matrix, with lengths divided by the robot's size.  A value near zero shows
-            that a singularity is near.
+        smallest_singular_value: [-] smallest nonzero singular value of the constraint
+            matrix, with lengths divided by the size of the robot.  A value near zero
+            indicates a nearby singularity.
         local_freedoms: ``freedoms`` minus ``platform_freedoms``.
-        actuation_redundancy: number of redundant drives: drives minus the freedoms that
-            the drives lock.
-        singular_value_gap: [-] least singular value that counts as nonzero, divided by
-            the largest that counts as zero, or by the rounding errors if there is none.
-            The value is the smaller one of two ratios, with the drives free and locked.
-            If it is below about 100, the counts are uncertain.
+        actuation_redundancy: number of redundant drives, which is the number of drives
+            minus the degrees of freedom that they lock.
+        singular_value_gap: [-] smallest singular value that counts as nonzero, divided
+            by the largest that counts as zero, or by the round-off error if there is
+            none.  The smaller of the two ratios with drives free and drives locked is
+            given.  If it is below about 100, the counts are uncertain.
     """
 
     freedoms: int
@@ -90,9 +90,9 @@ class NearMobility:
     """Mobility at postures close to a given posture.
 
     Attributes:
-        freedoms: the least number of freedoms at these postures; 0 if no motion leaves
-            the given posture, because its freedoms are only infinitesimal.
-        there: the counts at a nearby posture with this number; None if no posture was
+        freedoms: smallest number of degrees of freedom at these postures; 0 if the
+            degrees of freedom at the given posture are only infinitesimal.
+        there: counts at a nearby posture with this number; None if no posture was
             found.
     """
 
@@ -106,15 +106,15 @@ def mobility(posture: Posture, tolerance: float = ZERO) -> Mobility:
     Args:
         posture: the robot's configuration.
         tolerance: relative size below which a singular value counts as zero.  It is
-            increased to 30 times the nominal closure error, which rounding of the robot
-            file causes.
+            increased to 30 times the nominal closure error caused by rounded numbers in
+            the robot file.
 
     Returns:
         The counts.
 
     Sources:
         Zlatanov, Bonev, Gosselin (2002), Constraint singularities of parallel
-        mechanisms: freedoms as the null space of the joint screws of all closures.
+        mechanisms: degrees of freedom as the null space of the joint screws.
     """
     A, P = _rates(posture)
     moves = mobile(posture.robot)
@@ -149,7 +149,7 @@ def platform_screws(posture: Posture) -> tuple[NDArray, float]:
 
     Returns:
         (k, 6) [rad, m] screws of the k ``platform_freedoms``, at the platform's origin
-        in base axes; orthonormal if lengths are divided by the robot's size.  Also the
+        in base axes, orthonormal after lengths are divided by the robot's size; and the
         error [rad, reference lengths] of these screws.
     """
     A, P = _rates(posture)
@@ -162,15 +162,15 @@ def platform_screws(posture: Posture) -> tuple[NDArray, float]:
 
 
 def mobility_near(posture: Posture, here: Mobility) -> NearMobility:
-    """Return the mobility at postures near one, which can be less than at that posture.
+    """Return the mobility near a posture, which can be lower than at the posture.
 
     Args:
         posture: the robot's configuration.
         here: mobility at this posture.
 
     Returns:
-        The least number of freedoms, and the counts at a nearby posture with this
-        number.
+        The smallest number of degrees of freedom, and the counts at a nearby posture
+        with this number.
     """
     robot, q = posture.robot, posture.coordinates
     if here.freedoms == 0 or _certainly_least(here):
@@ -196,14 +196,14 @@ def mobility_near(posture: Posture, here: Mobility) -> NearMobility:
         if _AGREEING in {returned, *agreeing.values()}:
             break
     if not found:
-        # no nearby posture was found, so no smaller number of freedoms is known
+        # no nearby posture was found, so no smaller count is known
         return NearMobility(0 if returned == _AGREEING else here.freedoms, None)
     least = min(found, key=lambda m: (m.freedoms, m.freedoms_drives_locked))
     return NearMobility(min(least.freedoms, here.freedoms), least)
 
 
 def _certainly_least(here: Mobility) -> bool:
-    """Return whether all closures are independent, so no posture has fewer freedoms."""
+    """Return whether independent closures rule out lower mobility elsewhere."""
     return here.overconstraint == 0 and here.freedoms_drives_locked == 0
 
 
@@ -215,8 +215,8 @@ def _tolerance(posture: Posture, least: float = ZERO) -> float:
 def _rates(posture: Posture) -> tuple[NDArray, NDArray]:
     """Return velocities of closures and platform for unit joint rates.
 
-    Lengths are divided by the robot's size.  The unit rate of a prismatic joint is one
-    size, so the counts do not depend on the size.
+    Lengths, including the unit rate of a prismatic joint, are measured in units of the
+    robot's size, so that the counts do not depend on it.
 
     Returns:
         (6 closures, n) at the base's origin, without the directions that contacts leave
@@ -237,7 +237,7 @@ def _rates(posture: Posture) -> tuple[NDArray, NDArray]:
 
 @dataclass(frozen=True, eq=False)
 class _Motions:
-    """Joint motions that keep the closures, and the resulting platform motions.
+    """Joint motions that preserve the closures, and the resulting platform motions.
 
     Attributes:
         values: singular values of the closures, the largest first.
@@ -267,7 +267,7 @@ class _Motions:
 
     @property
     def gap(self) -> float:
-        """Least singular value that counts as nonzero, relative to the next one."""
+        """Smallest singular value that counts as nonzero, relative to the next one."""
         rank = self.joints.shape[1] - len(self.joints)
         if not rank:
             return np.inf
@@ -277,7 +277,7 @@ class _Motions:
 
 
 def _motions(A: NDArray, P: NDArray, tolerance: float, least: float = 0.0) -> _Motions:
-    """Return the joint motions that keep the closures, and the platform motions.
+    """Return the joint motions that preserve the closures, and the platform motions.
 
     Args:
         A: (6 closures, joints) velocities of closures for unit joint rates.

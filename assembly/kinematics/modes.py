@@ -1,8 +1,8 @@
 """Continuation from a singular home pose, where several operation modes meet.
 
-At such a pose, the closures and a partial pose, or the drives, do not determine the
-operation mode; rounding errors would select it.  The platform therefore keeps the pose
-components that are not given at their home values, if possible: first all of them, then
+At such a pose, the closures together with a partial pose, or with the drives, do not
+determine the operation mode, and round-off would select it.  Unspecified pose
+components are therefore held at their home values if possible: first all of them, then
 the rotation, then the translation.
 """
 
@@ -18,7 +18,7 @@ from forcefit.assembly.model.robot import Robot
 
 # [rad, m] largest error of closures and pose at which a target counts as reached
 _CLOSED = 1e-8
-# pose components [tx ty tz rx ry rz] that keep their home values, in the order of the
+# pose components [tx ty tz rx ry rz] held at their home values, in the order of the
 # attempts
 _KEPT = (range(6), range(3, 6), range(3))
 
@@ -33,8 +33,8 @@ def follow_in_mode(
         home: (n,) [rad or m] coordinates of the home pose.
         pose: (6,) ``[tx ty tz rx ry rz]`` [m, rad] of the platform there.
         target: k poses or sets of coordinates.
-        singular: whether modes meet at home.  If not, components that are not given
-            are fixed only if the target cannot be reached otherwise.
+        singular: whether modes meet at home.  If False, unspecified components are held
+            only if the target cannot be reached otherwise.
 
     Returns:
         The ends of the tracks, and their progress.
@@ -53,7 +53,7 @@ def follow_in_mode(
 
 
 def _held(target: Target, pose: NDArray, kept: range) -> Target:
-    """Return the target in which selected missing components have their home values."""
+    """Set selected unspecified components of a target to their home values."""
     goal = np.full((len(target), 6), np.nan)
     if target.pose is not None:
         goal = np.array(target.pose, dtype=float)
@@ -65,7 +65,7 @@ def _try(
     robot: Robot, home: NDArray, target: Target, track: Track, rows: NDArray,
     whatever: bool,
 ) -> None:  # fmt: skip
-    """Follow modified targets, and store those that were reached in a track."""
+    """Follow modified targets, and store those that were reached."""
     found = follow(robot, home, target)
     good = whatever | (found.reached & (found.mismatch < _CLOSED))
     for one in fields(Track):

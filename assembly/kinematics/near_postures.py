@@ -1,4 +1,4 @@
-"""Postures near a given posture: small motions with corrected closures.
+"""Generate postures near a given posture by small motions that satisfy the closures.
 
 Start with :func:`near_postures`.
 """
@@ -14,7 +14,7 @@ from forcefit.assembly.kinematics.track import Track
 from forcefit.assembly.model.robot import Robot
 
 _CORRECTIONS = 3  # number of corrections; near a singularity they converge slowly
-_ROUNDING = 1e-13  # [rad, m] closure error that is only rounding
+_ROUNDING = 1e-13  # [rad, m] closure error that is only round-off
 
 
 def near_postures(
@@ -43,7 +43,7 @@ def near_postures(
 
 
 def _steps_aside(robot: Robot, T: NDArray, distance: float, count: int) -> NDArray:
-    """Return (count, n) random joint steps that keep the closures to first order."""
+    """Return (count, n) random joint steps that are tangent to the closures."""
     A = closure_matrices(robot, T[None])[0][0]
     _, values, Vt = np.linalg.svd(A)
     rank = int((values > SINGULAR * values[:1]).sum())

@@ -1,9 +1,9 @@
-"""Solution of the nominal closures: joint coordinates at which the robot closes.
+"""Solve the nominal closures for the joint coordinates.
 
 Many targets are followed together, each along a straight line from the home pose.
-Steps are damped Gauss-Newton steps of least norm.  Coordinates that closures and target
-leave undetermined therefore do not change, and overconstrained robots need no special
-case.  The loops are compiled:
+Steps are damped Gauss-Newton steps of minimum norm.  Coordinates that are not
+determined by closures and target therefore do not change, and overconstrained robots
+need no special treatment.  The loops are compiled:
 :mod:`forcefit.assembly.kinematics.continuation_side_by_side`.
 """
 
@@ -21,7 +21,7 @@ from forcefit.assembly.kinematics.continuation_side_by_side import (
 from forcefit.assembly.kinematics.track import Track
 from forcefit.assembly.model.robot import Robot
 
-# number of each joint type in C++: a helical joint is a revolute joint with a lead
+# joint types in C++; a helical joint is a revolute joint with a lead
 KINDS = {"fixed": 0, "revolute": 1, "prismatic": 2, "helical": 1}
 NOT_CLOSED = "expected a configuration in which every closure holds"
 
@@ -115,7 +115,7 @@ def follow(robot: Robot, start: NDArray, target: Target, guess: bool = False) ->
         start: (n,) coordinates that close.
         target: k poses or sets of prescribed coordinates.
         guess: whether ``start`` is a guess at which the closures can be open.  In this
-            case, one step is made.
+            case, a single step is made.
 
     Returns:
         The ends of the tracks, and their progress.

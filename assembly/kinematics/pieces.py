@@ -1,9 +1,9 @@
-"""Beams cut into pieces: one link is modelled as several springs in series.
+"""Subdivide beams: one link is modelled as several springs in series.
 
-A single spring at the end of a beam is accurate if the beam bends little: its error is
-proportional to the square of the angle.  If the beam is cut into n pieces of length
-L / n, each a frame with a spring, the angle of each piece is proportional to 1 / n and
-the error to 1 / n^2.  For small motions the result does not change.
+A single spring at the end of a beam is accurate for small bending angles: its error
+grows with the square of the angle.  If the beam is cut into n pieces of length L / n,
+each of them a frame with a spring, the bending angle of each piece is proportional to 1
+/ n and the error to 1 / n^2.  Results for small motions do not change.
 """
 
 from dataclasses import dataclass, replace
@@ -22,10 +22,9 @@ class CutRobot:
 
     Attributes:
         robot: robot of m frames, m >= n.
-        owner: (m,) index of the frame, in the robot before the cut, to which each frame
-            of the cut robot belongs.
-        last: (n,) index, in the cut robot, of each original frame: the beam's last
-            piece.
+        owner: (m,) index of the original frame to which each frame of the cut robot
+            belongs.
+        last: (n,) index in the cut robot of the last piece of each original frame.
         back: (m,) [m] distance from the origin of the original frame to the end of the
             piece, along the beam.
     """
@@ -55,7 +54,7 @@ class CutRobot:
         return Posture(self.robot, q, T, posture.mismatch)
 
     def spread(self, rows: NDArray) -> NDArray:
-        """Return (..., m, k): the given rows at the ends of beams, zeros elsewhere."""
+        """Return (..., m, k): the given rows at the beam ends, and zeros elsewhere."""
         spread = np.zeros((*rows.shape[:-2], len(self.owner), rows.shape[-1]))
         spread[..., self.last, :] = rows
         return spread

@@ -1,4 +1,4 @@
-"""Tolerance callouts with the frame errors that they cause, and checks of holes."""
+"""Tolerance callouts with the resulting frame errors, and checks of holes."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from forcefit.inputs.table import BadInput, quoted
 
 @dataclass(frozen=True, eq=False)
 class PlacedCallout:
-    """A tolerance callout with its zone, and the errors of frames that it causes.
+    """A tolerance callout with its zone and the resulting frame errors.
 
     Attributes:
         callout: callout as stated in the drawing.
@@ -59,7 +59,7 @@ def fault_of(callout: Callout, found: str) -> str:
 
 
 def fits_by_parts(robot: Robot) -> dict[str, str]:
-    """Return the fits by the name of their parts; by default, the frame's name."""
+    """Return the fits by part name, which defaults to the name of the frame."""
     ends = robot.fitted_ends
     return {ends[f].parts if f in ends else f: text for f, text in robot.fits.items()}
 
@@ -68,7 +68,7 @@ def check_holes(
     robot: Robot, placed: Sequence[PlacedCallout],
     body_of: Callable[[tuple[str, bool]], int],
 ) -> None:  # fmt: skip
-    """Reject contradictory data of holes with the maximum material condition.
+    """Reject contradictory data for holes with the maximum material condition.
 
     Args:
         robot: robot to which the callouts belong.
@@ -76,8 +76,8 @@ def check_holes(
         body_of: function that returns the number of the body on a side of a frame.
 
     Raises:
-        BadInput: one hole has two sizes, its size differs from that of its fit, or it
-            is on two bodies.
+        BadInput: a hole has two sizes, its size differs from that of its fit, or it
+            lies on two bodies.
     """
     fits, seen = fits_by_parts(robot), dict[str, tuple[str, int]]()
     for one in placed:

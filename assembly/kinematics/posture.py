@@ -41,14 +41,14 @@ from forcefit.results.display import (
 from forcefit.stiffness.screws import rotation_matrix, rotation_vector, screw_map
 
 POSE = ("tx", "ty", "tz", "rx", "ry", "rz")
-_HOME_TOLERANCE = 1e-6  # [rad, m] accepted mismatch at home, for rounded robot files
+_HOME_TOLERANCE = 1e-6  # [rad, m] accepted mismatch at home, for rounded files
 # accepted mismatch relative to the reference length, for robots smaller than 100 mm
 _SMALL = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
 class Posture:
-    """Posture of a robot whose nominal geometry closes, or many postures of it.
+    """One or many postures at which the nominal geometry of a robot closes.
 
     The arrays of many postures, see :func:`together`, begin with a leading axis.
 
@@ -56,8 +56,8 @@ class Posture:
         robot: the manipulator.
         coordinates: (..., n) [rad or m] coordinate of every joint, 0 for fixed joints.
         transforms: (..., n, 4, 4) frames seen from the base, without imperfections.
-        mismatch: (...) [rad, m] largest nominal closure error.  It is caused by rounded
-            numbers in the file, and it is neglected.
+        mismatch: (...) [rad, m] largest nominal closure error, which is caused by
+            rounded numbers in the file and neglected.
     """
 
     robot: Robot
@@ -107,7 +107,7 @@ class Posture:
 
     @property
     def distinct(self) -> "tuple[Posture, NDArray]":
-        """The c distinct ones of R postures, and (R,) the index of each among them."""
+        """The c distinct postures among R postures, and (R,) their indices."""
         coordinates, transforms, which = _distinct(
             Unchanged(self.coordinates), Unchanged(self.transforms)
         )
@@ -129,7 +129,7 @@ def together(postures: Sequence[Posture]) -> Posture:
         The postures with a leading axis.
 
     Raises:
-        TypeError: a robot is given in place of postures.
+        TypeError: a robot was passed instead of postures.
     """
     if isinstance(postures, Robot):
         raise TypeError(
@@ -198,16 +198,16 @@ class Content:
 def content_of(
     postures: Posture, arrays: tuple[NDArray, ...], names: object
 ) -> Content:
-    """Return the cache key of a result that depends only on postures and arrays.
+    """Return a cache key for results that depend only on postures and arrays.
 
     Args:
         postures: one or many postures; the key contains their transforms and the
             parents of their frames.
         arrays: arrays of numbers.
-        names: all other data on which the result depends, compared by their ``repr``.
+        names: any other data on which the result depends, compared by ``repr``.
 
     Returns:
-        The key, which also contains the given objects.
+        The key, which also holds references to the given objects.
     """
     digest = blake2b(repr((names, [a.shape for a in arrays])).encode())
     for array in (postures.robot.parents, *arrays):
@@ -232,8 +232,9 @@ def home_posture(robot: Robot) -> Posture:
         The posture.
 
     Raises:
-        BadInput: the mismatch of a closure exceeds 1e-6 rad or m, or 1e-5 of the
-            longest body if that is less; the message names the closure.
+        BadInput: the mismatch of a closure exceeds 1e-6 rad or m, or 1e-5 times the
+            length of the longest body if that is smaller; the message names the
+            closure.
     """
     actuated = np.array([f.actuated for f in robot.frames])
     held = np.where(actuated, robot.positions, np.nan)
@@ -264,7 +265,7 @@ def _left_open(robot: Robot, T: NDArray) -> tuple[NDArray, NDArray]:
 
 
 def _either(turned: float, shifted: float, least: float) -> str:
-    """Return a text on a mismatch, either the rotation or the translation."""
+    """Describe the mismatch of a closure by its rotation or its translation."""
     if shifted < least:
         return f"{turned:.3g} rad with the actuated joints held, expected < 1e-06"
     return f"{shifted:.3g} m with the actuated joints held, expected < {least:.3g}"
@@ -298,15 +299,15 @@ def place_robot(
 
     The closures are followed from the home pose along a straight line, so the assembly
     mode is that of the home pose.  Components that the input leaves undetermined stay
-    near their home values.  At a singular home pose, several operation modes meet.  The
-    platform then keeps its home values of the components that are not given, if
-    possible.  The rotation has priority.
+    near their home values.  At a singular home pose, where several operation modes
+    meet, unspecified components are held at their home values if possible, with
+    priority given to the rotation.
 
     Args:
         robot: any robot.
         pose: any of ``tx ty tz`` [m], ``rx ry rz`` [rad], the platform's translation
-            and rotation vector in base axes; components that are not given are free.
-        joints: coordinates [rad or m] of actuated joints by frame; the others keep
+            and rotation vector in base axes; unspecified components are free.
+        joints: coordinates [rad or m] of actuated joints by frame; the others stay at
             their ``position``.
 
     Returns:
@@ -314,7 +315,7 @@ def place_robot(
 
     Raises:
         BadInput: both arguments are given, a name is unknown, a value is not finite, or
-            the pose is out of reach; the message contains the missing distance.
+            the pose cannot be reached; the message states the remaining distance.
     """
     if pose and joints:
         raise BadInput("found both a pose and joints, expected only one of the two")
@@ -373,8 +374,8 @@ def place_many(
         poses: (k, 6) ``[tx ty tz rx ry rz]`` [m, rad], NaN for free components.
 
     Returns:
-        Two lists with one entry for each pose: the posture, or None if the pose is out
-        of reach; and an empty string, or the reason why there is no posture.
+        Two lists with one entry for each pose: the posture, or None if the pose cannot
+            be reached; and the reason for the failure, or an empty string.
 
     Raises:
         BadInput: the robot's closures do not hold in its home pose.
@@ -404,7 +405,7 @@ def place_many_joints(
 def _follow_many(
     robot: Robot, target: Target
 ) -> tuple[list[Posture | None], list[str]]:
-    """Return for each target its posture, or None and the reason for failure."""
+    """Return the posture of each target, or None and the reason for failure."""
     track = _follow(robot, target)
     postures = [
         _posture(robot, track, i) if reached else None
@@ -426,12 +427,12 @@ def _follow(robot: Robot, target: Target) -> Track:
 
 
 def unreached(robot: Robot, track: Track, target: Target, i: int) -> str:
-    """Return the reason why target i was not reached, with the missing distance."""
+    """Explain why target i was not reached, with the remaining distance."""
     if target.pose is None:
         remaining = (1.0 - track.progress[i]) * 100
         return (
-            "these joint coordinates cannot be reached: the closures cease to "
-            f"hold {remaining:.3g} % of the path from home before the target; "
+            "these joint coordinates cannot be reached: the closures fail "
+            f"{remaining:.3g} % of the path before the target; "
             f"{NOT_CLOSED}{_way_out(robot, home_posture(robot).transforms)}"
         )
     goal = target.pose[i]
@@ -440,7 +441,7 @@ def unreached(robot: Robot, track: Track, target: Target, i: int) -> str:
     asked = ", ".join(f"{POSE[k]}={goal[k]:.6g}" for k in given)
     why = NOT_CLOSED
     if len(given) < len(POSE) and home_is_singular(robot):
-        why += "; home is a singular posture: name all six components of the pose"
+        why += "; home is a singular posture: specify all six components of the pose"
     gap = np.array([
         goal[k] - reached[k] if np.isfinite(goal[k]) else 0.0 for k in range(6)
     ])

@@ -1,4 +1,4 @@
-"""Decomposition of a space of screws into translations, rotations and helical motions.
+"""Decompose a space of screws into translations, rotations and helical motions.
 
 A screw (w, v) at a point c is a translation if w = 0.  It is a rotation about an axis
 if w.v = 0.  Otherwise it is a helical motion of pitch 2 pi w.v / w.w, whose axis passes
@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
 
-# both limits are for files rounded to 6 digits; parallel rods rotate a platform by ten
-# times this rounding error
+# both limits allow for files rounded to 6 digits; with parallel rods, the platform
+# rotates by ten times the rounding of the file
 _TURN = 1e-4  # [rad] largest rotation per reference length of a pure translation
 _PITCH = 1e-5  # [reference lengths] largest translation per rad of a pure rotation
 
@@ -25,8 +25,8 @@ class PureMotion:
     Attributes:
         kind: ``"translation"``, ``"turn"`` (rotation) or ``"screw"`` (helical motion).
         direction: (3,) unit vector along the translation, or along the axis.
-        point: (3,) [m] a point of the axis; None for a translation, and for a rotation
-            whose axis can be anywhere.
+        point: (3,) [m] a point on the axis; None for a translation, or for a rotation
+            whose axis is arbitrary.
         pitch: [m] translation per turn of a helical motion; None for other kinds.
     """
 
@@ -41,15 +41,15 @@ def pure_motions(
 ) -> list[PureMotion]:
     """Return independent motions that span a space of screws.
 
-    Translations come first.  The other motions are rotations if all their axes can meet
-    in one point; otherwise they are the principal screws of the system.
+    Translations come first.  The remaining motions are rotations if all their axes can
+    meet at a single point; otherwise they are the principal screws of the system.
 
     Args:
         screws: (k, 6) [rad, m] independent screws at a point, base axes.
         at: (3,) [m] that point.
-        size: [m] reference length by which translations are compared with rotations.
-        error: [rad, reference lengths] error of the screws; smaller components count as
-            zero.
+        size: [m] reference length used to compare translations with rotations.
+        error: [rad, reference lengths] error of the screws, below which components
+            count as zero.
 
     Returns:
         k motions in base axes.
@@ -74,14 +74,14 @@ def pure_motions(
 
 
 def _plain_basis(rows: NDArray, zero: float) -> NDArray:
-    """Return unit vectors that span the rows, along the base axes if possible."""
+    """Return unit vectors that span the row space, along base axes if possible."""
     rank = int((np.linalg.svd(rows, compute_uv=False) > zero).sum()) if len(rows) else 0
     if rank == 3:
         return np.eye(3)
     P = np.linalg.pinv(rows, rcond=zero) @ rows if rank else np.zeros((3, 3))
     basis: list[NDArray] = []
     for _ in range(rank):
-        # select the base axis nearest to the remaining space
+        # choose the base axis closest to the remaining space
         k = int(np.argmax(np.round(np.diag(P), 9)))
         d = P[k] / np.linalg.norm(P[k])
         d = np.where(np.abs(d) < 1e-12, 0.0, d)
@@ -111,8 +111,7 @@ def _common_point(
         zero: [lengths] largest difference of velocities that counts as zero.
 
     Returns:
-        (3,) the point, or None if there is none; and whether all axes can pass through
-        any point.
+        (3,) the point, or None if there is none; and whether the point is arbitrary.
     """
     # p x axis must equal the velocity at the origin, except for free translations
     rows = np.vstack([across @ -_cross(axis) for axis in axes])

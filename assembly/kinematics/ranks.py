@@ -1,19 +1,18 @@
 """Thresholds below which singular values of closures count as zero.
 
-The compiled methods use the same thresholds.
+The same thresholds are used by the compiled methods.
 """
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 RANK = 1e-10  # relative size below which a singular value counts as zero
-ROWS_RANK = 1e-9  # the same threshold for closure rows that only clearances can satisfy
-# factor; this factor times the nominal closure error is added to RANK, for rounded
-# robot files
+ROWS_RANK = 1e-9  # the same for closure equations that only clearances can satisfy
+# this factor times the nominal closure error is added to RANK, for rounded robot files
 MISMATCH_FACTOR = 30.0
-# relative rounding error of columns that a projection removes
+# relative round-off of columns that a projection removes
 NOISE = 1e-12
-UNBOUNDED = 1e-8  # [rad, m] least platform motion per unit of a free motion
+UNBOUNDED = 1e-8  # [rad, m] smallest platform motion per unit of a free motion
 
 
 def rank_tolerance(mismatch: float, least: float = RANK) -> float:
@@ -34,8 +33,8 @@ def rank_of(values: NDArray, tolerance: float, noise: float = 0.0) -> int:
 
     Args:
         values: (k,) singular values, the largest first.
-        tolerance: share of the largest value that a value must exceed.
-        noise: absolute size that a value must exceed.
+        tolerance: fraction of the largest value that a value must exceed.
+        noise: absolute threshold that a value must exceed.
 
     Returns:
         The rank; 0 without values.
@@ -44,7 +43,7 @@ def rank_of(values: NDArray, tolerance: float, noise: float = 0.0) -> int:
 
 
 def noise_of(columns: ArrayLike) -> float:
-    """Return the rounding error of columns that a projection removes.
+    """Estimate the round-off in columns that a projection removes.
 
     Args:
         columns: (m, n) columns before the projection.

@@ -1,7 +1,8 @@
 r"""Finite motions on SE(3): exponential, logarithm, and their derivatives.
 
-A constant screw that acts for unit time produces the finite motion ``exp(s)``; the
-screw is expressed in the axes of the initial frame.  All functions work on batches.
+A constant screw s that acts for unit time produces the finite motion ``exp(s)``; the
+screw is expressed in the axes of the initial frame.  All functions are vectorised over
+leading axes.
 
 ======  ======================  ============  ======================================
 symbol  code                    shape         meaning
@@ -14,8 +15,8 @@ Omega   ``bracket_form``        (..., 6, 6)   a.Omega(w) b = w.[a, b]
 ======  ======================  ============  ======================================
 
 Sources:
-    Barfoot (2017), State Estimation for Robotics, section 7.1 (J of SE(3)).  His
-    coefficients are written as Stumpff functions, which avoid cancellation at small
+    Barfoot (2017), State Estimation for Robotics, section 7.1 (J of SE(3)).  The
+    coefficients are expressed by Stumpff functions, which avoid cancellation at small
     angles.
 """
 
@@ -107,11 +108,11 @@ def left_jacobian(screw: ArrayLike) -> NDArray:
 
 
 def second_form(screw: ArrayLike, wrench: ArrayLike) -> NDArray:
-    """Return the work of a wrench on the second-order part of a screw's change.
+    """Return the work of a wrench on the second-order term of the exponential.
 
     To second order, ``exp(s + h) = exp(J h + D(h, h) / 2) exp(s)``.  This function
-    returns the matrix of ``w.D(h, h)``, computed to rounding from the series of J in
-    brackets.
+    returns the matrix of the quadratic form ``w.D(h, h)``, evaluated to machine
+    precision from the bracket series of J.
 
     Args:
         screw: (..., 6) s [rad, m].
@@ -140,7 +141,7 @@ def second_form(screw: ArrayLike, wrench: ArrayLike) -> NDArray:
 
 
 def _orders(screws: NDArray) -> int:
-    """Return the number of bracket orders whose terms are larger than rounding."""
+    """Return the number of bracket orders whose terms exceed round-off."""
     most = float(np.linalg.norm(screws[..., :3], axis=-1).max(initial=0.0))
     order, size = 2, most
     while size > _ROUNDING:

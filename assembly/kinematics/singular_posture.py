@@ -1,11 +1,11 @@
-"""Singular postures, at which the robot with locked drives gains a freedom.
+"""Singular postures, at which the robot with locked drives gains a degree of freedom.
 
-With locked drives, a robot keeps the freedoms that its closures allow.  At a singular
-posture, it has more freedoms than at nearby postures, because its closures are linearly
-dependent there to first order.  Small errors can then cause large motions, or none.
-Equations (17) to (27) are linear in the errors.  At such a posture, they determine
-neither whether the robot can be assembled nor the size of its errors.  Operation modes
-meet at singular postures (Zlatanov, Bonev, Gosselin 2002).
+With locked drives, a robot retains the degrees of freedom that its closures allow.  At
+a singular posture it has more of them than at nearby postures, because its closures are
+linearly dependent to first order.  Small errors can then cause large motions, or none.
+Equations (17) to (27) are linear in the errors.  At a singular posture they determine
+neither whether the robot can be assembled nor how large its errors are.  Operation
+modes meet at singular postures (Zlatanov, Bonev, Gosselin 2002).
 
 Start with :func:`is_singular`.
 """
@@ -21,7 +21,7 @@ from forcefit.assembly.kinematics.nominal import Target, follow
 from forcefit.assembly.model.robot import Robot
 
 _ASIDE = 0.02  # [rad or reference lengths] distance to nearby postures
-_NEIGHBOURS = 6  # number of nearby postures, of which one must not be singular
+_NEIGHBOURS = 6  # number of nearby postures, at least one of which must not be singular
 # relative size above which a singular value at a nearby posture counts as nonzero
 _APART = 1e-5
 _CLOSED = 1e-8  # [rad, m] largest closure error of a nearby posture
@@ -29,7 +29,7 @@ _NOISE = 1e3  # singular values below this factor times the closure error count 
 
 
 def is_singular(robot: Robot, q: NDArray, T: NDArray) -> bool:
-    """Return whether the locked robot has more freedoms than at nearby postures.
+    """Return whether the robot with locked drives is at a singular posture.
 
     Args:
         robot: robot of n frames.
@@ -37,11 +37,11 @@ def is_singular(robot: Robot, q: NDArray, T: NDArray) -> bool:
         T: (n, 4, 4) frames seen from the base.
 
     Returns:
-        True at a singular posture.  False if the number of freedoms is equal nearby,
-        which includes robots without drives.
+        True if the robot has more degrees of freedom than at nearby postures; False if
+        their number is the same nearby, as for robots without drives.
     """
     rank = int(locked_ranks(robot, T[None])[0])
-    # if the rank equals the number of columns, no posture has a larger rank
+    # the rank cannot exceed the number of columns
     most = sum(f.passive for f in robot.frames)
     return rank < most and rank < rank_near(robot, q, T)
 

@@ -1,4 +1,4 @@
-r"""Distances of a posture from singularities by kind, and the joints that move there.
+r"""Distance of a posture from each kind of singularity, and the joints that move there.
 
 The closures of the rigid robot allow its drives and its platform a space of motions.
 In an orthonormal basis of this space, with rates (q_a, t) of drives and platform,
@@ -8,11 +8,11 @@ and the map from the drives to the platform has the singular values tan(a_i).
 ======== ==================== ==================================================
 code     zero means           kind of Gosselin and Angeles
 ======== ==================== ==================================================
-serial   a drive moves, the   1st (type 1): the platform loses a freedom
+serial   a drive moves, the   1st (type 1): the platform loses a DOF
          platform does not
-parallel the platform moves,  2nd (type 2): the locked robot gains a freedom
+parallel the platform moves,  2nd (type 2): the locked robot gains a DOF
          no drive does
-closure  a closure transmits  constraint: the robot gains a freedom, or changes
+closure  a closure transmits  constraint: the robot gains a DOF, or changes
          no wrench            its assembly mode
 ======== ==================== ==================================================
 
@@ -48,14 +48,15 @@ class Singularities:
     """Distances of k postures from the three kinds of singularity.
 
     Attributes:
-        serial: (k,) sine of the least angle a_i, 0 at a serial singularity; at most 1.
+        serial: (k,) sine of the smallest angle a_i, 0 at a serial singularity; at most
+            1.
         parallel: (k,) cosine of the largest angle a_i, 0 at a parallel singularity.
-        closure: (k,) least singular value of the closures, without those that are zero
-            at every posture.
+        closure: (k,) smallest singular value of the closures, excluding those that are
+            zero at every posture.
         serial_joints: (k, n) joint rates of the motion at the serial singularity.
         parallel_joints: (k, n) joint rates of the motion at the parallel singularity.
         parallel_screws: (k, 6) the platform's motion at the parallel singularity.
-        closure_joints: (k, n) joint rates that the closures resist least.
+        closure_joints: (k, n) joint rates with the smallest resistance by the closures.
     """
 
     serial: NDArray
@@ -72,8 +73,8 @@ class Singularities:
     def condition(self) -> NDArray:
         """(k,) tan(a_max) / tan(a_min): condition of the map from drives to platform.
 
-        The number is defined for robots with as many drives as freedoms; NaN without
-        drives.
+        The number is defined for robots with as many drives as degrees of freedom; NaN
+        without drives.
         """
         least, most = self.serial, self.parallel
         rest = np.sqrt((1 - least**2).clip(0.0) * (1 - most**2).clip(0.0))
@@ -81,11 +82,11 @@ class Singularities:
             return rest / (least * most)
 
     def names(self, robot: Robot, near: float) -> list[str]:
-        """Return a text for each posture that names the singularities near it.
+        """Describe the singularities near each posture.
 
         Args:
             robot: the same robot.
-            near: distance below which a singularity is named.
+            near: distance below which a singularity is mentioned.
 
         Returns:
             Texts such as ``"parallel: left.elbow, platform TY"``; empty if no
@@ -120,15 +121,16 @@ def find_singularities(robot: Robot, transforms: NDArray) -> Singularities:
         transforms: (k, n, 4, 4) frames seen from the base.
 
     Returns:
-        The distances in the order of the postures.  The distance is 1 for a kind that
-        does not exist, such as closure singularities of a robot without closures.
+        The distances in the order of the postures.  The distance is 1 for kinds of
+        singularity that the robot cannot have, for example closure singularities of a
+        robot without closures.
     """
     return _measure(robot, transforms, _generic_ranks(robot))
 
 
 @dataclass(frozen=True)
 class _Ranks:
-    """Ranks of the closures, of Q and of its platform part, without singularity."""
+    """Ranks of the closures, of Q and of its platform part, away from singularities."""
 
     closures: int
     motions: int
@@ -157,12 +159,12 @@ def _generic_ranks(robot: Robot) -> _Ranks:
 
 
 def _rank(A: NDArray, least: float = _RANK) -> int:
-    """Return the number of singular values above rounding, or above a given size."""
+    """Return the number of singular values above round-off, or above a given size."""
     return rank_of(np.linalg.svd(A, compute_uv=False), least, noise=least)
 
 
 def _null_space(A: NDArray, rank: int) -> tuple[NDArray, NDArray, NDArray]:
-    """Return the null space, and the least nonzero singular value with its row."""
+    """Return the null space, and the smallest nonzero singular value with its row."""
     if not rank:
         return np.broadcast_to(np.eye(A.shape[2]), (len(A), *A.shape[2:] * 2)), *(
             np.ones(len(A)), np.zeros((len(A), A.shape[2]))
@@ -172,14 +174,14 @@ def _null_space(A: NDArray, rank: int) -> tuple[NDArray, NDArray, NDArray]:
 
 
 def _measure(robot: Robot, T: NDArray, ranks: _Ranks) -> Singularities:
-    """Return the distances, given the ranks away from singularities."""
+    """Return the distances, given the generic ranks."""
     A, B, _ = closure_matrices(robot, T)
     N, closure, resisting = _null_space(A, ranks.closures)
     measured = _drives_and_platform(N, B, ranks)
     closure = np.where(closure > SINGULAR, closure, 0.0)
     for i in np.flatnonzero(closure == 0.0).tolist():
-        # the closures allow more motions than at other postures; all of these motions
-        # count here
+        # the closures allow more motions than at other postures, all of which count
+        # here
         here = slice(i, i + 1)
         more, _, _ = _null_space(A[here], _rank(A[i], SINGULAR))
         own = _ranks_there(more[0] @ B[i], ranks)
@@ -209,7 +211,7 @@ def _measure(robot: Robot, T: NDArray, ranks: _Ranks) -> Singularities:
 def _ranks_there(moved: NDArray, generic: _Ranks) -> _Ranks:
     """Return ranks at postures where the closures allow more motions than elsewhere."""
     motions = _rank(moved, SINGULAR)
-    # motions that never move the platform are not a serial singularity either
+    # motions that never move the platform are not serial singularities
     always = generic.motions - generic.platform
     return _Ranks(generic.closures, motions, min(motions - always, 6))
 

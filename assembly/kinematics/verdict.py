@@ -1,4 +1,4 @@
-"""Tests of a posture: joint limits, singularity, singularities between it and home."""
+"""Check a posture for joint limits, singularity, and singularities on the way to it."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,15 +25,14 @@ _ROUNDING = 1e-8
 def verdicts(
     robot: Robot, target: Target, q: NDArray, T: NDArray, near: NDArray | None = None
 ) -> list[tuple[str, str]]:
-    """Return the status and reason of postures that were reached.
+    """Return a status and a reason for each posture that was reached.
 
     Args:
         robot: robot of n frames.
         target: k poses or sets of coordinates.
         q: (k, n) [rad or m] coordinates at the targets.
         T: (k, n, 4, 4) frames at the targets.
-        near: (k,) bool, True for postures that are tested for a singularity; None to
-            test all.
+        near: (k,) bool, True for postures to test for a singularity; None to test all.
 
     Returns:
         For each posture :data:`BEYOND_LIMITS`, :data:`SINGULAR` or
@@ -111,8 +110,8 @@ def posture_remarks(posture: Posture) -> list[str]:
     if home_is_singular(robot) and np.abs(q - home.coordinates).max() > _ROUNDING:
         remarks.append(
             "home is a singular posture, where operation modes meet; this "
-            f"posture belongs to {_mode(home, posture)} (specify the other "
-            "components of the pose to select another mode)"
+            f"posture belongs to {_mode(home, posture)} (specify the remaining "
+            "pose components to select another mode)"
         )
     if passed := limits_passed(robot, q):
         remarks.append(f"beyond the limits of its joints: {passed}")
@@ -123,7 +122,7 @@ def posture_remarks(posture: Posture) -> list[str]:
 
 
 def _mode(home: Posture, posture: Posture) -> str:
-    """Return the name of the operation mode in which the platform left home."""
+    """Return the operation mode in which the platform left home."""
     moved = posture.platform @ np.linalg.inv(home.platform)
     turned = np.abs(moved[:3, :3] - np.eye(3)).max() > _ROUNDING
     shift = posture.platform[:3, 3] - home.platform[:3, 3]

@@ -1,4 +1,4 @@
-"""Manipulator assembled with least energy: screws, wrenches, energy, certificate.
+"""Minimum-energy assembly of a manipulator: screws, wrenches, energy, certificate.
 
 ======  ====================  ========  ==============================================
 symbol  code                  shape     meaning
@@ -11,10 +11,10 @@ w       ``wrenches``          (n, 6)    wrenches of the links' springs, in frame
 E       ``energy``            J         elastic energy of all springs
 ======  ====================  ========  ==============================================
 
-The wrenches are computed from the multipliers of the closures, not from eqs (23)-(26).
-Eq. (23) adds the wrenches of springs in series, although these springs carry one and
-the same wrench.  Eqs (24)-(26) include only the path to the platform, so their wrenches
-add up to zero if the platform carries no load.
+The wrenches are computed from the closure multipliers rather than from eqs (23)-(26).
+Eq. (23) adds the wrenches of springs in series, although such springs carry the same
+wrench.  Eqs (24)-(26) include only the path to the platform, so their wrenches add up
+to zero if the platform carries no load.
 """
 
 from dataclasses import dataclass
@@ -62,18 +62,18 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-# relative to the largest wrench: smaller components are rounding errors
+# relative to the largest wrench: smaller components are round-off
 _ROUNDED = 1e-9
-_NOTHING = 1e-12  # [N m, N] components of a wrench below this are rounding errors
+_NOTHING = 1e-12  # [N m, N] wrench components below this are round-off
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Assembly(Solution[N]):
-    """Manipulator assembled with the least energy, at one point or at many points.
+    """Minimum-energy assembly of a manipulator, at one point or at many points.
 
     The arrays of many points begin with a point axis, and ``[i]`` returns point i.  If
-    point i has no solution, ``[i]`` raises the exception that explains why.  For the
-    fields see :class:`~forcefit.assembly.linear.solution.Solution`.
+    no solution was found at point i, ``[i]`` raises the corresponding exception.  For
+    the fields see :class:`~forcefit.assembly.linear.solution.Solution`.
     """
 
     summary, plot = short_repr, show
@@ -113,19 +113,19 @@ class Assembly(Solution[N]):
 
     @property
     def ranks(self) -> dict[str, int]:
-        """Numbers of free, elastic, rigid and redundant closure rows of one point."""
+        """Counts of free, elastic, rigid and redundant closure equations at a point."""
         return reduce_problem(self.linearisation, self.joints, self.frame_loads).ranks
 
     @property
     def loaded(self) -> Any:
-        """(...) bool, whether any load acts on the robot."""
+        """(...) bool, True if a load acts on the robot."""
         acting = np.any(self.frame_loads.body, axis=-1)
         acting = acting | np.any(self.frame_loads.joint, axis=-1)
         return plain(np.broadcast_to(acting, np.shape(self.energy_without_clearance)))
 
     @cached_property
     def energy(self) -> N:
-        """(...) [J] elastic energy; 0 if the certificate does not exclude zero."""
+        """(...) [J] elastic energy; 0 where it cannot be distinguished from zero."""
         nonzero = differs_from_zero(
             self.stored, self.duality_gap(), self.multipliers,
             self.closure_residual() + self.rounding,
@@ -134,7 +134,7 @@ class Assembly(Solution[N]):
 
     @property
     def stored(self) -> N:
-        """(...) [J] elastic energy of the springs in the numerical solution."""
+        """(...) [J] elastic energy of the springs, as computed."""
         return plain(np.vecdot(self.elastic, self.elastic) / 2)
 
     @cached_property
@@ -189,8 +189,8 @@ class Assembly(Solution[N]):
         """(..., closures, 6) [N m, N] wrench of the second chain on the first chain.
 
         The wrenches act at the platform's origin and are expressed in base axes.  If
-        rigid parts are overconstrained, the wrenches are not unique, and the wrenches
-        of least norm are returned.
+        rigid parts are overconstrained, the wrenches are not unique, and the
+        minimum-norm solution is returned.
         """
         size = self.linearisation.size
         return _by_frames(self.multipliers) / np.array([1, 1, 1, size, size, size])
@@ -200,8 +200,8 @@ class Assembly(Solution[N]):
         """(..., n, 6) [N m, N] wrench of each link's spring: K_E times its deformation.
 
         Each wrench acts at the frame's origin and is expressed in the frame's axes.
-        Half of the link's own weight acts at each end of the link.  For the wrenches
-        through the section at the tip see :attr:`tip_wrenches`.
+        Half of the link's own weight is applied at each of its ends.  See
+        :attr:`tip_wrenches` for the wrench through the section at the tip.
         """
         return self._closing + _by_frames(self.frame_loads.body)
 
@@ -236,19 +236,19 @@ class Assembly(Solution[N]):
 
     @cached_property
     def _closing(self) -> NDArray:
-        """(..., n, 6) [N m, N] part of each frame's wrench due to the closures only."""
+        """(..., n, 6) [N m, N] wrench on each frame due to the closures alone."""
         at_platform = closure_signs(self.posture.robot).T @ self.closure_wrenches
         return np.einsum("...nji,...nj->...ni", self.posture.paths, at_platform)
 
     @cached_property
     def bound(self) -> N:
-        """(...) [J] certified lower bound of the energy minus the work of the loads.
+        """(...) [J] certified lower bound on the potential energy of the assembly.
 
         The bound is the complementary energy of the computed wrenches.  For any
         wrenches w in equilibrium, the energy of every assembly is at least
-        -w.dl - w.C w/2 - (largest work of w on the clearances).  The bound therefore
-        does not depend on the solution method.  It is valid if no free motion exceeds
-        its value in this solution.
+        -w.dl - w.C w/2 - (largest work of w on the clearances).  The bound is therefore
+        independent of the solution method.  It is valid provided that no free motion
+        exceeds its value in this solution.
         """
         joint, springs = _flat(self.joint_wrenches), self._balancing
         clearances = cone_sizes(joint @ self.joints.cones, self.joints.group)
@@ -259,9 +259,9 @@ class Assembly(Solution[N]):
 
     @property
     def _balancing(self) -> NDArray:
-        """(..., ny) [sqrt(2 J)] deformations of the springs that balance the wrenches.
+        """(..., ny) [sqrt(2 J)] spring deformations in equilibrium with the wrenches.
 
-        The wrenches include those of the loads.
+        The wrenches include those of the applied loads.
         """
         columns, links = self.joints.elastic, self.joints.links
         body, joint = _flat(self.wrenches), _flat(self.joint_wrenches)
@@ -273,7 +273,7 @@ class Assembly(Solution[N]):
         bodies: ArrayLike | None = None,
         gravity: ArrayLike | None = None,
     ) -> bool:
-        """Return whether the assembly carries these loads.
+        """Return whether the assembly was computed for the given loads.
 
         For the arguments see :func:`solve_assembly`.
         """
@@ -305,18 +305,18 @@ class Assembly(Solution[N]):
 
     @cached_property
     def rounding(self) -> N:
-        """(...) [rad, lengths] largest closure error that rounding can cause."""
+        """(...) [rad, lengths] largest closure error that round-off can cause."""
         size = self.linearisation.size
         return plain(closure_rounding(self._errors, self.joints, size))
 
     @cached_property
     def uncertainty(self) -> N:
-        """(...) [J] duality gap computed without cancellation, plus rounding errors.
+        """(...) [J] duality gap evaluated without cancellation, plus round-off.
 
-        The energy minus its bound equals |y - s|^2 / 2.  Here y are the deformations of
-        the springs, and s the deformations that balance the wrenches.  Two terms are
-        added: the work that the wrench on each cone could still gain, and the work of
-        the multipliers on the residual of the closures.
+        The energy minus its bound equals |y - s|^2 / 2.  Here y are the spring
+        deformations, and s the deformations in equilibrium with the wrenches.  Two
+        terms are added: the work that the wrench on each cone could still gain, and the
+        work of the multipliers on the residual of the closures.
         """
         joint, springs = _flat(self.joint_wrenches), self.elastic - self._balancing
         group, on_cones = self.joints.group, joint @ self.joints.cones
@@ -333,7 +333,7 @@ class Assembly(Solution[N]):
         )  # fmt: skip
 
     def duality_gap(self) -> N:
-        """Return (...) [J] certified bound of the energy above the least energy."""
+        """Return (...) [J] certified bound on the excess over the minimum energy."""
         return self._gap
 
     @cached_property
@@ -343,18 +343,18 @@ class Assembly(Solution[N]):
     def relative_gap(self) -> N:
         """Return (...) [-] the duality gap divided by the elastic energy.
 
-        The divisor is at least 1e-4 of the energy without clearance.
+        The divisor is at least 1e-4 times the energy without clearance.
         """
-        # inside an assembly zone the least energy is zero, so the divisor has a lower
-        # limit
+        # the minimum energy vanishes inside an assembly zone, so the divisor is bounded
+        # below
         least = np.maximum(1e-4 * np.asarray(self.energy_without_clearance), 1e-300)
         return plain(self.duality_gap() / np.maximum(self.stored, least))
 
     @property
     def certified(self) -> Any:
-        """(...) bool: gap <= 1e-8 of the energy + 1e-12 of that without clearance.
+        """(...) bool: gap <= 1e-8 energy + 1e-12 energy without clearance.
 
-        Under loads, 1e-12 of the work of the loads is added to the limit.
+        Under loads, 1e-12 times the work of the loads is added to the limit.
         """
         largest_energy = self.energy_without_clearance + np.abs(self.work)
         allowed = GAP * self.energy + GAP_WITHOUT_CLEARANCE * largest_energy
@@ -377,14 +377,14 @@ def _times(matrices: NDArray, vectors: NDArray) -> NDArray:
 
 
 def without_rounding(wrenches: NDArray) -> NDArray:
-    """Return the wrenches with all components that are rounding errors set to 0.
+    """Set wrench components that are only round-off to zero.
 
     Args:
         wrenches: (..., n, 6) [N m, N] wrenches of the n bodies of a robot.
 
     Returns:
-        (..., n, 6) [N m, N] wrenches.  A component is 0 if its absolute value was below
-        1e-9 of the largest component of the robot, or below 1e-12 N m or N.
+        (..., n, 6) [N m, N] wrenches.  A component is set to 0 if its absolute value is
+        below 1e-9 times the robot's largest component, or below 1e-12 N m or N.
     """
     sizes = np.abs(wrenches)
     largest = sizes.max(axis=(-2, -1), keepdims=True, initial=0.0)

@@ -1,20 +1,21 @@
-"""Bounds of the errors of energy, closures and platform screw, from a certificate.
+"""Error bounds on energy, closures and platform screw, derived from a certificate.
 
-A certificate of least energy is a lower bound of the energy.  The distance of the
-computed platform screw from all platform screws of least energy is bounded as well.
+The certificate of a minimum-energy assembly is a lower bound on the energy.  It also
+bounds the distance of the computed platform screw from every minimum-energy platform
+screw.
 
 The energy E = y.y/2 minus the work of the loads is quadratic in the scaled deformations
-y of the springs.  The energy of a solution with duality gap g exceeds the least energy
-by at most g.  Let w_k be the wrench on cone k.  Then
+y of the springs.  The energy of a solution with duality gap g exceeds the minimum
+energy by at most g.  Let w_k be the wrench on cone k.  Then
 
     |y - y_least| <= sqrt(2 g),          |w_k| - w_k.u_k <= g for each cone,
 
-for the computed solution and every solution of least energy.  The gap thus bounds the
-errors of the springs and of the clearances with an active constraint.  The gap does not
-bound clearances without load: the energy does not depend on them, and the minimiser is
-not unique.  The platform screws of least energy form a convex set, and so do the
-platform screws that the gap allows.  A cone programme with a certified objective value
-bounds the extent of each set along each axis.
+for the computed solution and every minimum-energy solution.  The gap thus bounds the
+errors in the springs and in the clearances whose constraint is active.  It does not
+bound unloaded clearances: the energy does not depend on them, and the minimiser is not
+unique.  The minimum-energy platform screws form a convex set, and so do the platform
+screws that the gap allows.  A cone program with a certified objective value bounds the
+extent of each set along each axis.
 """
 
 from dataclasses import dataclass, replace
@@ -38,26 +39,26 @@ from forcefit.assembly.solvers.conic import GAP, GAP_WITHOUT_CLEARANCE, SolverFa
 LARGEST_RESIDUAL = 1e-9
 # [-] largest accepted relative excess of a clearance over its bound
 LARGEST_EXCESS = 1e-9
-# largest accepted error of the screw: absolute [rad, m], and relative to the screw
+# largest accepted error in the screw: absolute [rad, m], and relative to the screw
 _SCREW, _SCREW_SHARE = 1e-5, 1e-3
 _AMPLIFIED = 10.0  # assumed upper limit of frame motion divided by spring deformation
-# [-] required difference of upper and lower bound of a distance, relative to it
+# [-] required difference between upper and lower bound, relative to the distance
 _WIDTH = 3e-5
-# [-] a clearance whose range is a smaller share of its cone counts as fixed
+# [-] a clearance whose range is a smaller fraction of its cone counts as fixed
 _HELD = 0.1
 
 
 @dataclass(frozen=True)
 class ScrewBound:
-    """Largest distances of the computed platform screw from those of least energy.
+    """Bounds on the distance to the minimum-energy platform screws.
 
     Attributes:
-        rotation: [rad] upper bound; infinite if the platform turns freely.
+        rotation: [rad] upper bound; infinite if the platform rotates freely.
         translation: [m] upper bound, at the platform's origin.
-        rotation_open: [rad] part of ``rotation`` due to clearances without load.  Such
-            clearances make the screw non-unique.  The farthest possible screw is at
-            most this far from the computed screw.
-        translation_open: [m] part of ``translation`` due to clearances without load.
+        rotation_open: [rad] part of ``rotation`` due to unloaded clearances, which make
+            the screw non-unique.  No possible screw is farther than this from the
+            computed screw.
+        translation_open: [m] part of ``translation`` due to unloaded clearances.
         rotation_error: [rad] part of ``rotation`` that is numerical error.
         translation_error: [m] part of ``translation`` that is numerical error.
     """
@@ -73,13 +74,13 @@ class ScrewBound:
 def unproved(assembly: Assembly) -> str:
     """Return sentences that state which properties the certificate does not prove.
 
-    An assembly is proved if three conditions are satisfied.  The closure residuals are
-    at most 1e-9 (rad, or m per reference length).  The clearances exceed their bounds
-    by at most 1e-9.  The energy exceeds the least energy by at most 1e-8 of the energy
-    and of the loads' work, plus 1e-12 of the energy without clearance.
+    An assembly counts as proved if the closure residuals are at most 1e-9 (rad, or m
+    per reference length), the clearances exceed their bounds by at most 1e-9 relative,
+    and the energy exceeds the minimum by at most 1e-8 times the energy and the work of
+    the loads, plus 1e-12 times the energy without clearance.
 
     Args:
-        assembly: assembly of least energy.
+        assembly: minimum-energy assembly.
 
     Returns:
         Sentences joined by semicolons; empty if the assembly is proved.
@@ -94,7 +95,7 @@ def unproved(assembly: Assembly) -> str:
     # the condition is written so that NaN counts as not proved
     if not gap <= allowed:
         sentences.append(
-            f"the minimum of the energy is certified to {gap:.1e} J only, "
+            f"the minimum energy is certified to within {gap:.1e} J only, "
             f"expected {allowed:.1e} J"
         )
     if not residual <= LARGEST_RESIDUAL:
@@ -109,17 +110,17 @@ def unproved(assembly: Assembly) -> str:
 
 
 def unproved_screw(assembly: Assembly, bound: ScrewBound) -> list[str]:
-    """Return messages if the duality gap leaves rotation or translation uncertain.
+    """Return a message for each part of the platform screw that is too inaccurate.
 
-    The test covers only the parts of the platform screw that are unique.
+    Only the unique part of the screw is tested: unloaded clearances are not counted.
 
     Args:
-        assembly: assembly of least energy.
-        bound: bound of the platform screw's error.
+        assembly: minimum-energy assembly.
+        bound: error bound on the platform screw.
 
     Returns:
-        One message each for the rotation and the translation if the error can exceed
-        1e-5 rad or m plus 1e-3 of the value.
+        A message for the rotation, the translation or both, if the error can exceed
+        1e-5 rad or m plus 1e-3 times the value.
     """
     allowed = _allowed(assembly)
     spread = stiffness_spread(assembly.joints, assembly.linearisation.size)
@@ -129,7 +130,7 @@ def unproved_screw(assembly: Assembly, bound: ScrewBound) -> list[str]:
         else ""
     )
     return [
-        f"the platform's {part} is certified to {error:.1e} {unit} only, "
+        f"the platform's {part} is certified to within {error:.1e} {unit} only, "
         f"expected {most:.1e} {unit}{why}"
         for part, error, unit, most in (
             ("rotation", bound.rotation_error, "rad", allowed[0]),
@@ -146,7 +147,7 @@ def _allowed(assembly: Assembly) -> NDArray:
 
 
 def _springs_determined(assembly: Assembly) -> bool:
-    """Return whether the error of the springs causes only negligible frame motions."""
+    """Return whether errors in the springs cause only negligible frame motions."""
     frames, springs = len(assembly.posture.robot.frames), assembly.elastic.size
     blocks = assembly.joints.elastic.reshape(frames, 6, springs)
     moved = np.linalg.norm(assembly.posture.paths @ blocks, axis=(0, 2))
@@ -156,15 +157,15 @@ def _springs_determined(assembly: Assembly) -> bool:
 
 
 def bound_screw(assembly: Assembly) -> ScrewBound:
-    """Bound the distance to every platform screw of least energy.
+    """Bound the distance to every minimum-energy platform screw.
 
     Args:
         assembly: the computed assembly with its wrenches.
 
     Returns:
         Bounds that follow from the certificate only.  They are computed for boxes
-        around the sets of screws, and can exceed the true distances by a factor of
-        sqrt(3).
+        around the sets of screws, and can overestimate the true distances by up to a
+        factor of sqrt(3).
     """
     gap, lin = assembly.uncertainty, assembly.linearisation
     open_closures = lin.rows @ assembly.screws.ravel()
@@ -183,7 +184,7 @@ def bound_screw(assembly: Assembly) -> ScrewBound:
         )
 
     def uncertain(joints: VirtualJoints) -> MovingCones:
-        """Return the clearances, springs and residual that the gap leaves uncertain."""
+        """Return clearances, springs and residual that the gap does not determine."""
         columns, start, group, room = _room(assembly, joints, gap)
         springs = joints.elastic * np.sqrt(2.0 * gap)
         columns = np.hstack([columns * room, springs])
@@ -217,13 +218,13 @@ def bound_screw(assembly: Assembly) -> ScrewBound:
 def _room(
     assembly: Assembly, joints: VirtualJoints, gap: float
 ) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-    """Return the range of each clearance among the assemblies of least energy.
+    """Return the range of each clearance among the minimum-energy assemblies.
 
     Returns:
         Columns of the clearances; their values in this assembly; the cone of each
         column; and (nu,) [-] ranges relative to the sizes of the cones.  A range of 1
-        means the complete cone.  A smaller range is the largest distance between this
-        assembly and any assembly of least energy.
+        denotes the whole cone; a smaller range bounds the distance between this
+        assembly and any minimum-energy assembly.
     """
     group = joints.group
     load = cone_sizes(joints.cones.T @ assembly.joint_wrenches.ravel(), group)
@@ -236,7 +237,7 @@ def _room(
 
 
 def _farthest(reachable: ReachableSet, part: int, box: float) -> float:
-    """Return the certified largest distance [rad or m] of the set from its centre."""
+    """Bound the distance [rad or m] of the set from its centre."""
     if not 0.0 < box < np.inf:
         return box
     about_centre = replace(reachable, centre=np.zeros(6))
@@ -247,7 +248,7 @@ def _farthest(reachable: ReachableSet, part: int, box: float) -> float:
 
 
 def _extents(reachable: ReachableSet) -> NDArray:
-    """Return (6,) [rad, m] the larger extent of the set in both senses of each axis."""
+    """Return the (6,) [rad, m] largest extents along the axes, in either sense."""
     extents = []
     for d in np.concatenate([np.eye(6), -np.eye(6)]):
         try:

@@ -1,21 +1,21 @@
 """Assembly constraints, linear in the small screws.
 
-Eqs (8) and (16)-(20) are applied to any tree with closures.  The two chains that meet
-at a closure must produce the same motion:
+Eqs (8) and (16)-(20) are generalised to any tree with closures.  The two chains that
+meet at a closure must produce the same motion:
 
     sum over frames j of  sign_kj M_j (dl_j + de_j + dc_j + db_j)  =  0.
 
-The sign is +1 on the first chain and -1 on the second chain.  It is 0 for frames
-outside both chains and for frames in both.  All screws are expressed at the platform's
-origin in base axes.  The multiplier of closure k is therefore the wrench at the
-platform's origin that the second chain of k exerts on the first.
-======  =============  ==========  ================================================
-symbol  code           shape       meaning
-======  =============  ==========  ================================================
-y       ``elastic``    (6n, ny)    links and joint springs, scaled: energy = y.y / 2
-u       ``cones``      (6n, nu)    clearances in discs, intervals or balls of radius 1
-q       ``free``       (6n, nq)    unbounded motions, in units of their screws
-======  =============  ==========  ================================================
+The sign is +1 on the first chain, -1 on the second chain, and 0 for frames that belong
+to neither or to both.  All screws are expressed at the platform's origin in base axes.
+The multiplier of closure k is therefore the wrench at the platform's origin that the
+second chain of k exerts on the first.  ======  =============  ==========
+================================================ symbol  code           shape
+meaning ======  =============  ==========
+================================================ y       ``elastic``    (6n, ny)
+links and joint springs, scaled: energy = y.y / 2 u       ``cones``      (6n, nu)
+clearances in discs, intervals or balls of radius 1 q       ``free``       (6n, nq)
+unbounded motions, in units of their screws ======  =============  ==========
+================================================
 """
 
 from dataclasses import dataclass, field
@@ -46,19 +46,19 @@ from forcefit.results.display import html_table, short_repr
 
 @dataclass(frozen=True, eq=False)
 class VirtualJoints:
-    """Columns of the small screws of all links, clearances, springs and free joints.
+    """Basis columns for the small screws of links, clearances, springs and joints.
 
     Attributes:
         robot: robot of n frames.
         elastic: (6n, ny) columns of links and joint springs.
         links: (ny,) bool, True for columns of links and False for columns of joints.
-        cones: (6n, nu) columns of bounded clearances; the length of each is its bound.
+        cones: (6n, nu) columns of bounded clearances, each scaled by its bound.
         group: (nu,) cone of each column: two columns for a disc, three for a ball.
-        scaled: (nu,) bool, True if the factor of the margin, problem (21), scales the
-            cone of the column.
+        scaled: (nu,) bool, True if the cone of the column is scaled by the margin of
+            problem (21).
         free: (6n, nq) unit columns of unbounded motions.
-        bounded_motion: frames with a passive joint whose motion limit is included as a
-            cone.
+        bounded_motion: frames whose passive joint has a motion limit that is modelled
+            as a cone.
     """
 
     robot: Robot
@@ -77,17 +77,18 @@ def virtual_joints(
     robot: Robot, springs: bool = True, own_axes_free: bool = False,
     bounded_motion: bool | frozenset[int] = False,
 ) -> VirtualJoints:  # fmt: skip
-    """Return the columns of all small screws that can move.
+    """Return basis columns for all small screws of a robot.
 
     Args:
         robot: robot of n frames.
-        springs: whether links and joints deform; in problem (21) they are rigid.
+        springs: whether links and joints are elastic; problem (21) treats them as
+            rigid.
         own_axes_free: whether passive joints with stiffness move freely about (or
-            along) their z axis.  If not, the z axis is elastic, or rigid without
-            springs.  The two cases give the two margins of problem (21).
-        bounded_motion: whether the motion limits of passive joints are included, for
-            all joints or for a set of frames.  These limits are large and rarely
-            active.  They are therefore omitted first and checked afterwards.
+            along) their z axis.  If False, the z axis is elastic, or rigid if
+            ``springs`` is False.  The two choices give the two margins of problem (21).
+        bounded_motion: whether to impose the motion limits of passive joints, for all
+            joints or for a set of frames.  These limits are large and rarely active, so
+            callers omit them first and check the solution.
 
     Returns:
         The columns.
@@ -107,7 +108,7 @@ class _JointsKey:
 
 
 def _parts(robot: Robot) -> tuple:
-    """Return the parts of the cache key; links are compared by object identity."""
+    """Return the entries of the cache key; links are compared by identity."""
     return tuple(
         (
             f.parent, f.joint, f.pitch, f.actuated, f.clearance, id(f.link),
@@ -123,7 +124,7 @@ def _virtual_joints(
     key: _JointsKey, springs: bool, own_axes_free: bool,
     bounded_motion: frozenset[int],
 ) -> VirtualJoints:  # fmt: skip
-    """Return the columns, cached for all robots with equal parts."""
+    """Return the basis columns, cached for all robots with equal keys."""
     robot = key.robot
     bounds = clearance_bounds(robot, own_axes_free)
     scaled = scales_with_margin(robot)
@@ -155,7 +156,7 @@ def _virtual_joints(
 def _elastic(
     links: NDArray, joints: NDArray, robot: Robot
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
-    """Return the columns of all springs, and (ny,) bool, True for springs of links."""
+    """Return the spring columns, and (ny,) bool, True for springs of links."""
     count = len(robot.frames)
     columns, is_link = [np.zeros((6 * count, 0))], []
     for compliances, link in ((links, True), (joints, False)):
@@ -202,7 +203,7 @@ def _free(bounds: NDArray, robot: Robot) -> NDArray:
 
 
 def in_reference_lengths(size: float) -> NDArray:
-    """Return the factors that make the lengths in screws comparable with angles.
+    """Return factors that make the translations of screws comparable with rotations.
 
     Args:
         size: [m] reference length.

@@ -1,9 +1,10 @@
-"""Least energy that closes a manipulator, problem (22), at one or many points.
+"""Minimum energy needed to close a manipulator, problem (22), at one or many points.
 
 The compiled method (:mod:`forcefit.assembly.linear.lanes`) computes all steps from the
 poses of the frames to the certificate, with and without loads.  The reference method
-(:mod:`forcefit.assembly.linear.reference`) solves the points that the compiled method
-does not cover or certify.  The field ``method`` of the result names the method used.
+(:mod:`forcefit.assembly.linear.reference`) solves points that the compiled method does
+not cover or cannot certify.  The field ``method`` of the result states which method was
+used.
 """
 
 from collections.abc import Mapping, Sequence
@@ -48,9 +49,9 @@ from forcefit.assembly.solvers.method import Method, check_method, log_reference
 
 __all__ = ["Assembly", "CannotAssemble", "solve_assembly"]
 
-# outcome codes of assembly/kernels/linear/energies.h. From _LEFT on, the kernel has no
-# result. The codes _AT_BOUNDS can be caused by an omitted motion limit of a passive
-# joint
+# outcome codes of assembly/kernels/linear/energies.h. Codes from _LEFT on mean that the
+# kernel returned no result. The codes _AT_BOUNDS can be caused by an omitted motion
+# limit of a passive joint
 _LEFT, _AT_BOUNDS = 2, (5, 6)
 _STATUS: dict[type[Exception], str] = {
     CannotAssemble: CANNOT_ASSEMBLE,
@@ -97,32 +98,33 @@ def solve_assembly(
     method: Method = "compiled",
     carried: ArrayLike | None = None,
 ) -> Assembly:
-    """Close a manipulator with the least energy, problem (22), under optional loads.
+    """Close a manipulator with minimum energy, problem (22), under optional loads.
 
     Args:
-        posture: configuration of a robot, whose errors, clearances, links and joint
-            springs are used; or a sequence of k postures of one robot.
+        posture: configuration of a robot, including its errors, clearances, links and
+            joint springs; or a sequence of k postures of one robot.
         load: (6,) or (k, 6) [N m, N] wrench on the platform at its origin, base axes;
-            or a mapping of components such as ``{"fz": -50}``.  With a load, the energy
-            minus the work of the load is minimised.
+            or a mapping of components such as ``{"fz": -50}``.  Under a load, the
+            energy minus the work of the load is minimised.
         bodies: (n, 6) or (k, n, 6) [N m, N] wrenches on the bodies of all frames, each
             at its frame's origin, base axes.
         gravity: (3,) or (k, 3) [m/s^2] gravity vector in base axes.  It acts on links
             with a density and on bodies with a mass.
-        errors: (k, n, 6) [rad, m] geometric errors in place of the robot's: one set for
-            each of k postures, or k sets at one posture.
-        method: ``"compiled"`` uses the reference method only for points that the
-            compiled method does not prove; ``"reference"`` uses only numpy and
-            Clarabel.  The field ``method`` of the result names the method per point.
+        errors: (k, n, 6) [rad, m] geometric errors that replace those of the robot: one
+            set for each of k postures, or k sets at one posture.
+        method: ``"compiled"`` falls back on the reference method for points that the
+            compiled method cannot certify; ``"reference"`` uses only numpy and
+            Clarabel.  The field ``method`` of the result states the method used for
+            each point.
         carried: (n, 6) or (k, n, 6) [N m, N] wrenches on the parts that the joints of
             all frames carry, each at its frame's origin, base axes.
 
     Returns:
-        The assembled manipulator.  The function
-        :func:`forcefit.assembly.linear.certificate.unproved` lists the properties that
-        remain unproved.  For many postures or sets of errors, one object contains all
-        points.  A point without a solution then raises no exception; the field
-        ``reason`` contains the message.
+        The assembled manipulator.  Use
+        :func:`forcefit.assembly.linear.certificate.unproved` to list the properties
+        that remain unproved.  For many postures or sets of errors, one object contains
+        all points.  A point without a solution does not raise an exception; instead,
+        the field ``reason`` contains the message.
 
     Raises:
         CannotAssemble: no clearance and no spring can close an open closure.
@@ -148,7 +150,7 @@ def solve_assembly(
 
 
 def with_free_own_axes(assembly: Assembly) -> Assembly:
-    """Return the least energy if compliant joints turn freely about their own axis.
+    """Solve (22) with compliant joints that rotate freely about their own axis.
 
     Args:
         assembly: assembly of many points.
@@ -165,9 +167,9 @@ def together_at(posture: Posture, points: Sequence[Assembly | Exception]) -> Ass
     """Combine points that were solved separately into one object.
 
     Args:
-        posture: k postures of a robot; its springs and clearances may differ from those
-            of the points' robots.
-        points: k assemblies; an exception replaces a point without a solution.
+        posture: k postures of a robot, whose springs and clearances may differ from
+            those of the individual points.
+        points: k assemblies, or the exception raised at a point without a solution.
 
     Returns:
         Assembly of all points; an index selects one of them.
@@ -185,13 +187,13 @@ def together_at(posture: Posture, points: Sequence[Assembly | Exception]) -> Ass
 
 
 def failure_status(error: Exception) -> str:
-    """Return the status of a posture without a solution.
+    """Return the status that corresponds to an exception.
 
     Args:
         error: :class:`CannotAssemble`, :class:`FreeMotion` or :class:`SolverFailed`.
 
     Returns:
-        The status of the public format.
+        The status, as defined in the public format.
     """
     return next(status for kind, status in _STATUS.items() if isinstance(error, kind))
 
@@ -199,12 +201,12 @@ def failure_status(error: Exception) -> str:
 def _solve_one(
     posture: Posture, load: NDArray, loads: FrameLoads, method: Method
 ) -> Assembly:
-    """Solve one posture by the compiled method, or by the reference where necessary."""
+    """Solve one posture by the compiled method, or by the reference if necessary."""
     robot = posture.robot
     if method == "reference":
         return least_energy(posture, load, loads)
     rounding, acting = _rounding_of(robot), loads.rows() if loads else None
-    # a copy, because C++ obtains the address of a writable array three times as fast
+    # copy: C++ obtains the address of a writable array three times as fast
     T = np.array(posture.transforms, ndmin=4)
     off = np.array([posture.mismatch])
     for bounded in (False, True):
@@ -213,12 +215,12 @@ def _solve_one(
         if rows["outcome"][0] < _LEFT:
             break
         if bounded or not _bounds_matter(structure, rows["outcome"])[0]:
-            log_reference(robot.name, "least energy", 1, 1)
+            log_reference(robot.name, "minimum energy", 1, 1)
             return least_energy(posture, load, loads)
     multipliers, residual = rows["multipliers"], rows["residual"] + rounding
     drop_zeros(rows["energy"], rows["bound"], multipliers, residual, acting is not None)
     if acting is None and not np.count_nonzero(multipliers):
-        rows["elastic"][:] = 0.0  # without wrenches, deformations are rounding errors
+        rows["elastic"][:] = 0.0  # without wrenches, deformations are round-off
     assembly = Assembly(
         linearisation=linearise(posture), joints=joints, load=load, frame_loads=loads,
         method="compiled", energy_without_clearance=float(rows["tight"][0]),
@@ -230,7 +232,7 @@ def _solve_one(
 
 @lru_cache(maxsize=32)  # cached, because it is called for one robot at many postures
 def _rounding_of(robot: Robot) -> float:
-    """Return the largest closure error [rad, lengths] that rounding can cause."""
+    """Return the largest closure error [rad, lengths] that round-off can cause."""
     joints, _ = structure_of(robot)
     return float(closure_rounding(robot.errors, joints, checked_size(robot)))
 
@@ -262,9 +264,9 @@ def _solve_many(
     points = _of_rows(posture, joints, rows, load, loads, own)
     left = np.flatnonzero(rows["outcome"] >= _LEFT).tolist()
     if left and method == "compiled":
-        log_reference(robot.name, "least energy", len(left), count)
+        log_reference(robot.name, "minimum energy", len(left), count)
     for i in left:
-        one = points[i]  # this object contains the posture and the loads of point i
+        one = points[i]  # posture and loads of point i
         _record(rows, points.apart, i, _by_reference(one, own_axes_free))
     residual = rows["residual"] + closure_rounding(sets, joints, structure.size)
     _drop_rounding(rows, residual, points.loaded)
@@ -281,12 +283,12 @@ def _within_bounds(
     joints: VirtualJoints, structure: Structure, matter: NDArray,
     given: tuple[NDArray, NDArray, NDArray, NDArray | None], rows: _Rows,
 ) -> tuple[NDArray, VirtualJoints, _Rows]:  # fmt: skip
-    """Solve again the points at which motion limits of passive joints can be active.
+    """Solve again at points where motion limits of passive joints can be active.
 
     Returns:
-        Indices of the points that are solved here, with all motion limits as cones;
-        their virtual joints; and their results for these joints.  Results whose shape
-        does not depend on the virtual joints are also written into ``rows``.
+        Indices of the points solved here, with all motion limits as cones; their
+        virtual joints; and their results for these joints.  Results whose shape does
+        not depend on the virtual joints are also stored in ``rows``.
     """
     held = np.flatnonzero(matter)
     T, sets, off, acting = (
@@ -338,7 +340,7 @@ def _compiled(
     joints: VirtualJoints, structure: Structure, T: NDArray, errors: NDArray,
     mismatch: NDArray, loads: NDArray | None, method: Method = "compiled",
 ) -> _Rows:  # fmt: skip
-    """Return compiled results of k points; mark the points left to the reference."""
+    """Solve k points by the kernel; mark the points that need the reference method."""
     count = len(errors) if len(T) == 1 else len(T)
     rows = _empty(joints, count)
     given = structure, T, errors, mismatch
@@ -359,7 +361,7 @@ def _compiled(
 
 
 def _empty(joints: VirtualJoints, count: int) -> _Rows:
-    """Return empty result arrays of k points, in the order that the kernel requires."""
+    """Allocate the result arrays of k points, in the order required by the kernel."""
     return {
         "outcome": np.zeros(count, dtype=np.int64),
         "energy": np.zeros(count),
@@ -376,14 +378,14 @@ def _empty(joints: VirtualJoints, count: int) -> _Rows:
 
 
 def _unsaid(count: int) -> _Rows:
-    """Return the result arrays of k points that the kernel does not fill."""
+    """Allocate the result arrays of k points that the kernel does not fill."""
     texts = {"method": "compiled", "status": OK, "reason": ""}
     rows = {name: np.full(count, text, dtype=object) for name, text in texts.items()}
     return rows | {name: np.zeros(count) for name in ("gap", "potential", "least")}
 
 
 def _certify(rows: _Rows, points: Assembly) -> None:
-    """Add the gap, the potential and its lower bound of each point to ``rows``."""
+    """Store gap, potential and lower bound of each point in ``rows``."""
     energy, bound, loads = rows["energy"], rows["bound"], points.frame_loads
     rows["gap"][:] = np.maximum(0.0, energy - bound)
     on_errors = loads.body @ points.posture.robot.errors.ravel()
@@ -442,7 +444,7 @@ def _record(
     rows: _Rows, apart: dict[int, Assembly | Exception], i: int,
     found: Assembly | Exception,
 ) -> None:  # fmt: skip
-    """Write a separately solved point into row i; store it if it has other columns."""
+    """Store a separately solved point in row i, or in ``apart`` if necessary."""
     rows["method"][i] = "reference"
     if isinstance(found, Exception):
         for name in (*_NUMBERS, "platform_screw", *_VECTORS):
@@ -470,10 +472,10 @@ def _record(
 
 
 def _drop_rounding(rows: _Rows, residual: NDArray, loaded: NDArray) -> None:
-    """Set energies, wrenches and springs that are rounding errors to zero, in place."""
+    """Set energies, wrenches and springs that are only round-off to zero, in place."""
     multipliers = rows["multipliers"]
     drop_zeros(rows["energy"], rows["bound"], multipliers, residual, loaded)
-    # without loads and wrenches, all deformations are rounding errors
+    # without loads and wrenches, all deformations are round-off
     rows["elastic"][~(loaded | multipliers.any(axis=1))] = 0.0
 
 

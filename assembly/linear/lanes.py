@@ -1,10 +1,10 @@
 """Compiled solution of problems (22), (21), (27) and of K_C at several postures.
 
 Each lane of the processor's vector registers computes one posture, or one search of
-(27), from the poses of the frames to the certificate.  Lanes do not depend on each
-other.  Results of a point are therefore bit-identical whether the point is computed
-separately, in a batch or in another order.  Points that the kernels do not cover or do
-not prove are marked for the reference method.
+(27), from the poses of the frames to the certificate.  Lanes are independent, so the
+results at a point are bit-identical whether the point is computed alone, in a batch or
+in another order.  Points that the kernels do not cover or cannot certify are marked for
+the reference method.
 """
 
 from collections.abc import Mapping
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from forcefit.assembly.kernels.choice import kernels
 from forcefit.assembly.linear.robot_structure import Structure
 
-# outcome codes of (21), (27) and K_C: proved by the kernel, or left to the reference
+# outcome codes of (21), (27) and K_C: certified by the kernel, or left to the reference
 COMPILED, REFERENCE = range(2)
 _KEPT = 64  # number of robots whose C++ objects are cached
 _known: dict[int, tuple[Structure, Any]] = {}
@@ -37,7 +37,7 @@ def assemble_side_by_side(
         loads: (k, 2, n, 6) [N m, N] wrenches on bodies and on joints, in the frames'
             axes.
         out: arrays to fill, in this order: (k,) outcomes, energies [J], certified lower
-            bounds of the energies, energies without clearance, work of the loads on all
+            bounds on the energies, energies without clearance, work of the loads on all
             small screws except the errors; (k, 6) [rad, m] platform screws, (k, nu)
             clearances, (k, nq) free motions, (k, 6 closures) multipliers; (k,) closure
             residuals; (k, ny) [sqrt(2 J)] deformations of the springs.
@@ -52,7 +52,7 @@ def margins_side_by_side(
     structure: Structure, T: NDArray, errors: NDArray, mismatch: NDArray,
     out: tuple[NDArray, NDArray, NDArray, NDArray],
 ) -> None:  # fmt: skip
-    """Compute the margins of all points with their lower bounds.
+    """Compute the assembly margin at every point, with a lower bound.
 
     Args:
         structure: the robot without springs.
@@ -61,8 +61,8 @@ def margins_side_by_side(
         errors: (k, n, 6) [rad, m] geometric errors.
         mismatch: (k,) [rad, m] nominal closure errors of the frames.
         out: arrays to fill: (k,) margins; (k,) lower bounds; (k, nu) forces on the
-            clearances that prove the bounds, where the sizes of the forces on all cones
-            add up to 1; and (k,) outcomes.
+            clearances that prove the bounds, normalised so that their magnitudes on all
+            cones add up to 1; and (k,) outcomes.
 
     Raises:
         ValueError: the shape, type or memory order of an array is wrong.
@@ -75,7 +75,7 @@ def bounds_side_by_side(
     held: Structure, loads: tuple[NDArray, ...], asked: tuple[NDArray, NDArray],
     out: tuple[NDArray, ...],
 ) -> None:  # fmt: skip
-    """Bound the largest pose errors of the points whose outcome is COMPILED.
+    """Bound the largest pose error at each point whose outcome is COMPILED.
 
     Args:
         structure: the robot without springs.
@@ -84,17 +84,17 @@ def bounds_side_by_side(
         centres: solution of (22): (k, 6) [rad, m] screws of the platform at its origin;
             (k, nu) clearances in the cones of ``structure``; and (k, nq) [rad, m]
             motions, of which only bounded motions are read.
-        held: the robot in whose solution of (22) the loaded clearances are identified.
+        held: structure whose solution of (22) identifies the loaded clearances.
         loads: solution of (22) for ``held``: (k, 6 closures) multipliers of the scaled
             closures; (k, nu) clearances in the cones of ``held``; (k,) [J] energies;
             (k,) [J] energies with all clearances zero; and (cones,) indices of the
             cones of ``structure`` among the cones of ``held``.
         asked: (3,) [m] vector from the platform's origin to the point whose error is
             bounded; (2,) [rad, m] required difference of upper and lower bounds.
-        out: arrays to fill: (k, 2) [rad] lower and upper bounds of the rotation;
-            (k, 2) [m] bounds of the translation; two arrays (k, 6) [rad, m] of screws
-            that attain the lower bounds; (k,) number of support functions computed; and
-            (k,) outcomes.  The outcome of an unsolved point becomes REFERENCE.
+        out: arrays to fill: (k, 2) [rad] lower and upper bounds on the rotation; (k, 2)
+            [m] bounds of the translation; two arrays (k, 6) [rad, m] of screws that
+            attain the lower bounds; (k,) number of support functions computed; and (k,)
+            outcomes.  The outcome of an unsolved point becomes REFERENCE.
 
     Raises:
         ValueError: the shape, type or memory order of an array is wrong.
@@ -110,7 +110,7 @@ def compliances_side_by_side(
     structure: Structure, T: NDArray, mismatch: NDArray, springs: NDArray,
     status: NDArray,
 ) -> None:  # fmt: skip
-    """Compute the deformations of all springs under unit wrenches on the platform.
+    """Compute the spring deformations under unit wrenches on the platform.
 
     Args:
         structure: the robot.
@@ -128,7 +128,7 @@ def compliances_side_by_side(
 
 
 def _robot(structure: Structure) -> Any:
-    """Return the cached C++ object of a structure, created and checked at first use."""
+    """Return the C++ object of a structure, created and checked on first use."""
     known = _known.get(id(structure))
     if known is None:
         if len(_known) >= _KEPT:

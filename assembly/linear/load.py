@@ -1,6 +1,6 @@
 """Loads on the platform and on the bodies of a robot, including weights.
 
-A dead load does work on every small screw in the chain between its point of application
+A dead load does work on every small screw of the chain between its point of application
 and the base.  A load on the body of frame j acts on the base side of j's joint: it does
 work on the body's error and deformation, but not on the joint's clearance and spring.
 A load ``carried`` by j's joint acts on the platform side of that joint.  The drive
@@ -8,11 +8,11 @@ force of frame j (``drive_force``) acts between j's body and the part that j's j
 carries.  It does work only on the joint's motion.
 
 The weight W of a beam is distributed over its length.  It is replaced by forces W / 2
-at the two ends and by the fixed-end moments -r x W / 12 and +r x W / 12 of a beam
-clamped at both ends.  The deflection and rotation at the ends then equal those under
-the distributed load; the deflection between the ends is slightly larger.  The section
-at the tip transmits the wrench of the beam's spring minus the equivalent wrench at the
-tip, see :func:`weights_at_tips`.
+at both ends, together with the moments -r x W / 12 and +r x W / 12 of a beam clamped at
+both ends.  The end deflection and rotation then equal those under the distributed load;
+only the deflection between the ends is slightly larger.  The section at the tip
+transmits the wrench of the beam's spring minus the equivalent wrench at the tip, see
+:func:`weights_at_tips`.
 
 Sources:
     Timoshenko, Strength of Materials I, section 38 (beam with built-in ends, uniform
@@ -42,8 +42,10 @@ class FrameLoads:
     """Loads as wrenches on the small screws of every frame, in the frame's axes.
 
     Attributes:
-        body: (..., 6n) [N m, N] wrenches on errors and deformations of bodies.
-        joint: (..., 6n) [N m, N] wrenches on clearances, springs and motions of joints.
+        body: (..., 6n) [N m, N] wrenches that do work on errors and deformations of
+            bodies.
+        joint: (..., 6n) [N m, N] wrenches that do work on clearances, springs and
+            motions of joints.
         distributed: (..., 6n) [N m, N] part of ``body`` that is distributed along the
             links, reduced to their tips; or zero.
     """
@@ -68,11 +70,11 @@ class FrameLoads:
         return full.reshape(*full.shape[:-1], -1, 6)
 
     def rows(self) -> NDArray:
-        """Return the loads in the layout that compiled functions read.
+        """Return the loads in the layout that the compiled functions expect.
 
         Returns:
-            (k, 2, n, 6) [N m, N] wrenches on bodies and on joints; a single row serves
-            all points.
+            (k, 2, n, 6) [N m, N] wrenches on bodies and on joints; k = 1 if all points
+            have the same loads.
         """
         rows = np.stack([self.body, self.joint], axis=-2)
         return rows.reshape(-1, 2, rows.shape[-1] // 6, 6)
@@ -99,7 +101,7 @@ def loads_on_frames(
     bodies: ArrayLike | None = None,
     carried: ArrayLike | None = None,
 ) -> FrameLoads:
-    """Return the loads on all small screws of a robot.
+    """Return the loads that act on the small screws of a robot.
 
     Args:
         posture: one or many configurations of a robot of n frames.  The leading
@@ -115,8 +117,7 @@ def loads_on_frames(
         The loads, including drive forces; zeros if no load is given.
 
     Raises:
-        BadInput: a number is not finite, or its square overflows; or a shape does not
-            fit.
+        BadInput: a number is not finite or too large, or a shape is wrong.
     """
     for whose, given in (("load", load), ("bodies", bodies), ("carried", carried)):
         _check(whose, given, _LARGEST_LOAD, "N m, N")
@@ -156,15 +157,15 @@ def loads_on_frames(
 
 @lru_cache(maxsize=32)
 def driven(robot: Robot) -> bool:
-    """Return whether at least one drive of the robot applies a force."""
+    """Return True if at least one drive of the robot applies a force."""
     return any(frame.drive_force for frame in robot.frames)
 
 
 def drive_loads(robot: Robot) -> NDArray:
     """Return the (n, 6) [N m, N] wrenches that drives exert on the parts they move.
 
-    The wrenches act at each frame's origin and are expressed in the frame's axes.  The
-    drive exerts the opposite wrench on the body.
+    The wrenches act at each frame's origin, in the frame's axes.  The drive exerts the
+    opposite wrench on its body.
     """
     wrenches = np.zeros((len(robot.frames), 6))
     for wrench, frame in zip(wrenches, robot.frames, strict=True):
@@ -192,12 +193,12 @@ def _with_leading(
 
 @lru_cache(maxsize=16)
 def _beyond(robot: Robot) -> NDArray:
-    """Return (n, n) entries: 1 if the frame of the row carries that of the column."""
+    """Return the (n, n) matrix whose entry (i, j) is 1 if frame i carries frame j."""
     return (robot.on_path & ~np.eye(len(robot.frames), dtype=bool)).T.astype(float)
 
 
 def _moved(wrenches: NDArray, arms: NDArray) -> NDArray:
-    """Return (..., n, 6) wrenches at points (..., n, 3), moved to the origin."""
+    """Transform (..., n, 6) wrenches at points (..., n, 3) to the origin."""
     read = wrenches.copy()
     x, y, z = (arms[..., a] for a in range(3))
     fx, fy, fz = (wrenches[..., a] for a in range(3, 6))
@@ -208,7 +209,7 @@ def _moved(wrenches: NDArray, arms: NDArray) -> NDArray:
 
 
 def weights(posture: Posture, gravity: ArrayLike) -> tuple[NDArray, NDArray]:
-    """Return the weights of all links with a density and of all bodies with a mass.
+    """Compute the weights of links with a density and of bodies with a mass.
 
     Args:
         posture: one or many configurations of a robot of n frames.
@@ -216,8 +217,8 @@ def weights(posture: Posture, gravity: ArrayLike) -> tuple[NDArray, NDArray]:
 
     Returns:
         Arguments ``bodies`` and ``carried`` (..., n, 6) [N m, N] of
-        :func:`loads_on_frames`.  Links given by a matrix, a mesh or a library have no
-        weight here.
+        :func:`loads_on_frames`.  Links given by a matrix, a mesh or a library are
+        treated as weightless.
 
     Raises:
         BadInput: gravity is not finite, exceeds 1e6 m/s^2, or its shape does not fit.
@@ -245,7 +246,7 @@ def weights(posture: Posture, gravity: ArrayLike) -> tuple[NDArray, NDArray]:
 
 
 def massless(robot: Robot, gravity: ArrayLike | None) -> list[str]:
-    """Return a remark if the robot, or a link given by a mesh, has no mass.
+    """Return a remark if the robot, or a link given by a mesh, lacks a mass.
 
     Args:
         robot: any robot.
@@ -264,7 +265,7 @@ def massless(robot: Robot, gravity: ArrayLike | None) -> list[str]:
         return [
             (
                 f"the weight of {', '.join(map(quoted, without))}, whose stiffness "
-                "is computed from a mesh, and the stress due to it are left out: "
+                "is computed from a mesh, and the resulting stress are neglected: "
                 'expected "mass" and "centre_of_mass" of the frame; forcefit '
                 "stiffness stress --gravity computes that stress"
             )
@@ -273,14 +274,14 @@ def massless(robot: Robot, gravity: ArrayLike | None) -> list[str]:
         return []
     return [
         (
-            "gravity has no effect, because no frame has a mass; expected "
-            '"density" of links or "mass" of frames'
+            "gravity has no effect, because no frame has a mass; expected a "
+            '"density" for links or a "mass" for frames'
         )
     ]
 
 
 def weights_at_tips(posture: Posture, gravity: ArrayLike) -> NDArray:
-    """Return the weights distributed along the links, reduced to the links' tips.
+    """Reduce the weights distributed along the links to the tips of the links.
 
     Args:
         posture: one or many configurations of a robot of n frames.
@@ -298,11 +299,11 @@ def weights_at_tips(posture: Posture, gravity: ArrayLike) -> NDArray:
 
 
 def wrenches_at_starts(robot: Robot, tips: NDArray, distributed: NDArray) -> NDArray:
-    """Return the wrenches at the starts of links under their own weight.
+    """Compute the wrenches at the starts of links under their own weight.
 
     Args:
         robot: robot of n frames.
-        tips: (..., n, 6) [N m, N] wrenches through each link's section at its tip.
+        tips: (..., n, 6) [N m, N] wrenches through the section at each link's tip.
         distributed: (..., n, 6) [N m, N] result of :func:`weights_at_tips`.
 
     Returns:
@@ -332,7 +333,7 @@ def _masses(robot: Robot) -> NDArray:
 
 
 def loads_with_weight(postures: Posture, load: NDArray, gravity: NDArray) -> FrameLoads:
-    """Return the loads of a platform wrench and of gravity, at one or many postures.
+    """Return the loads due to a platform wrench and gravity, at one or many postures.
 
     Args:
         postures: one posture, or R postures in one object.
@@ -340,8 +341,8 @@ def loads_with_weight(postures: Posture, load: NDArray, gravity: NDArray) -> Fra
         gravity: (3,) or (R, 3) [m/s^2] gravity vector in base axes.
 
     Returns:
-        Loads (6n,) or (R, 6n) on all small screws, read-only.  Robots that differ only
-        in errors, springs and clearances share these arrays.
+        Loads (6n,) or (R, 6n) on all small screws, read-only.  The arrays are shared by
+        robots that differ only in errors, springs and clearances.
     """
     robot = postures.robot
     arrays = load, gravity, _masses(robot), drive_loads(robot)
@@ -365,7 +366,7 @@ def _loads_with_weight(content: Content) -> FrameLoads:
 def with_distributed(
     loads: FrameLoads, posture: Posture, gravity: ArrayLike
 ) -> FrameLoads:
-    """Return the loads with the links' distributed weight stored in ``distributed``.
+    """Store the distributed weight of the links in the field ``distributed``.
 
     Args:
         loads: loads that include the result of :func:`weights`.

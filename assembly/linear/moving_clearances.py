@@ -1,4 +1,4 @@
-"""Arguments and call of the compiled search for the largest pose error, (27)."""
+"""Call the compiled search for the largest pose error, problem (27)."""
 
 from dataclasses import dataclass
 from functools import lru_cache
@@ -19,13 +19,13 @@ from forcefit.assembly.solvers.method import Method, check_method
 
 @dataclass(frozen=True)
 class Asked:
-    """Settings for the bounds of the largest pose error.
+    """Settings for the pose error bounds.
 
     Attributes:
         assumption: name from the table in :mod:`forcefit.assembly.linear.pose_error`.
         energy_budget: eta of the assumption ``budget``.
-        tolerance_rotation: [rad] required difference of upper and lower bound.
-        tolerance_translation: [m] required difference of the bounds of the translation.
+        tolerance_rotation: [rad] required gap between upper and lower bound.
+        tolerance_translation: [m] required gap between the translation bounds.
         offset: (3,) [m] from the platform's origin to the point whose error is bounded.
         method: ``"compiled"`` or ``"reference"``.
     """
@@ -46,18 +46,18 @@ class Asked:
 
 
 def compiled_bounds(assembly: Assembly, asked: Asked) -> tuple[dict[str, Any], NDArray]:
-    """Return the bounds of k points computed by the compiled search.
+    """Bound the largest pose error at k points by the compiled search.
 
     Args:
         assembly: assembly of k points.
-        asked: assumption, required widths and point.
+        asked: assumption, required gaps and reference point.
 
     Returns:
         Mapping with ``rotation_error`` (k, 2) [rad] and ``translation_error`` (k, 2)
         [m], lower and upper bounds; ``rotation_screw`` and ``translation_screw`` (k, 6)
         [rad, m] that attain the lower bounds; and ``supports`` (k,) number of support
-        functions computed.  Also (k,) bool, True for points that are left to numpy or
-        that have no solution of (22); their bounds are NaN.
+        functions evaluated.  Also (k,) bool, True for points that must be solved in
+        numpy or for which (22) has no solution; their bounds are NaN.
     """
     count, robot = len(assembly), assembly.posture.robot
     rows = {

@@ -1,19 +1,19 @@
-"""Assembly of least energy whose platform pose is nearest to the nominal pose.
+"""Find the minimum-energy assembly whose platform pose is nearest to nominal.
 
-The assembly of least energy need not be unique.  Springs and loaded clearances are
-equal in all such assemblies, see ``frozen`` in
+The minimum-energy assembly need not be unique.  Springs and loaded clearances are equal
+in all such assemblies, see ``frozen`` in
 :mod:`forcefit.assembly.linear.reference.pose_error`.  Unloaded clearances can have any
 values in their cones that satisfy the closures.  The nearest pose is the solution of
-another second-order cone programme,
+another second-order cone program,
 
     minimise  |x + X (v - u)|^2    subject to  H (v - u) = 0,  |v_k| <= 1.
 
 Here x is the deviation at the solution u, X its derivative with respect to the unloaded
-clearances, v their new values, and H contains the rows of the closures.
+clearances, v their new values, and H contains the closure equations.
 
 Sources:
-    Public format, section 5, item 15: the pose of least energy and, among these poses,
-    the pose of least norm.
+    Public format, section 5, item 15: the minimum-energy pose and, among these poses,
+    the pose of minimum norm.
 """
 
 from collections.abc import Iterator
@@ -41,7 +41,7 @@ from forcefit.assembly.solvers.conic import minimise_energy
 from forcefit.assembly.solvers.method import Method
 from forcefit.stiffness.screws import skew
 
-_STILL = 1e-11  # [rad, m] a platform pose whose range is smaller counts as unique
+_STILL = 1e-11  # [rad, m] range below which a platform pose counts as unique
 
 
 def nearest_pose(
@@ -49,18 +49,18 @@ def nearest_pose(
     offset: ArrayLike = (0.0, 0.0, 0.0),
     method: Method = "compiled",
 ) -> tuple[Assembly, bool]:
-    """Return the assembly of least energy whose pose deviates least.
+    """Return the minimum-energy assembly with the smallest pose deviation.
 
     Args:
-        assembly: assembly of least energy.
+        assembly: minimum-energy assembly.
         offset: (3,) [m] from the platform's origin to the point whose deviation is
             minimised, base axes.
         method: method of :func:`forcefit.assembly.solvers.conic.minimise_energy`.
 
     Returns:
-        The assembly whose deviation (rotation vector [rad] and displacement of the
-        point [m]) has the least Euclidean norm; and whether the pose is not unique
-        because of clearances.
+        The assembly that minimises the Euclidean norm of the deviation (rotation vector
+        [rad] and displacement of the point [m]); and whether clearances leave the pose
+        non-unique.
 
     Raises:
         SolverFailed: the cone solver did not converge.
@@ -114,7 +114,7 @@ class _FreeClearances:
 
 
 def _free_clearances(assembly: Assembly, offset: ArrayLike) -> _FreeClearances | None:
-    """Return the clearances that can change at least energy; None if there are none."""
+    """Return the clearances that can vary at minimum energy; None if there are none."""
     joints, lin = assembly.joints, assembly.linearisation
     unloaded = ~loaded_cones(assembly, joints)
     columns = joints.cones[:, unloaded]
@@ -138,7 +138,7 @@ def _free_clearances(assembly: Assembly, offset: ArrayLike) -> _FreeClearances |
 
 
 def _with_clearances(assembly: Assembly, free: _FreeClearances, v: NDArray) -> Assembly:
-    """Return the assembly for new unloaded clearances, with adapted free motions."""
+    """Replace the unloaded clearances and adapt the free motions."""
     joints, lin = assembly.joints, assembly.linearisation
     u = assembly.clearances.copy()
     u[free.unloaded] = v
@@ -159,7 +159,7 @@ def _moves(free: _FreeClearances, method: Method) -> bool:
 def _heights(
     free: _FreeClearances, direction: NDArray, method: Method
 ) -> Iterator[float]:
-    """Yield the platform's range [rad, m] in a direction and in the opposite one."""
+    """Yield the range [rad, m] of the platform along a direction and its opposite."""
     gradient = free.map.T @ direction
     size = float(np.linalg.norm(gradient))
     none, right = np.zeros((0, len(gradient))), free.rows @ free.start

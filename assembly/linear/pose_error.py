@@ -1,17 +1,17 @@
-"""Certified bounds of the largest pose error of the platform, problem (27).
+"""Certified bounds on the largest pose error of the platform, problem (27).
 
-As printed in the paper, (27) is degenerate: if the deformations keep their values of
-problem (22), complementary slackness fixes every loaded clearance.  The assumption
-names the screws that can still move:
+As printed in the paper, (27) is degenerate: if the deformations are fixed at their
+values in problem (22), complementary slackness fixes every loaded clearance.  The
+argument ``assumption`` therefore selects which screws can still move:
 
 ======== =================================================================
 frozen   all deformations are fixed; only unloaded clearances move (paper)
-free     compliant joints also turn freely about their own axis
-budget   all assemblies with at most (1 + eta) times the least energy
+free     compliant joints also rotate freely about their own axis
+budget   all assemblies with at most (1 + eta) times the minimum energy
 ======== =================================================================
 
-The motions of passive joints stay within their bounds.  Rotation and translation are
-bounded separately: a tool on a bearing turns freely, but the error of its point is
+Motions of passive joints stay within their limits.  Rotation and translation are
+bounded separately: a tool on a bearing rotates freely, but the error of its point is
 bounded.
 
 The set of platform screws (:mod:`forcefit.assembly.linear.reference.pose_error`) is
@@ -21,9 +21,9 @@ functions.  With ``"reference"``, :func:`forcefit.assembly.solvers.outer_cuts.fa
 does this in numpy, and Clarabel computes every support function.
 
 For ``frozen`` and ``free`` all steps are compiled
-(:mod:`forcefit.assembly.linear.moving_clearances`), which requires some tenths of a
+(:mod:`forcefit.assembly.linear.moving_clearances`), which takes a few tenths of a
 millisecond per point.  For ``budget``, and for points that the compiled search does not
-cover, the set is constructed in numpy, point by point.
+cover, the set is constructed in numpy, one point at a time.
 """
 
 from collections.abc import Callable
@@ -52,7 +52,7 @@ from forcefit.results.display import Figures, bracket, short_repr
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PoseError(PointResults):
-    """Certified bounds of the largest pose error of one or many points.
+    """Certified bounds on the largest pose error at one or many points.
 
     The arrays of many points begin with a point axis.
 
@@ -64,7 +64,7 @@ class PoseError(PointResults):
         rotation_screw: (..., 6) [rad, m] screw that attains the rotation's lower bound.
         translation_screw: (..., 6) [rad, m] screw that attains the translation's lower
             bound.
-        supports: (...) number of support functions computed.
+        supports: (...) number of support functions evaluated.
         method: (...) method of the search: ``"compiled"``, or ``"reference"`` for numpy
             and Clarabel.
         one_by_one: (...) bool, True if the set of screws was constructed in numpy for
@@ -72,7 +72,7 @@ class PoseError(PointResults):
         status: (...) ``"ok"``; for many points also ``"cannot assemble"``, or
             ``"solver failed"`` if there is no solution or its certificate is too weak.
         reason: (...) message if the status is not ok.
-        proof: function that returns the unproved properties of one point.
+        proof: function that returns the unproved properties at one point.
     """
 
     assumption: str
@@ -111,10 +111,10 @@ class PoseError(PointResults):
 
     @cached_property
     def unproved(self) -> Any:
-        """(...) properties of the solution of (22), or of the bounds, without proof.
+        """(...) unproved properties of the solution of (22) or of the bounds.
 
-        The text is empty if everything is proved.  For one point the text is computed
-        at first use, because its computation is slower than that of the bounds.
+        The text is empty if everything is proved.  At a single point, it is computed on
+        first use, because this takes longer than computing the bounds.
         """
         return self.reason if self.of_many else self.reason or self.proof()
 
@@ -148,23 +148,23 @@ def bound_pose_error(
     """Bound the largest rotation and translation error of the platform.
 
     Args:
-        assembly: assembly of least energy, of one or many points; without loads for
+        assembly: minimum-energy assembly, of one or many points; without loads for
             ``budget``.
         assumption: name from the table at the head of this module.
         energy_budget: eta of ``budget``.
-        tolerance_rotation: [rad] required difference of upper and lower bound.
-        tolerance_translation: [m] required difference of the bounds of the translation.
+        tolerance_rotation: [rad] required gap between upper and lower bound.
+        tolerance_translation: [m] required gap between the translation bounds.
         offset: (3,) [m] from the platform's origin to the point whose error is bounded,
             base axes.
         method: ``"compiled"``; or ``"reference"``, which uses only numpy and Clarabel
-            and requires tenths of a second.
+            and takes several tenths of a second.
 
     Returns:
         Bounds.  They are wider than required only if 400 support functions did not
-        suffice; ``unproved`` then contains a message.  They are infinite if the
-        platform can turn, or its point move, without bound.  For many assemblies, one
-        object contains all points.  A point without bounds then raises no exception;
-        ``reason`` contains its message.
+        suffice, in which case ``unproved`` contains a message.  They are infinite if
+        the platform can rotate, or its point translate, without limit.  For many
+        assemblies, one object contains all points.  A point without bounds does not
+        raise an exception; instead, ``reason`` contains its message.
 
     Raises:
         ValueError: ``assumption`` or ``method`` is unknown, or ``budget`` has a load.
@@ -191,7 +191,7 @@ def bound_pose_error(
 
 
 def _bounds_of_many(assembly: Assembly, asked: Asked) -> PoseError:
-    """Return the bounds of many points: compiled where possible, else one by one."""
+    """Bound the errors at many points, one by one where the kernel fails."""
     rows, left = compiled_bounds(assembly, asked)
     status, reason = assembly.status.copy(), assembly.reason.copy()
     left &= status == OK
@@ -211,7 +211,7 @@ def _bounds_of_many(assembly: Assembly, asked: Asked) -> PoseError:
 
 
 def _bounds_of_one(assembly: Assembly, asked: Asked) -> PoseError:
-    """Return the bounds of one point, whose set of screws is constructed in numpy."""
+    """Bound the errors at one point from a set of screws constructed in numpy."""
     reachable = reachable_screws(assembly, asked.assumption, asked.energy_budget)
     reachable = reachable.at_point(asked.offset)
     rotation, rotation_screw, supports = reachable.farthest(
@@ -245,7 +245,7 @@ def _bounds_of_one(assembly: Assembly, asked: Asked) -> PoseError:
 def _too_wide(
     part: str, bounds: tuple[float, float], tolerance: float, unit: str
 ) -> str:
-    """Return a message if lower and upper bound differ too much, else ``""``."""
+    """Return a message if the bounds are too far apart, otherwise ``""``."""
     low, high = bounds
     # both bounds are infinite if the platform can move without bound
     if high - low <= tolerance or low == high:

@@ -1,4 +1,4 @@
-"""Arrays that describe a robot's virtual joints to the compiled methods."""
+"""Arrays that pass the virtual joints of a robot to the compiled methods."""
 
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -19,7 +19,7 @@ from forcefit.assembly.solvers.cones import cone_starts
 
 
 class Structure(NamedTuple):
-    """Arrays that all postures of a robot share.
+    """Posture-independent arrays that describe a robot.
 
     The robot has n frames and closures with np different patterns of signs.
 
@@ -76,7 +76,7 @@ def structure_of(
     robot: Robot, springs: bool = True, own_axes_free: bool = False,
     bounded_motion: bool = False,
 ) -> tuple[VirtualJoints, Structure]:  # fmt: skip
-    """Return the small screws that can move, as columns and as arrays.
+    """Return the virtual joints of a robot, as columns and as arrays.
 
     Args:
         robot: any robot.
@@ -95,7 +95,7 @@ def structure_of(
 
 @dataclass(frozen=True)
 class _Tree:
-    """Data of the robot that a structure contains in addition to virtual joints."""
+    """Robot data needed for a structure in addition to the virtual joints."""
 
     platform: int
     closures: tuple[tuple[int, int], ...]
@@ -104,7 +104,7 @@ class _Tree:
 
 @lru_cache(maxsize=32)
 def _structure(joints: VirtualJoints, tree: _Tree, own_axes_free: bool) -> Structure:
-    """Return the arrays, cached for robots that differ only in their errors."""
+    """Return the arrays, cached across robots that differ only in their errors."""
     robot = tree.robot
     on_path = robot.on_path[tree.platform]
     signs = closure_signs(robot).T.astype(float)

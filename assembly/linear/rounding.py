@@ -1,8 +1,8 @@
-"""Rounding errors: energies that could be zero, and ill-conditioned stiffnesses.
+"""Round-off: energies indistinguishable from zero, and ill-conditioned stiffnesses.
 
-Closures are sums of screws that cancel.  In floating point, a residual of some units in
-the last place of the summed terms remains.  The work of the wrenches on this residual
-is a rounding error and not an elastic energy.
+Closures are sums of screws that cancel.  In floating-point arithmetic, a residual of a
+few units in the last place of the terms remains.  The work of the wrenches on this
+residual is round-off, not elastic energy.
 """
 
 from functools import lru_cache
@@ -12,14 +12,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from forcefit.assembly.linear.closure import VirtualJoints, in_reference_lengths
 
-# [-] relative rounding error of a sum of some tens of terms
+# [-] relative round-off error of a sum of a few dozen terms
 ROUNDING = 8 * float(np.finfo(float).eps)
-# stiffness ratio at which the stiffest spring's rounding error is 1e-3 of the softest
+# stiffness ratio at which the stiffest spring's round-off is 1e-3 of the softest
 SPREAD = 1e13
 
 
 def closure_rounding(errors: NDArray, joints: VirtualJoints, size: float) -> NDArray:
-    """Return the largest closure error (...,) [rad, lengths] that rounding can cause.
+    """Estimate the largest closure error that round-off can cause.
 
     Args:
         errors: (..., n, 6) [rad, m] geometric errors.
@@ -27,7 +27,8 @@ def closure_rounding(errors: NDArray, joints: VirtualJoints, size: float) -> NDA
         size: [m] reference length.
 
     Returns:
-        (...,) 8 units in the last place of the sum of errors and clearances.
+        (...,) [rad, lengths] 8 units in the last place of the sum of errors and
+        clearances.
     """
     sums = (np.abs(errors) @ in_reference_lengths(size)).sum(axis=-1)
     return ROUNDING * (sums + _clearance_sum(joints, size))
@@ -43,16 +44,16 @@ def _clearance_sum(joints: VirtualJoints, size: float) -> float:
 def differs_from_zero(
     energy: ArrayLike, gap: ArrayLike, multipliers: NDArray, residual: ArrayLike
 ) -> NDArray:
-    """Return whether least energies exceed their certified uncertainty.
+    """Return whether minimum energies exceed their certified uncertainty.
 
     An energy that does not exceed the duality gap can be zero.  The work of the
-    wrenches on the rounding errors of the closures counts as uncertainty too.
+    wrenches on closure round-off is also counted as uncertainty.
 
     Args:
-        energy: (...,) [J] least energies.
+        energy: (...,) [J] minimum energies.
         gap: (...,) [J] energy minus its certified bound.
         multipliers: (..., 6 closures) multipliers of the scaled closures.
-        residual: (...,) [rad, reference lengths] closure residual, rounding included.
+        residual: (...,) [rad, reference lengths] closure residual, including round-off.
 
     Returns:
         (...,) bool; True also if the energy is NaN.
@@ -65,18 +66,18 @@ def drop_zeros(
     energy: NDArray, bound: NDArray, multipliers: NDArray, residual: NDArray,
     loaded: ArrayLike = False,
 ) -> None:  # fmt: skip
-    """Set energies that do not differ from zero to zero, in place.
+    """Set energies that cannot be distinguished from zero to zero, in place.
 
     Args:
-        energy: (k,) [J] least energies.
+        energy: (k,) [J] minimum energies.
         bound: (k,) [J] certified lower bounds.
-        multipliers: (k, 6 closures) multipliers of the scaled closures; they are set to
-            zero at unloaded points where they are only rounding errors.
-        residual: (k,) [rad, lengths] residual of the closures, rounding included.
+        multipliers: (k, 6 closures) multipliers of the scaled closures, set to zero at
+            unloaded points where they are only round-off.
+        residual: (k,) [rad, lengths] closure residual, including round-off.
         loaded: (k,) bool, points under loads.
     """
     zero = ~differs_from_zero(energy, energy - bound, multipliers, residual)
-    # if no energy is zero, no multiplier is a rounding error
+    # if no energy is zero, no multiplier is round-off
     if not np.count_nonzero(zero):
         return
     rounding = ~differs_from_zero(energy, 0.0, multipliers, residual) & ~np.array(
@@ -88,7 +89,7 @@ def drop_zeros(
 
 @lru_cache(maxsize=64)
 def stiffness_spread(joints: VirtualJoints, size: float) -> float:
-    """Return the ratio [-] of stiffest to softest spring; angles are scaled by size."""
+    """Return the stiffness ratio [-] of the stiffest to the softest spring."""
     weights = np.tile(in_reference_lengths(size), len(joints.elastic) // 6)
     compliance = ((joints.elastic * weights[:, None]) ** 2).sum(axis=0)
     return float(compliance.max(initial=1e-300) / compliance.min(initial=np.inf))

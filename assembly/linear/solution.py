@@ -1,7 +1,6 @@
-"""Numerical solution of the least-energy problem, for one or many points.
+"""Numerical solution of the minimum-energy problem, for one or many points.
 
-:class:`forcefit.assembly.linear.assembled.Assembly` adds the quantities that are
-computed from these numbers.
+:class:`forcefit.assembly.linear.assembled.Assembly` adds the derived quantities.
 """
 
 from collections.abc import Mapping
@@ -18,7 +17,7 @@ from forcefit.assembly.model.point_results import N, PointResults, plain
 from forcefit.assembly.model.statuses import OK
 
 _VECTORS = ("elastic", "clearances", "motions", "multipliers")
-# names of values that can be stored in addition: properties, parts of a certificate
+# names of derived values that can be stored: properties, parts of a certificate
 KNOWN = (
     "energy", "platform_screw", "work", "potential", "bound", "_gap", "_residual",
     "_excess",
@@ -27,7 +26,7 @@ KNOWN = (
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Solution(PointResults, Generic[N]):
-    """Numerical solution of least energy for one or many points of a manipulator.
+    """Numerical minimum-energy solution of a manipulator at one or many points.
 
     The arrays of many points begin with a point axis.
 
@@ -37,21 +36,21 @@ class Solution(PointResults, Generic[N]):
         load: (..., 6) [N m, N] wrench on the platform at its origin, base axes.
         frame_loads: all loads on every small screw, including ``load``.
         elastic: (..., ny) [sqrt(2 J)] scaled deformations of the springs.
-        clearances: (..., nu) clearances in units of their cones.  In an object of many
-            points, NaN at points where the bound of a passive joint's motion is active;
-            ``[i]`` returns their values.
+        clearances: (..., nu) clearances in units of their cones.  If there are many
+            points, NaN where the motion limit of a passive joint is active; ``[i]``
+            returns the values at these points.
         motions: (..., nq) [rad, m] free motions; NaN at the same points.
         multipliers: (..., 6 closures) multipliers of the scaled closure rows.
-        energy_without_clearance: (...) [J] least energy with all clearances zero.
+        energy_without_clearance: (...) [J] minimum energy with all clearances zero.
         method: (...) method that solved the point: ``"compiled"``, or ``"reference"``
             for numpy and Clarabel.
-        errors: (..., n, 6) [rad, m] geometric errors; None for the robot's errors.
+        errors: (..., n, 6) [rad, m] geometric errors; None for those of the robot.
         status: (...) ``"ok"``; for many points also ``"cannot assemble"``,
-            ``"no equilibrium"``, or ``"solver failed"``.  The last status also marks a
+            ``"no equilibrium"``, or ``"solver failed"``, which also denotes a
             certificate that is too weak.
         reason: (...) message if the status is not ok.
-        apart: by point number, an assembly if the columns of the point differ from
-            ``joints``, or an exception if the point has no solution.
+        apart: for some points, by number: an assembly whose columns differ from
+            ``joints``, or the exception raised if there is no solution.
         held: sorted numbers of the points at which motion limits of passive joints are
             active, and an assembly of these points with all motion limits as cones.
     """
@@ -122,7 +121,7 @@ class Solution(PointResults, Generic[N]):
         return with_known(alone, known)
 
     def _taken(self, rows: NDArray) -> Self:
-        """Return a selection of points, in which a point can occur repeatedly."""
+        """Return a selection of points, possibly with repetitions."""
         lin, held = self.linearisation, self.held
         if self.posture.transforms.ndim > 3:
             lin = replace(lin, posture=self.posture[rows])
@@ -140,7 +139,7 @@ class Solution(PointResults, Generic[N]):
         return with_known(taken, known)
 
     def in_columns(self, joints: VirtualJoints) -> Self:
-        """Return many points with the columns of other virtual joints.
+        """Express many points in the columns of other virtual joints.
 
         Args:
             joints: virtual joints of some points in ``apart``.
@@ -169,12 +168,11 @@ class Solution(PointResults, Generic[N]):
     def with_held(
         self, rows: NDArray, joints: VirtualJoints, parts: Mapping[str, NDArray]
     ) -> Self:
-        """Return many points with the points whose bounds of motion are active.
+        """Store the points at which motion limits of passive joints are active.
 
         Args:
-            rows: sorted numbers of the points whose bounds of passive joints' motions
-                are active.
-            joints: virtual joints with all such bounds as cones.
+            rows: sorted numbers of these points.
+            joints: virtual joints with all motion limits as cones.
             parts: ``clearances`` and ``motions`` of these points in the columns of
                 ``joints``.
 
@@ -210,15 +208,14 @@ One = TypeVar("One", bound=Solution)
 
 
 def with_known(solution: One, known: Mapping[str, Any]) -> One:
-    """Store values that are already known, so that they are not computed again.
+    """Store known derived values so that they need not be recomputed.
 
     Args:
         solution: solution of one point or of many points.
-        known: known values by name.  Only the names in :data:`KNOWN` are used; others
-            are ignored.
+        known: known values by name.  Names that are not in :data:`KNOWN` are ignored.
 
     Returns:
-        The given object.
+        The same object.
     """
     own = vars(solution)
     for name in KNOWN:

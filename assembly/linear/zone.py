@@ -1,12 +1,12 @@
 """Assembly zone, problem (21), as a margin on the clearances.
 
-The margin t is the factor on all clearances at which the manipulator can just be
-assembled with rigid links and joints.  The manipulator can be assembled if t <= 1.  The
-margin is a continuous function of the errors.  Its inverse is the factor by which the
-errors could grow.
+The margin t is the factor by which all clearances must be scaled so that the
+manipulator can just be assembled with rigid links and joints.  Assembly is possible if
+t <= 1.  The margin is a continuous function of the errors, and 1 / t is the factor by
+which the errors could grow.
 
 As printed, (21) makes compliant joints rigid in every direction (``"rigid"``).  With
-``"free"`` they turn about their own axis, as a hinge does.
+``"free"`` they rotate about their own axis like a hinge.
 """
 
 from collections.abc import Sequence
@@ -26,13 +26,13 @@ from forcefit.assembly.solvers.conic import SolverFailed
 from forcefit.assembly.solvers.method import Method, check_method, log_reference
 from forcefit.results.display import Figures
 
-# accepted difference of margin and lower bound, relative to the margin
+# accepted gap between margin and lower bound, relative to the margin
 MARGIN_GAP = 1e-8
-_GAP_ABSOLUTE = 1e-12  # [-] absolute part of that difference
-# for each name of a margin: behaviour of compliant joints about their own axis
+_GAP_ABSOLUTE = 1e-12  # [-] absolute part of that gap
+# behaviour of compliant joints about their own axis, by the name of the margin
 Compliant = Literal["rigid", "free"]
 MARGINS: dict[str, Compliant] = {"margin": "rigid", "margin_free": "free"}
-ASSEMBLABLE = 1.0 + 1e-6  # largest margin that counts as assemblable: 1 plus rounding
+ASSEMBLABLE = 1.0 + 1e-6  # largest margin that counts as assemblable: 1 plus round-off
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -40,17 +40,17 @@ class Zone(PointResults, Generic[N]):
     """Solution of problem (21) at one posture or at many, with a leading point axis.
 
     Attributes:
-        margin: (...) factor on the clearances at which the robot just assembles; inf if
-            there is no such factor, NaN if the solver failed.  A single posture raises
-            an exception instead of NaN.
-        bound: (...) certified lower bound of the margin; the compiled method returns it
+        margin: (...) factor on the clearances at which the robot can just be assembled;
+            inf if there is no such factor, NaN if the solver failed.  At a single
+            posture, a failure raises an exception instead.
+        bound: (...) certified lower bound on the margin; the compiled method returns it
             within 1e-8 of the margin.
         method: (...) method that solved the point: ``"compiled"``, or ``"reference"``
             for numpy and Clarabel.
         forces: (..., nu) [-] forces on the clearances that prove the bound, multiplied
-            by the sizes of the cones.  They are scaled so that their magnitudes on all
-            cones add up to 1.  Zero if no clearance is needed; NaN if the reference
-            method solved the point.
+            by the sizes of the cones and normalised so that their magnitudes on all
+            cones add up to 1.  Zero if no clearance is needed; NaN if the point was
+            solved by the reference method.
         reason: (...) message if the solver failed; else empty.
     """
 
@@ -83,7 +83,7 @@ class Zone(PointResults, Generic[N]):
         """Return one point or a selection; raise SolverFailed for a failed point."""
         taken = super().__getitem__(rows)
         if not taken.of_many and np.isnan(taken.margin):
-            raise SolverFailed("least factor on the clearances", taken.reason)
+            raise SolverFailed("smallest factor on the clearances", taken.reason)
         return taken
 
     @property
@@ -93,7 +93,7 @@ class Zone(PointResults, Generic[N]):
 
     @property
     def unproved(self) -> Any:
-        """(...) reason why there is no margin or why it is not proved; else empty."""
+        """(...) reason why the margin is missing or unproved; otherwise empty."""
         margin, bound = np.atleast_1d(self.margin, self.bound)
         with np.errstate(invalid="ignore"):
             # the condition is written so that NaN counts as not proved
@@ -130,17 +130,18 @@ def zone_margin(
     posture: Posture | Sequence[Posture], compliant: Compliant = "rigid",
     errors: ArrayLike | None = None, method: Method = "compiled",
 ) -> Zone:  # fmt: skip
-    """Return the factor on all clearances at which a rigid manipulator just assembles.
+    """Compute the clearance factor at which a rigid manipulator can just be assembled.
 
     Args:
         posture: the robot's configuration; or many postures of one robot.
-        compliant: behaviour of passive joints with stiffness about their own axis:
-            ``"rigid"`` or ``"free"``, see the head of this module.
-        errors: (n, 6) [rad, m] geometric errors in place of the robot's; or (k, n, 6),
-            one set for each of k postures, or k sets at one posture.
-        method: ``"compiled"`` uses the reference method only for points that the
-            compiled method does not prove; ``"reference"`` uses only numpy and
-            Clarabel.  The field ``method`` of the result names the method per point.
+        compliant: whether passive joints with stiffness are ``"rigid"`` or ``"free"``
+            about their own axis.
+        errors: (n, 6) [rad, m] geometric errors that replace those of the robot; or (k,
+            n, 6), one set for each of k postures, or k sets at one posture.
+        method: ``"compiled"`` falls back on the reference method for points that the
+            compiled method cannot certify; ``"reference"`` uses only numpy and
+            Clarabel.  The field ``method`` of the result states the method used for
+            each point.
 
     Returns:
         The margin with a certified lower bound; for many postures or sets of errors,
@@ -194,7 +195,7 @@ def _erring(posture: Posture, errors: NDArray, i: int) -> Posture:
 def _compiled(
     posture: Posture, compliant: Compliant, own: NDArray, method: Method
 ) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-    """Return margins, bounds, forces, and a mask of points for the reference method."""
+    """Compute margins, bounds, forces and a mask of points that remain unsolved."""
     if compliant not in {"rigid", "free"}:
         raise ValueError(f"compliant is {compliant!r}, expected 'rigid' or 'free'")
     joints, structure = structure_of(posture.robot, False, compliant == "free")

@@ -1,4 +1,4 @@
-"""Predicted readings of a device that measures the pose of a robot.
+"""Predict the readings of a device that measures the pose of a robot.
 
-Start with ``conditions.py``, the conditions of each measurement, then ``predict.py``.
+Start with ``conditions.py``, which describes each measurement, then ``predict.py``.
 """

@@ -1,10 +1,9 @@
-"""Conditions of past or planned measurements of a robot.
+"""Operating conditions of past or planned measurements of a robot.
 
 An *effect* (:mod:`forcefit.assembly.effects`) is a property that the declared model of
 a robot lacks, such as friction or thermal expansion.  An effect changes one or more of
-the fields below and nothing else.  Any number of effects can therefore be combined.
-The function :func:`forcefit.assembly.measurement.predict.predict` need not know the
-effects.
+the fields below and nothing else.  Any number of effects can therefore be combined, and
+:func:`forcefit.assembly.measurement.predict.predict` is independent of the effects.
 
 ======  ====================  =========  =============================================
 symbol  code                  shape      meaning
@@ -49,17 +48,17 @@ class ContactLaw:
 
 @dataclass(frozen=True, eq=False)
 class Yield:
-    """Compliant place of a robot: a law determines its deflection from wrenches.
+    """Compliant location of a robot, whose deflection follows from wrenches by a law.
 
     Attributes:
         frame: name of the frame.
         component: index of the screw component that changes, in the frame's axes; 6 for
             the motion along the thread of a helical joint.
-        through: frames and component indices of the wrenches on which the law depends.
-        inputs: (R, k) other inputs of the law in each of R rows.
+        through: frames and components of the wrenches on which the law depends.
+        inputs: (R, k) additional inputs of the law, one row per measurement.
         law: smooth function [rad or m] of the inputs (R, k) and wrenches (R, s).
         linear: whether the law is that of a linear spring: a compliance times one
-            wrench component at this place.
+            wrench component at this location.
     """
 
     frame: str
@@ -72,16 +71,16 @@ class Yield:
 
 @dataclass(frozen=True, eq=False)
 class Conditions:
-    """Conditions of R measurements (rows) of one robot, perhaps changed by effects.
+    """Operating conditions of R measurements of one robot, possibly with effects.
 
     Attributes:
-        robot: robot of n frames; its links, springs and clearances are the same in all
-            rows.
+        robot: robot of n frames, with the same links, springs and clearances in all
+            measurements.
         coordinates: (R, n) [rad or m] commanded coordinates of all joints.
         transforms: (R, n, 4, 4) frames in the base frame, without imperfections.
         mismatch: (R,) [rad, m] largest nominal closure error, which is neglected.
-        errors: (R, n, 6) [rad, m] stress-free screws of the frames: geometric errors
-            and changes by effects.
+        errors: (R, n, 6) [rad, m] stress-free screws of the frames: geometric errors,
+            including changes due to effects.
         point: (3,) [m] reference point at which the load acts, platform axes.
         load: (R, 6) [N m, N] wrenches on the platform at the reference point, base
             axes.
@@ -90,25 +89,24 @@ class Conditions:
         time: (R,) [s] time since the first measurement; NaN if unknown.
         approach: (R,) side from which the position was approached, -1 or 1; NaN if
             unknown.
-        covariates: (R,) values of further covariates by name.
+        covariates: (R,) values of additional covariates by name.
         session: (R,) names of the sessions; None if unknown.
-        history: rows of a campaign in the order of measurement, including these rows;
-            None without a history.
-        row: (R,) indices of these rows in the history.
+        history: readings of a campaign in the order of measurement, including those of
+            these conditions; None without a history.
+        row: (R,) indices of these measurements in the history.
         target: (R, 3) [m] measured point, platform axes; None for the reference point.
         laws: contact springs in series with joints.
-        yields: compliant places with laws.
-        exact: whether the model with finite motions is used instead of the linear
-            model.
+        yields: compliant locations with laws.
+        exact: whether to use the model with finite motions instead of the linear one.
         second_order: (R, 6) [rad, m] exact minus linear platform screw without load;
             see :func:`forcefit.assembly.measurement.predict.with_second_order`.
         rest: (R, n, 6) rest positions of the clearances relative to their bounds; None
-            if they follow from the least energy.
-        base: (6,) or (R, 6) [rad, m] rotation and translation of the measuring frame.
-            They multiply the measured pose from the left.
+            if they follow from the minimum-energy assembly.
+        base: (6,) or (R, 6) [rad, m] rotation and translation of the measuring frame,
+            by which the measured pose is multiplied from the left.
         tool: (3,) or (R, 3) [m] vector from the reference point to the measured point,
             platform axes.
-        reading: (R, 6) [rad, m] values that are added to the reading.
+        reading: (R, 6) [rad, m] offsets added to the reading.
     """
 
     robot: Robot
@@ -148,11 +146,11 @@ class Conditions:
 
     @property
     def postures(self) -> Posture:
-        """All nominal postures as one object, whose arrays have R rows."""
+        """All nominal postures as one object, with a leading axis of length R."""
         return Posture(self.robot, self.coordinates, self.transforms, self.mismatch)
 
     def posture(self, row: int) -> Posture:
-        """Return the posture of one row, for the robot with the errors of that row."""
+        """Return the posture of one measurement, for the robot with its errors."""
         return Posture(
             self.robot.with_errors(self.errors[row]), self.coordinates[row],
             self.transforms[row], float(self.mismatch[row]),
@@ -160,7 +158,7 @@ class Conditions:
 
     @property
     def measured_points(self) -> NDArray:
-        """(R, 3) [m] nominal position of the measured point in each row, base axes."""
+        """(R, 3) [m] nominal positions of the measured point, base axes."""
         T = self.postures.platform
         return T[:, :3, 3] + self.measured_arms
 
@@ -181,13 +179,13 @@ class Conditions:
         return moved
 
     def take(self, rows: ArrayLike) -> "Conditions":
-        """Return the conditions of selected rows.
+        """Select measurements.
 
         Args:
             rows: indices or a mask.
 
         Returns:
-            The conditions of these rows only.
+            The conditions of the selected measurements.
         """
         index = np.asarray(rows)
         kept = {name: getattr(self, name)[index] for name in _BY_ROW}
@@ -219,23 +217,23 @@ def as_declared(
     covariates: Mapping[str, ArrayLike] | None = None,
     target: ArrayLike | None = None,
 ) -> Conditions:
-    """Return the conditions of a robot as declared in its file.
+    """Create the conditions of a robot as declared in its file.
 
     Args:
-        postures: one posture, or many with arrays of R rows.
+        postures: one posture, or R postures in one object.
         load: (6,) or (R, 6) [N m, N] wrench at the reference point, base axes; None for
             no load.
         mismatch: (R,) [rad, m] remaining nominal closure error.
         point: (3,) [m] reference point, platform axes.
         gravity: (3,) or (R, 3) [m/s^2] gravity vector in base axes.
-        covariates: (R,) values, or one value for all rows, by name: ``temperature``
-            [K], ``time`` [s], ``approach`` -1 or 1, NaN if absent; any other names; and
-            ``session``, a name or (R,) names.
+        covariates: (R,) values, or a common value, by name: ``temperature`` [K],
+            ``time`` [s], ``approach`` -1 or 1, NaN if unknown; any additional
+            covariates; and ``session``, a name or (R,) names.
         target: (3,) or (R, 3) [m] measured point, platform axes; by default the
             reference point.
 
     Returns:
-        R rows of conditions.
+        The conditions of R measurements.
     """
     given = dict.fromkeys(COVARIATES, np.nan) | dict(covariates or {})
     session = given.pop("session", None)

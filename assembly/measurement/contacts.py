@@ -18,7 +18,7 @@ CONVERGED = 1e-11  # largest relative change of a contact's deflection at conver
 def softened(
     posture: Posture, laws: tuple[ContactLaw, ...], compliances: NDArray
 ) -> Posture:
-    """Return the posture with each contact replaced by a spring in series (secant)."""
+    """Replace each contact by a spring in series with its secant stiffness."""
     if not compliances.any():
         return posture
     frames = list(posture.robot.frames)
@@ -65,14 +65,14 @@ def contact_columns(conditions: Conditions) -> NDArray:
 def contact_deflections(
     laws: tuple[ContactLaw, ...], w: NDArray, A: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Return the deflections d of contacts with c |d|^n sign(d) = w + A d.
+    """Solve for the contact deflections d with c |d|^n sign(d) = w + A d.
 
     The solution minimises a strictly convex function, because A is negative
-    semidefinite.  Newton's method is used; each step is halved until the gradient
-    decreases.
+    semidefinite.  Newton's method is used, in which each step is halved until the
+    gradient decreases.
 
     Returns:
-        (R, s) deflections, and (R,) bool, True for rows that converged.
+        (R, s) deflections, and (R,) bool, True where the iteration converged.
     """
     c = np.array([law.coefficient for law in laws])
     n = np.array([law.exponent for law in laws])

@@ -1,14 +1,15 @@
-r"""Exact equilibrium of a robot without clearances, for many measurements together.
+r"""Exact equilibrium of a robot without clearances, for many measurements at once.
 
-The equations are those of :mod:`forcefit.assembly.exact.exact`: closures hold on SE(3),
-every body and spring deforms by its compliance times its wrench, and free motions carry
-no load.  All rows are iterated together with the inverse of the linear model at the
-nominal posture (:mod:`forcefit.assembly.measurement.without_clearance`).  The first
-iterate is the linear solution.  Each further iteration reduces the error by a factor of
-the size of the motions (a chord method).  Rows that do not converge are solved by
+The equations are those of :mod:`forcefit.assembly.exact.exact`: loop closure is imposed
+on SE(3), every body and spring deforms by its compliance times its wrench, and free
+motions carry no load.  All measurements are iterated together with the inverse of the
+linear model at the nominal posture
+(:mod:`forcefit.assembly.measurement.without_clearance`).  The first iterate is the
+linear solution, and each following iteration of this chord method reduces the error by
+a factor of the order of the motions.  Measurements that do not converge are solved by
 :func:`forcefit.assembly.exact.exact.solve_exact`.
 
-The rows and the iterate are defined in :mod:`forcefit.assembly.measurement.row_state`.
+The iterate is defined in :mod:`forcefit.assembly.measurement.row_state`.
 
 Sources:
     Ortega, Rheinboldt, Iterative Solution of Nonlinear Equations in Several Variables,
@@ -28,7 +29,7 @@ from forcefit.assembly.model.links import own_screws
 from forcefit.assembly.model.robot import Robot
 
 _MOST_ITERATIONS = 60  # largest number of iterations; usually 5 to 12
-# [rad, reference lengths] largest change of a screw in the last iteration
+# [rad, reference lengths] largest screw change in the last iteration
 _CONVERGED = 1e-12
 _CLOSURE_TOLERANCE = 1e-11  # [rad, reference lengths] largest closure residual
 # largest accepted force along a free motion, relative to the largest wrench
@@ -38,22 +39,24 @@ _ZERO_LOAD = 1e-9
 # largest accepted ratio of two successive changes, after the initial iterations
 _CONTRACTION = 0.8
 _TRANSIENT = 3  # number of initial iterations in which the changes can increase
-_BATCH = 100  # number of rows solved together, which limits the memory
+_BATCH = 100  # number of measurements solved together, to limit memory
 
 
 def solve_rows(
     conditions: Conditions, linear_deflections: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Return the platform screws of finite motions under every row's loads.
+    """Compute the exact platform screw of each measurement under its loads.
 
     Args:
-        conditions: R rows of a robot without clearances, all with finite motions.
+        conditions: conditions of R measurements of a robot without clearances, with
+            finite motions.
         linear_deflections: (R, s) [rad or m] deflections of s contacts in the linear
             model.
 
     Returns:
         (R, 6) [rad, m] rotation vector of R R_nominal^T and translation of the origin,
-        base axes; and (R,) bool, True for rows that converged; other rows are invalid.
+        base axes; and (R,) bool, True where the iteration converged; other rows are
+        invalid.
     """
     conditions = _in_pieces(conditions)
     screws, converged = (
@@ -73,7 +76,7 @@ def solve_rows(
 
 
 def _of_passive_joints(free: NDArray, robot: Robot) -> bool:
-    """Return whether all q free motions (6n, q) are motions of passive joints."""
+    """Return True if all q free motions (6n, q) are motions of passive joints."""
     passive = np.array([frame.passive for frame in robot.frames])
     own = own_screws(robot) * passive[:, None]
     for column in free.T.reshape(-1, len(robot.frames), 6):
@@ -84,7 +87,7 @@ def _of_passive_joints(free: NDArray, robot: Robot) -> bool:
 
 
 def _solve(rows: Rows) -> tuple[NDArray, NDArray]:
-    """Return (R, 6) platform screws, and (R,) bool, True for rows that converged."""
+    """Return (R, 6) platform screws, and (R,) bool, True where converged."""
     flexible, count = rows.flexible, len(rows.conditions)
     n, K = len(rows.conditions.robot.frames), 6 * len(rows.conditions.robot.closures)
     q = flexible.free.shape[1]
@@ -115,7 +118,7 @@ def _solve(rows: Rows) -> tuple[NDArray, NDArray]:
     converged &= np.abs(state.residual).max(axis=1, initial=0.0) <= _CLOSURE_TOLERANCE
     converged &= np.all(np.abs(state.motions) <= flexible.limit, axis=1)
     _, free_forces, _ = state.imbalance()
-    # without loads, wrenches are only rounding errors
+    # without loads, wrenches are only round-off
     zero_load = _ZERO_LOAD / flexible.softness
     largest = np.abs(state.total_wrenches / rows.scale).max(
         axis=(0, 2, 3), initial=zero_load
@@ -134,7 +137,7 @@ def _lever_arms(rows: Rows) -> NDArray:
 
 
 def _correction(state: RowState, first: bool) -> tuple[NDArray, NDArray, NDArray]:
-    """Return the changes of the unknowns by the inverse of the linear model."""
+    """Compute the changes of the unknowns by the inverse of the linear model."""
     rows, flexible = state.rows, state.rows.flexible
     screw_residual, free, w = state.imbalance()
     count, shape = len(rows.conditions), (len(rows.conditions), -1, 6)
@@ -162,7 +165,7 @@ def _correction(state: RowState, first: bool) -> tuple[NDArray, NDArray, NDArray
 
 
 def _in_pieces(conditions: Conditions) -> Conditions:
-    """Return the conditions of the robot in which every piece of a beam is a frame."""
+    """Return the conditions of the robot with its beams cut into pieces."""
     cut = cut_beams(conditions.robot)
     if cut.robot is conditions.robot:
         return conditions

@@ -1,9 +1,9 @@
-"""History of a robot: the measurements (rows) of a campaign in order of time.
+"""Measurement history of a robot: the readings of a campaign in order of time.
 
 Some effects have memory.  For example, the temperature of a body lags behind that of
 the air, and the side on which a clearance is closed depends on the direction of the
-last motion.  Such effects depend on earlier rows, including rows that a fit omits.  The
-value of a row is assumed to apply since the previous row, or since time 0.
+last motion.  Such effects depend on earlier readings, including those that a fit omits.
+Each value is assumed to apply since the previous reading, or since time 0.
 
 Sources:
     Ljung, System Identification, section 2 (sampling of a first-order lag).
@@ -16,7 +16,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-STILL = 1e-9  # [rad, m] smaller changes of a command count as no motion
+STILL = 1e-9  # [rad, m] smaller command changes count as no motion
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,8 +24,8 @@ class History:
     """Variables of H measurements in order of time, one session after another.
 
     Attributes:
-        values: for each variable, by public name, its (H,) values; NaN if unknown.
-        first: (H,) bool, True for the first row of a session.
+        values: (H,) values of each variable by public name; NaN if unknown.
+        first: (H,) bool, True for the first reading of a session.
     """
 
     values: Mapping[str, NDArray]
@@ -38,7 +38,7 @@ class History:
             name: name of the variable; ``"approach"`` is the column of this name.
 
         Returns:
-            (H,) signs, 0 if unknown.  A variable that does not change keeps its last
+            (H,) signs, 0 if unknown.  A variable that does not change retains its last
             direction.  Before the first change, the column ``approach`` is used if it
             exists.
         """
@@ -54,17 +54,18 @@ class History:
         return np.where(known, np.sign(step[last]), given)
 
     def slip(self, name: str, depth: float) -> NDArray:
-        """Return the position of a friction element that a variable drags along.
+        """Return the position of a friction element that is dragged by a variable.
 
         Args:
             name: name of the variable.
-            depth: change of the variable that moves the element from the middle to an
+            depth: change of the variable that moves the element from the middle to one
                 end, > 0.
 
         Returns:
             (H,) positions from -1 to 1.  The element follows the variable until it
-            reaches an end, and stays there until the variable reverses.  A session
-            begins at the end given by ``approach``, or in the middle.
+            reaches an end, and stays there until the variable reverses.  At the
+            beginning of a session it is at the end given by ``approach``, or in the
+            middle.
 
         Sources:
             Krasnosel'skii, Pokrovskii, Systems with Hysteresis, section 2 (stop).
@@ -84,8 +85,8 @@ class History:
         Args:
             name: name of the variable.
             time_constant: [s] time constant, > 0.
-            held: whether each value applies since the time of the previous row, as for
-                a load.  If not, the variable changes linearly between rows, as for a
+            held: whether each value applies since the previous reading, as for a load.
+                If False, the variable varies linearly between readings, as for a
                 temperature.
 
         Returns:
@@ -94,7 +95,7 @@ class History:
         u, state = self.values[name], 0.0
         past = self._elapsed / time_constant
         decay = np.exp(-past)
-        # share of the change that lags: (1 - e^-r) / r, or 1 if no time passed
+        # lagging fraction of the change: (1 - e^-r) / r, or 1 if no time has passed
         share = np.where(
             past > 0, -np.expm1(-past) / np.where(past > 0, past, 1.0), 1.0
         )
@@ -116,7 +117,7 @@ class History:
 
     @cached_property
     def _elapsed(self) -> NDArray:
-        """(H,) [s] time since the previous row, or since time 0."""
+        """(H,) [s] time since the previous reading, or since time 0."""
         time = self.values["time"]
         return np.where(self.first, time, np.diff(time, prepend=0.0))
 
@@ -124,15 +125,15 @@ class History:
 def in_order(
     values: Mapping[str, NDArray], session: NDArray | None
 ) -> tuple[History, NDArray]:
-    """Return the rows of a table sorted in the order of measurement.
+    """Sort the readings of a table by the time of measurement.
 
     Args:
-        values: (H,) values by public name of the variable, including ``time``; rows
-            without a time keep their order.
-        session: (H,) name of each row's session; None if there is one session.
+        values: (H,) values by public name of the variable, including ``time``; the
+            order of readings without a time is preserved.
+        session: (H,) session name of each reading; None if there is a single session.
 
     Returns:
-        The history, and (H,) the index of each given row in the history.
+        The history, and the (H,) indices of the given readings in it.
     """
     time = np.nan_to_num(values["time"])
     names = np.zeros(len(time)) if session is None else session

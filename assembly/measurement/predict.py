@@ -1,9 +1,9 @@
-"""Predicted readings: deviation of the platform under the conditions of each row.
+"""Predict readings: the deviation of the platform in each measurement.
 
-Rows of robots without clearances are solved together: with small motions by
-:mod:`forcefit.assembly.measurement.without_clearance`, with finite motions by
-:mod:`forcefit.assembly.measurement.exact_rows`.  Rows with clearances, or with closures
-of ambiguous numerical rank, are solved one by one by
+Measurements of robots without clearances are solved together, with small motions by
+:mod:`forcefit.assembly.measurement.without_clearance` and with finite motions by
+:mod:`forcefit.assembly.measurement.exact_rows`.  Measurements with clearances, or with
+closures of ambiguous numerical rank, are solved one by one by
 :mod:`forcefit.assembly.linear.energy` and :mod:`forcefit.assembly.exact.exact`.
 
 Sources:
@@ -48,9 +48,9 @@ from forcefit.assembly.measurement.yields import Yields, settle_yields, with_spr
 from forcefit.assembly.solvers.conic import SolverFailed
 from forcefit.stiffness.screws import rotation_matrix, rotation_vector
 
-# largest number of configurations that are corrected to second order individually
+# largest number of configurations for which second-order corrections are computed
 _MOST_ONE_BY_ONE = 40
-# convergence criterion in place of CONVERGED, if the iteration starts from the linear
+# convergence criterion that replaces CONVERGED if the iteration starts from the linear
 # solution
 _CONVERGED_FINITE = 1e-5
 
@@ -61,10 +61,10 @@ class Prediction:
 
     Attributes:
         deviation: (R, 6) [rad, m] rx ry rz tx ty tz, base axes; NaN without a solution.
-        reason: (R,) reason why there is no solution, or an empty text.
+        reason: (R,) reason why there is no solution; otherwise empty.
         undetermined: (R,) bool, True if clearances leave the pose undetermined.  The
-            returned pose of a closed chain is then the pose nearest to nominal; that of
-            an open chain has centred clearances.
+            deviation of a closed chain then refers to the pose nearest to nominal, and
+            that of an open chain to centred clearances.
     """
 
     deviation: NDArray
@@ -73,10 +73,10 @@ class Prediction:
 
 
 def predict(conditions: Conditions) -> Prediction:
-    """Return the platform's deviation from its nominal pose at the reference point.
+    """Predict the deviation of the platform from its nominal pose.
 
     Args:
-        conditions: R rows: the conditions of R measurements.
+        conditions: conditions of R measurements.
 
     Returns:
         The predicted readings.
@@ -86,8 +86,8 @@ def predict(conditions: Conditions) -> Prediction:
     one_by_one = None
     if has_clearance and conditions.rest is not None:
         conditions = with_clearances_at_rest(conditions)
-        # if the exact model cannot close the robot with clearances in rest position,
-        # neither model has a solution
+        # if the exact model cannot close the robot with its clearances at rest, neither
+        # model has a solution
         one_by_one = 0 if conditions.exact else None
     elif has_clearance and not conditions.robot.closures and not conditions.exact:
         conditions, undetermined = with_clearances_taken_up(conditions)
@@ -107,7 +107,7 @@ def predict(conditions: Conditions) -> Prediction:
 def _platform_screws(
     conditions: Conditions, one_by_one: int | None = None
 ) -> tuple[NDArray, NDArray, NDArray]:
-    """Return the platform screws of all rows; solve rows one by one where necessary.
+    """Compute all platform screws, one measurement at a time where necessary.
 
     Returns:
         (R, 6) screws, (R,) reasons why there is no solution, and (R,) bool, True if
@@ -124,7 +124,7 @@ def _platform_screws(
         unsolved = ~solved
         screws[unsolved], reason[unsolved] = (
             np.nan,
-            "the closures do not close when all rows are solved together",
+            "the closures do not close when all measurements are solved together",
         )
     for row in np.flatnonzero(unsolved)[:one_by_one].tolist():
         try:
@@ -138,10 +138,10 @@ def _platform_screws(
 def _nearest_assembly(
     conditions: Conditions, row: int
 ) -> tuple[Assembly | ExactAssembly, bool]:
-    """Return the assembly of one row whose possible pose is nearest to nominal.
+    """Return the assembly of one measurement whose pose is nearest to nominal.
 
-    With finite motions, the nearest pose refers to the linear solution that is the
-    start of the iteration.
+    With finite motions, the nearest pose refers to the linear solution from which the
+    iteration starts.
 
     Returns:
         The assembly, and whether clearances leave its pose undetermined.
@@ -164,15 +164,15 @@ def _nearest_assembly(
 
 
 def with_second_order(conditions: Conditions) -> Conditions:
-    """Return the conditions with the second-order effect of the declared errors added.
+    """Add the second-order effect of the declared errors to the conditions.
 
-    Near a singularity, geometric errors cause large motions.  The error of the linear
-    model then exceeds the noise of a device, whatever the load.  The difference between
-    the exact and the linear platform screw without load is computed once for each
-    configuration; effects of the load remain linear.
+    Near a singularity, geometric errors cause large motions, and the error of the
+    linear model exceeds the noise of a device whatever the load.  The difference
+    between the exact and the linear platform screw without load is therefore computed
+    once per configuration, while effects of the load remain linear.
 
     Args:
-        conditions: R rows, as declared.
+        conditions: conditions of R measurements, as declared.
 
     Returns:
         The conditions, with ``second_order``.
@@ -191,13 +191,14 @@ def with_second_order(conditions: Conditions) -> Conditions:
 
 
 def with_finite_motions(conditions: Conditions) -> Conditions:
-    """Return the conditions with the changes that finite motions cause.
+    """Add the effect of finite motions to the conditions.
 
-    The changes are computed as in :func:`with_second_order`, but for each row under its
-    loads.  The declared model is then exact, and effects are added to first order.
+    The correction is computed as in :func:`with_second_order`, but under the loads of
+    each measurement.  The declared model is then exact, and effects are added to first
+    order.
 
     Args:
-        conditions: R rows, as declared.
+        conditions: conditions of R measurements, as declared.
 
     Returns:
         The conditions, with ``second_order`` and without ``exact``.
@@ -206,9 +207,9 @@ def with_finite_motions(conditions: Conditions) -> Conditions:
 
 
 def _finite_part(conditions: Conditions, one_by_one: int | None = None) -> NDArray:
-    """Return (R, 6) exact minus linear platform screws; zero if a solution is missing.
+    """Return (R, 6) exact minus linear platform screws; zero if no solution exists.
 
-    Compliant places with laws are solved by the linear model.
+    Compliant locations are treated by the linear model.
     """
     conditions = replace(conditions, yields=())
     exact, linear = (
@@ -219,17 +220,16 @@ def _finite_part(conditions: Conditions, one_by_one: int | None = None) -> NDArr
 
 
 def with_rest_positions(conditions: Conditions) -> Conditions:
-    """Return the conditions with the rest positions of clearances at least energy.
+    """Fix the clearances at their minimum-energy rest positions.
 
-    An effect can then be evaluated as fast as for a robot without clearances.  The
-    result is correct to first order as long as the contact points do not change.
+    Effects can then be evaluated as fast as for a robot without clearances.  The result
+    is correct to first order as long as the contact points do not change.
 
     Args:
-        conditions: R rows.
+        conditions: conditions of R measurements.
 
     Returns:
-        The conditions, with ``rest``; clearances are centred in rows without a
-        solution.
+        The conditions, with ``rest``; clearances are centred where no solution exists.
     """
     rest = np.zeros_like(conditions.errors)
     for row in range(len(conditions)):
@@ -242,15 +242,15 @@ def with_rest_positions(conditions: Conditions) -> Conditions:
 
 
 def read(conditions: Conditions, screws: NDArray) -> NDArray:
-    """Return the device's readings of platform screws.
+    """Convert platform screws to readings of the device.
 
     Args:
-        conditions: R rows.
+        conditions: conditions of R measurements.
         screws: (R, 6) [rad, m] rotation vector of R R_nominal^T and translation of the
             platform's origin, base axes.
 
     Returns:
-        (R, 6) [rad, m] deviation that the device reads at the measured points.
+        (R, 6) [rad, m] deviations read by the device at the measured points.
     """
     platform = conditions.postures.platform
     R, p = platform[:, :3, :3], platform[:, :3, 3]
@@ -260,8 +260,8 @@ def read(conditions: Conditions, screws: NDArray) -> NDArray:
     lever = _turned(turn - np.eye(3), arm + tool)
     shift = screws[:, 3:] + lever + tool
     base = rotation_matrix(conditions.base[..., :3])
-    # the device's rotation acts on the position itself; without a rotation there is no
-    # rounding error
+    # the rotation of the device acts on the position itself; without it, no round-off
+    # is introduced
     translation = _turned(base - np.eye(3), p + arm) + _turned(base, shift)
     translation += conditions.base[..., 3:]
     turns = conditions.base[..., :3].any()
@@ -270,7 +270,7 @@ def read(conditions: Conditions, screws: NDArray) -> NDArray:
 
 
 def _turned(R: NDArray, vectors: NDArray) -> NDArray:
-    """Return (R, 3) vectors, rotated by a common matrix or by one matrix for each."""
+    """Rotate (R, 3) vectors by a common matrix or by one matrix each."""
     if R.ndim == 2:
         return vectors @ R.T
     return np.einsum("rij,...j->ri" if vectors.ndim == 1 else "rij,rj->ri", R, vectors)
@@ -280,18 +280,18 @@ def assemble_row(
     conditions: Conditions, row: int, bodies: NDArray | None = None,
     carried: NDArray | None = None,
 ) -> Assembly | ExactAssembly:  # fmt: skip
-    """Solve one row and return all screws and wrenches of the robot.
+    """Solve one measurement and return all screws and wrenches of the robot.
 
     Args:
-        conditions: conditions of all rows.
-        row: index of the row.
+        conditions: conditions of all measurements.
+        row: index of the measurement.
         bodies: (n, 6) [N m, N] additional loads on the bodies, as for
             :func:`forcefit.assembly.linear.energy.solve_assembly`; only for the linear
             model.
         carried: (n, 6) [N m, N] additional loads on the parts that the joints carry.
 
     Returns:
-        The linear or the exact assembly, depending on the conditions.
+        The linear or exact assembly, depending on the conditions.
 
     Raises:
         CannotAssemble: a closure cannot be closed.
@@ -327,7 +327,7 @@ def assemble_row(
 def _assemble_yielding(
     row: Conditions, bodies: NDArray | None, carried: NDArray | None
 ) -> Assembly | ExactAssembly:
-    """Solve one row with compliant places that have laws."""
+    """Solve one measurement of a robot with compliant locations."""
 
     def solve(held: Conditions) -> tuple[Assembly | ExactAssembly, NDArray]:
         assembly = assemble_row(held, 0, bodies, carried)
@@ -343,7 +343,7 @@ def _assemble_yielding(
 
 
 def _without_clearance(conditions: Conditions) -> tuple[NDArray, NDArray]:
-    """Return (R, 6) platform screws without clearances, and a mask of solved rows."""
+    """Return (R, 6) platform screws without clearances, and a mask of valid ones."""
     if not conditions.yields:
         screws, _, solved = _linear(conditions)
         return screws, solved
@@ -352,7 +352,7 @@ def _without_clearance(conditions: Conditions) -> tuple[NDArray, NDArray]:
         np.zeros(len(conditions), dtype=bool),
     )
     if conditions.exact:
-        # all rows unsolved: they are solved one by one, with finite motions
+        # mark all as unsolved, so that they are solved one by one, with finite motions
         return unsolved
     distinct, which = conditions.postures.distinct
 
@@ -371,11 +371,11 @@ def _without_clearance(conditions: Conditions) -> tuple[NDArray, NDArray]:
 
 
 def _linear(conditions: Conditions) -> tuple[NDArray, NDArray, NDArray]:
-    """Solve rows of robots without clearances and without compliant places.
+    """Solve measurements of robots without clearances and compliant locations.
 
     Returns:
         (R, 6) platform screws, (R, 6n) joint wrenches of the linear model, and (R,)
-        bool, True for solved rows.
+        bool, True where a solution was found.
     """
     distinct, which = conditions.postures.distinct
     flexible = flexibility(distinct)

@@ -1,4 +1,4 @@
-r"""Exact equilibrium equations of many measurements (rows), evaluated at an iterate.
+r"""Exact equilibrium equations of many measurements, evaluated at an iterate.
 
 ======  =============  ===========  ==================================================
 symbol  code           shape        meaning
@@ -47,12 +47,13 @@ _LINEAR_BELOW = 1e-9  # [rad or m] deflection below which the law of a contact i
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """Rows to be solved, with the quantities that do not change in the iteration.
+    """Measurements to be solved, with quantities that are constant in the iteration.
 
     Attributes:
-        conditions: R rows.
+        conditions: conditions of R measurements.
         flexible: linear model at the distinct postures.
-        posture_of_row: (R,) index of each row's posture among the distinct postures.
+        posture_of_row: (R,) index of each measurement's posture among the distinct
+            postures.
         linear_deflections: (R, s) [rad or m] deflections of contacts in the linear
             model.
     """
@@ -117,7 +118,7 @@ class Rows:
         )
 
     def tangent_deflection(self, w: NDArray) -> NDArray:
-        """Return (R, s) [rad or m] deflections under loads w, by the law's tangent."""
+        """Return (R, s) [rad or m] deflections under loads w, from a linearised law."""
         c, n = self.law_constants
         load = (
             c
@@ -135,11 +136,11 @@ class Rows:
 
     @cached_property
     def times(self) -> Callable[[NDArray, NDArray], NDArray]:
-        """Function that multiplies each row's vector by its posture's matrix."""
+        """Function that multiplies each vector by the matrix of its posture."""
         return at_postures(self.posture_of_row)
 
     def corrected(self, right_side: NDArray) -> NDArray:
-        """Return the (R, m) solution of the linear model for right sides (R, m)."""
+        """Solve the linear model for right-hand sides (R, m)."""
         if not self.conditions.laws:
             return self.times(self.flexible.inverse, right_side)
         return np.einsum("rij,rj->ri", self._with_contacts, right_side)
@@ -193,10 +194,10 @@ class Rows:
 
 @dataclass(frozen=True, eq=False)
 class RowState:
-    """The current iterate of R rows.
+    """Current iterate of R measurements.
 
     Attributes:
-        rows: constant quantities of the rows.
+        rows: measurements with their constant quantities.
         screws: (2, R, n, 6) deformations of bodies and of joints.
         motions: (R, q) free motions.
         multipliers: (R, 6K) multipliers of the scaled closures.
@@ -209,7 +210,7 @@ class RowState:
 
     @cached_property
     def passive_motion(self) -> NDArray:
-        """(R, n) [rad or m] motions of passive joints in addition to coordinates."""
+        """(R, n) [rad or m] additional motions of passive joints."""
         moved = self.motions @ self.rows.flexible.free.T
         own = [f.own_axis for f in self.rows.conditions.robot.frames]
         return moved.reshape(*self.screws.shape[1:])[..., np.arange(len(own)), own]
@@ -290,7 +291,7 @@ class RowState:
         return total
 
     def wrenches(self, total: NDArray, poses: NDArray, frames: NDArray) -> NDArray:
-        """Return (R, k, 6) wrenches at the platform's origin, transformed to frames."""
+        """Transform (R, k, 6) wrenches from the platform's origin to frames."""
         origin = self.rows.conditions.postures.platform[:, None, :3, 3]
         T, w = poses[:, frames], total[:, frames]
         moment = w[..., :3] - np.cross(T[..., :3, 3] - origin, w[..., 3:])

@@ -1,10 +1,10 @@
-"""Clearances closed by the loads: each joint is in contact, at its bound.
+"""Clearances that are closed by the loads: each joint is in contact, at its bound.
 
 A joint that transmits the wrench w rests at the point of its clearance cones that is
 farthest along w.  In a robot without closures, the wrenches depend only on the loads,
-and this position is the exact minimum of (22).  With closures, this position is the
-limit for small clearances.  It follows from the envelope theorem: dE/d(bound) = -|w| in
-the cone's directions.
+and this position is the exact minimum of (22).  With closures, it is the limit for
+small clearances, which follows from the envelope theorem: dE/d(bound) = -|w| in the
+directions of the cone.
 """
 
 from dataclasses import replace
@@ -30,15 +30,15 @@ _UNLOADED = 1e-9
 
 
 def with_clearances_taken_up(conditions: Conditions) -> tuple[Conditions, NDArray]:
-    """Return the conditions with clearances replaced by their screws under the load.
+    """Replace clearances by their screws under the load.
 
     Args:
-        conditions: R rows of a robot with clearances.
+        conditions: conditions of R measurements of a robot with clearances.
 
     Returns:
-        The same rows for a robot without clearances, whose errors include these screws.
-        Also (R,) bool, True if a joint with clearance transmits no load.  The rest
-        position of this joint is then undetermined, and the joint is centred.
+        The conditions of a robot without clearances, whose errors include these screws;
+        and (R,) bool, True if a joint with clearance transmits no load.  Its rest
+        position is then undetermined, and the joint is centred.
     """
     tight = replace(conditions, robot=without_joint_clearances(conditions.robot))
     distinct, posture_of_row = tight.postures.distinct
@@ -66,13 +66,14 @@ def with_clearances_taken_up(conditions: Conditions) -> tuple[Conditions, NDArra
 
 
 def with_clearances_at_rest(conditions: Conditions) -> Conditions:
-    """Return the conditions with clearances replaced by their rest positions.
+    """Replace clearances by their rest positions.
 
     Args:
-        conditions: R rows of a robot with clearances, and with ``rest``.
+        conditions: conditions of R measurements of a robot with clearances, and with
+            ``rest``.
 
     Returns:
-        The same rows for a robot without clearances, whose errors include these screws.
+        The conditions of a robot without clearances, whose errors include these screws.
 
     Raises:
         ValueError: ``rest`` is not given.
@@ -89,14 +90,14 @@ def with_clearances_at_rest(conditions: Conditions) -> Conditions:
 
 
 def _component_bounds(robot: Robot) -> NDArray:
-    """Return the (n, 6) bound of each component of a clearance screw; 0 without one."""
+    """Return the (n, 6) bounds of clearance screw components; 0 without clearance."""
     bounds = np.where(scales_with_margin(robot), clearance_bounds(robot), 0.0)
     bounds[np.isinf(bounds)] = 0.0
     return component_bounds(bounds)
 
 
 def fractions(robot: Robot, clearance_screws: NDArray) -> NDArray:
-    """Return the clearance screws divided by their bounds.
+    """Divide clearance screws by their bounds.
 
     Args:
         robot: robot of n frames.
@@ -112,7 +113,7 @@ def fractions(robot: Robot, clearance_screws: NDArray) -> NDArray:
 
 
 def without_joint_clearances(robot: Robot) -> Robot:
-    """Return the robot without clearances; motion limits of passive joints remain.
+    """Remove the clearances of a robot, but not the motion limits of passive joints.
 
     Args:
         robot: robot with or without clearances.

@@ -1,6 +1,6 @@
-"""Values of the variables of effects, such as ``q.drive``, ``load.fz``, ``time``.
+"""Evaluate the variables of effects, such as ``q.drive``, ``load.fz`` and ``time``.
 
-Wrenches (``wrench.drive.mz``) are not included, because they are known only after the
+Wrenches (``wrench.drive.mz``) are excluded, because they are known only after the
 equilibrium has been computed.
 """
 
@@ -19,10 +19,10 @@ LOADS = tuple(name.lower() for name in WRENCH)
 
 
 def variable(conditions: Conditions, name: str) -> NDArray:
-    """Return the values of a variable in all rows.
+    """Return the values of a variable in all measurements.
 
     Args:
-        conditions: R rows.
+        conditions: conditions of R measurements.
         name: public name of the variable, which must not be a wrench.
 
     Returns:
@@ -45,15 +45,15 @@ def variable(conditions: Conditions, name: str) -> NDArray:
 
 
 def past(conditions: Conditions, names: Iterable[str]) -> tuple[History, NDArray]:
-    """Return the history that contains the rows of the conditions.
+    """Return the measurement history that contains the given operating conditions.
 
     Args:
-        conditions: R rows.
+        conditions: conditions of R measurements.
         names: names of the required variables.
 
     Returns:
-        The history, and (R,) the indices of the rows in it.  Rows without a history
-        become the first rows of separate sessions.
+        The history, and the (R,) indices of the measurements in it.  Measurements
+        without a history each become the first reading of a separate session.
     """
     if conditions.history is not None and conditions.row is not None:
         return conditions.history, conditions.row
@@ -65,13 +65,14 @@ def past(conditions: Conditions, names: Iterable[str]) -> tuple[History, NDArray
 
 
 def with_history(conditions: Conditions) -> Conditions:
-    """Return the conditions as rows measured in sequence, as in a campaign.
+    """Add a history, as if the measurements were taken in sequence in a campaign.
 
     Args:
-        conditions: R rows, as declared.
+        conditions: conditions of R measurements, as declared.
 
     Returns:
-        The conditions; selections by :meth:`Conditions.take` retain the whole history.
+        The conditions; selections by :meth:`Conditions.take` retain the complete
+        history.
     """
     names = [f"q.{frame.name}" for frame in conditions.robot.frames]
     names += [f"load.{name}" for name in LOADS]

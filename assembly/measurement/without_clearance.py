@@ -1,13 +1,14 @@
-"""Least energy (22) of a robot without clearances, at many postures and loads.
+"""Minimum energy (22) of a robot without clearances, at many postures and loads.
 
-Without clearances, all unknowns of (22) are unbounded.  Its conditions are a linear
-system in the multipliers of the closures and the free motions,
+Without clearances, all unknowns of (22) are unbounded, and the optimality conditions
+are a linear system in the closure multipliers and the free motions,
 
     [ J C J'   J F ] [lambda]      [ J (dl + C f) ]
     [ F' J'     0  ] [  q   ]  = - [    F' f      ].
 
-C contains the compliances of bodies and joints, f the loads on them, J the closures,
-and F the free motions.  One factorisation serves all rows at a posture.
+Here C contains the compliances of bodies and joints, f the loads on them, J the
+closures, and F the free motions.  One factorisation serves all measurements at a
+posture.
 
 ======  ====================  ===========  ===========================================
 symbol  code                  shape        meaning
@@ -42,13 +43,13 @@ from forcefit.assembly.model.links import (
     own_screws,
 )
 
-# relative size below which an eigenvalue counts as a rounding error. If an eigenvalue
-# is between this size and RANK, the numerical rank is ambiguous
+# relative size below which an eigenvalue counts as round-off. If an eigenvalue lies
+# between this size and RANK, the numerical rank is ambiguous
 _ROUNDING = 1e-13
-# largest padding relative to the number of rows; beyond it, rows are solved one by one
+# largest padding relative to the number of rows; beyond it, rows are solved singly
 _PADDING = 4
 _CLOSED = 1e-9  # largest relative residual of a solved system
-_CLOSED_ABSOLUTE = 1e-12  # [rad, reference lengths] residual that counts as rounding
+_CLOSED_ABSOLUTE = 1e-12  # [rad, reference lengths] residual that counts as round-off
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,16 +89,16 @@ class Flexibility:
     def solve(
         self, posture: NDArray, errors: NDArray, loads: FrameLoads
     ) -> "FlexibleAssembly":
-        """Close the robot under R conditions.
+        """Solve for the assemblies in R measurements.
 
         Args:
-            posture: (R,) index of each row's posture.
+            posture: (R,) index of the posture of each measurement.
             errors: (R, 6n) [rad, m] stress-free screws.
             loads: (R, 6n) loads on every small screw.
 
         Returns:
-            The assemblies; rows in which :attr:`FlexibleAssembly.solved` is False are
-            invalid.
+            The assemblies, which are invalid where :attr:`FlexibleAssembly.solved` is
+            False.
         """
         under_load = _under_load(self, loads)
         unclosed = errors if under_load is None else errors + under_load
@@ -129,11 +130,11 @@ class Flexibility:
         )
 
     def self_stress(self, columns: NDArray, read: NDArray | None = None) -> NDArray:
-        """Return the forces by which the closed structure resists stress-free screws.
+        """Compute the self-stress of the closed structure due to stress-free screws.
 
         Args:
             columns: (6n, s) screws at the frames.
-            read: (6n, t) screws along which forces are computed; by default
+            read: (6n, t) screws along which the forces are evaluated; by default
                 ``columns``.
 
         Returns:
@@ -147,7 +148,7 @@ class Flexibility:
         return -(met.mT @ (inner @ through))
 
     def platform_of(self, columns: NDArray) -> NDArray:
-        """Return the platform screw that stress-free screws at the frames cause.
+        """Compute the platform screw due to stress-free screws at the frames.
 
         Args:
             columns: (6n, s) screws at the frames.
@@ -170,7 +171,7 @@ class Flexibility:
 def responses_to(
     flexible: Flexibility, columns: bytes, shape: tuple[int, int]
 ) -> tuple[NDArray, NDArray, NDArray]:
-    """Return the responses to stress-free screws at the frames, cached.
+    """Compute the responses to stress-free screws at the frames, with caching.
 
     Args:
         flexible: the prepared robot at c postures.
@@ -195,7 +196,7 @@ class FlexibleAssembly:
         joint_wrenches: (R, 6n) [N m, N] wrenches through all joints, in the frames'
             axes.
         multipliers: (R, 6K) multipliers of the scaled closures.
-        solved: (R,) bool; rows with False are invalid.
+        solved: (R,) bool, False where the assembly is invalid.
     """
 
     platform_screw: NDArray
@@ -206,8 +207,8 @@ class FlexibleAssembly:
 
 @lru_cache(maxsize=4)
 def _under_load(flexible: Flexibility, loads: FrameLoads) -> NDArray | None:
-    """Return the (R, 6n) deformations that loads cause in an open chain."""
-    # cached: conditions that differ only in errors have the same result
+    """Return the (R, 6n) deformations of an open chain under the loads."""
+    # cached, because the result is the same for conditions that differ only in errors
     if not loads:
         return None
     screws = _each(flexible.body_compliances, loads.body)
@@ -216,15 +217,16 @@ def _under_load(flexible: Flexibility, loads: FrameLoads) -> NDArray | None:
 
 
 def at_postures(posture: NDArray) -> Callable[[NDArray, NDArray], NDArray]:
-    """Return a function that multiplies each row's vector by its posture's matrix.
+    """Return a function that multiplies each vector by the matrix of its posture.
 
-    Rows at the same posture are multiplied together, so matrices are not copied.
+    Vectors at the same posture are multiplied together, so matrices are not copied.
 
     Args:
-        posture: (R,) index of each row's posture.
+        posture: (R,) index of the posture of each vector.
 
     Returns:
-        A function of matrices (c, a, b) and vectors (R, b) that returns (R, a).
+        A function of matrices (c, a, b) and vectors (R, b) that returns products (R,
+        a).
     """
     return _at_postures(Unchanged(posture))
 
@@ -267,7 +269,7 @@ def flexibility(postures: Posture) -> Flexibility:
         ValueError: the robot has clearances.
     """
     robot = postures.robot
-    # robots that differ only in errors and loads share one factorisation
+    # the factorisation is shared by robots that differ only in errors and loads
     springs = link_compliances(robot), joint_compliances(robot)
     arrays = *springs, clearance_bounds(robot), own_screws(robot)
     return _factorise(content_of(postures, arrays, (robot.closures, robot.platform)))
@@ -275,7 +277,7 @@ def flexibility(postures: Posture) -> Flexibility:
 
 @lru_cache(maxsize=4)
 def _factorise(content: Content) -> Flexibility:
-    """Return the system of every posture with its inverse."""
+    """Assemble and invert the system at every posture."""
     postures, (C_body, C_joint, *_) = content.postures, content.arrays
     robot = postures.robot
     joints = virtual_joints(robot)
@@ -314,12 +316,12 @@ def _factorise(content: Content) -> Flexibility:
 
 
 def pseudo_inverse(M: NDArray) -> tuple[NDArray, NDArray]:
-    """Return (c, m, m) inverses on the range, and (c,) bool, True if ambiguous."""
+    """Return (c, m, m) pseudoinverses, and (c,) bool, True if the rank is ambiguous."""
     if not M.size:
         return M, np.zeros(len(M), dtype=bool)
     values, vectors = np.linalg.eigh(M)
     size = np.abs(values)
-    # the largest value is zero if there is only a free motion
+    # the largest value is zero if there are only free motions
     largest = size.max(axis=1, keepdims=True)
     kept = size > RANK * largest
     ambiguous = np.any((size > _ROUNDING * largest) & ~kept, axis=1)
@@ -334,7 +336,7 @@ def _limits(postures: Posture, free: NDArray) -> NDArray:
 
 
 def _each(matrices: NDArray, screws: NDArray) -> NDArray:
-    """Return (R, 6n) products of each frame's (6, 6) matrix and its screw or wrench."""
+    """Multiply the (6, 6) matrix of each frame by its screw or wrench, (R, 6n)."""
     blocks = np.swapaxes(screws.reshape(len(screws), -1, 6), 0, 1)
     products = blocks @ matrices.mT
     return np.swapaxes(products, 0, 1).reshape(screws.shape)

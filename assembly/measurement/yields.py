@@ -1,9 +1,9 @@
-"""Compliant places of a robot, whose deflections follow from wrenches by laws.
+"""Solve for the deflections of compliant locations, which depend on wrenches.
 
-Their deflections e are stress-free screws that depend on the wrenches w, which in turn
+The deflections e are stress-free screws that depend on the wrenches w, which in turn
 depend on e: e = g(w), w = w0 + A e, where A is the self-stress.  Newton's method solves
-e - g(w) = 0 for all rows together.  In a robot without closures A is zero, and the
-first iterate is exact.
+e - g(w) = 0 for all measurements together.  In a robot without closures, A is zero and
+the first iterate is exact.
 
 ======  ===========  ===========  ====================================================
 symbol  code         shape        meaning
@@ -27,7 +27,7 @@ from forcefit.assembly.model.links import in_series, own_screw
 from forcefit.assembly.solvers.conic import SolverFailed
 
 T = TypeVar("T")
-_STEP = 1e-6  # step of the numerical derivative of a law, relative to the wrench
+_STEP = 1e-6  # finite-difference step of a law, relative to the wrench
 _SETTLED = 1e-10  # largest accepted residual, relative to the largest deflection
 _STEPS = 40
 
@@ -37,14 +37,14 @@ class Yields:
     """Compliant places of a robot, described by columns of small screws.
 
     Attributes:
-        conditions: R rows of a robot of n frames.
+        conditions: conditions of R measurements of a robot of n frames.
     """
 
     conditions: Conditions
 
     @cached_property
     def places(self) -> NDArray:
-        """(6n, m) unit screws along which the places deflect."""
+        """(6n, m) unit screws along which the locations deflect."""
         return self._units([(y.frame, y.component) for y in self.conditions.yields])
 
     @cached_property
@@ -66,7 +66,7 @@ class Yields:
         return columns
 
     def deflections(self, through: NDArray) -> NDArray:
-        """Return the (R, m) deflections of the places under wrenches (R, t)."""
+        """Return the (R, m) deflections of the locations under wrenches (R, t)."""
         columns = []
         for one in self.conditions.yields:
             chosen = [self._pairs.index(pair) for pair in one.through]
@@ -86,7 +86,7 @@ class Yields:
         return slopes
 
     def correction(self, give: NDArray, through: NDArray, A: NDArray) -> NDArray:
-        """Return the Newton correction of the deflections.
+        """Compute the Newton correction of the deflections.
 
         Args:
             give: (R, m) current deflections.
@@ -94,7 +94,7 @@ class Yields:
             A: (R, t, m) derivative of the wrenches with respect to the deflections.
 
         Returns:
-            (R, m) correction to be added; zero in converged rows.
+            (R, m) correction to be added; zero where converged.
 
         Raises:
             SolverFailed: the deflections are unbounded.
@@ -116,15 +116,15 @@ class Yields:
 def with_deflections(
     conditions: Conditions, places: NDArray, give: NDArray
 ) -> Conditions:
-    """Return conditions with given deflections as stress-free screws, without laws.
+    """Replace compliant locations by given deflections as stress-free screws.
 
     Args:
-        conditions: R rows.
-        places: (6n, m) unit screws of the compliant places.
+        conditions: conditions of R measurements.
+        places: (6n, m) unit screws of the compliant locations.
         give: (R, m) [rad or m] deflections.
 
     Returns:
-        The conditions without compliant places.
+        The conditions without compliant locations.
     """
     screws = (give @ places.T).reshape(conditions.errors.shape)
     return replace(conditions, errors=conditions.errors + screws, yields=())
@@ -135,13 +135,13 @@ def settle_yields(
     solve: Callable[[Conditions], tuple[T, NDArray]],
     A: Callable[[Yields], NDArray],
 ) -> T:
-    """Solve conditions whose compliant places deflect by their laws.
+    """Solve for the equilibrium of conditions with compliant locations.
 
     Args:
-        conditions: R rows.
-        solve: function that returns solutions and (R, 6n) joint wrenches without laws.
-        A: (R, t, m) first-order derivative of the laws' wrenches with respect to the
+        conditions: conditions of R measurements.
+        solve: function that returns solutions and (R, 6n) joint wrenches for fixed
             deflections.
+        A: (R, t, m) derivative of the wrenches with respect to the deflections.
 
     Returns:
         The solutions.
@@ -162,15 +162,15 @@ def settle_yields(
 
 
 def with_springs(conditions: Conditions, row: int) -> Conditions:
-    """Return one row whose linear compliant places are springs in series with joints.
+    """Replace linear compliant locations by springs in series with the joints.
 
     Args:
-        conditions: conditions of all rows.
-        row: index of the row.
+        conditions: conditions of all measurements.
+        row: index of the measurement.
 
     Returns:
-        Conditions of the row.  Compliant places with a nonlinear law or without
-        positive compliance remain.
+        Conditions of one measurement.  Compliant locations that have a nonlinear law or
+        no positive compliance are retained.
     """
     one, left = conditions.take([row]), []
     frames = list(conditions.robot.frames)

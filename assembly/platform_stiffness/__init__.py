@@ -1,4 +1,4 @@
-"""Stiffness K_C of the platform, and contributions of the parts to its compliance.
+"""Platform stiffness K_C, and contributions of the parts to the compliance.
 
 Start with ``platform_stiffness.py``; ``matrices.py`` defines its result.
 """

@@ -1,16 +1,16 @@
 r"""Newton's method for an equilibrium at which the loaded clearances are known.
 
-A clearance is called pressed here if it is at its bound and carries a force.  Cone
-programmes are solved up to a certified gap: pressed clearances are within 1e-6 of their
-bounds, and their forces have the same accuracy.  Once the pressed clearances are known,
+A clearance is called closed if it is at its bound and carries a force.  Cone programs
+are solved up to a certified gap, so that closed clearances are within 1e-6 of their
+bounds and their forces have the same accuracy.  Once the closed clearances are known,
 the conditions of equilibrium are equations,
 
     [ H   A'  N ] [ dx       ]     [ g ]      g = H_y y - loads - A' lambda + N f
     [ A   0   0 ] [ -dlambda ] = - [ r ],     r = A x + misfit
     [ N'  0   0 ] [ df       ]     [ c ]      c = (|u_k|^2 - 1) / 2
 
-which Newton's method solves to rounding.  N contains the normals u_k of the bounds of
-pressed clearances.
+which Newton's method solves to machine precision.  N contains the normals u_k of the
+bounds of closed clearances.
 
 Sources:
     Nocedal, Wright (2006), Numerical Optimization, sections 16.2 and 18.1.
@@ -29,7 +29,7 @@ from forcefit.assembly.linear.load import FrameLoads
 from forcefit.assembly.solvers.cones import cone_sizes
 
 AT_BOUND = 1e-6  # [-] relative distance within which a clearance counts as at its bound
-# [-] relative distance from its bound within which a clearance can be pressed
+# [-] relative distance from its bound within which a clearance can be closed
 _NEAR_BOUND = 1e-3
 _PRESSED = 1e-8  # relative to the largest force: a smaller force counts as zero
 # relative to the energy without clearance: a force below this counts as zero
@@ -38,22 +38,21 @@ _RANK = 1e-10  # relative size below which a singular value counts as zero
 _FLAT = 1e-12  # relative to the largest curvature: smaller curvatures count as zero
 _STEPS = 4  # largest number of Newton steps; two are usual
 _SETTLED = 1e-14  # [-] largest accepted relative excess of a clearance over its bound
-_GUESSES = 3  # largest number of guesses of the pressed clearances
+_GUESSES = 3  # largest number of guesses of the set of closed clearances
 
 
 def contacts(assembly: Assembly) -> tuple[NDArray, NDArray]:
-    """Return the clearances that carry a force, and those at their bound without force.
+    """Return the closed clearances, and those at their bound without a force.
 
-    In the solution of a cone solver, the product of gap and force is equal for all
-    clearances.  Near a bound, the larger of gap and force (relative to the energy)
-    decides whether the clearance is pressed.
+    In the solution of a cone solver, the product of gap and force is the same for all
+    clearances.  A clearance near its bound is closed if its force, relative to the
+    energy, exceeds its gap.
 
     Args:
-        assembly: the manipulator with least energy.
+        assembly: minimum-energy assembly.
 
     Returns:
-        Two masks (cones,) bool: clearances that carry a force, and clearances at their
-        bound without a force.
+        Two masks (cones,) bool: clearances at their bound with and without a force.
     """
     force = bound_forces(assembly)
     gap = 1.0 - cone_sizes(assembly.clearances, assembly.joints.group)
@@ -73,14 +72,16 @@ def bound_forces(assembly: Assembly) -> NDArray:
 
 
 def settle(assembly: Assembly) -> Assembly:
-    """Refine an equilibrium of (22) to rounding, with pressed clearances at bounds.
+    """Refine an equilibrium of problem (22) to machine precision by Newton's method.
+
+    The closed clearances are held at their bounds.
 
     Args:
-        assembly: the manipulator with least energy, as computed by a cone solver.
+        assembly: minimum-energy assembly computed by a cone solver.
 
     Returns:
-        The result of Newton's method; the given assembly if no clearance is pressed, or
-        if the pressed clearances cannot be identified.
+        The refined assembly; the given assembly if no clearance is closed, or if the
+        closed clearances cannot be identified.
     """
     pressed, _ = contacts(assembly)
     for _ in range(_GUESSES):
@@ -90,7 +91,7 @@ def settle(assembly: Assembly) -> Assembly:
         size = cone_sizes(settled.clearances, settled.joints.group)
         if np.array_equal(contacts(settled)[0], pressed) and np.all(size <= 1 + 1e-9):
             return settled
-        # a clearance exceeds its bound, because its small force was wrongly set to zero
+        # a clearance exceeds its bound because its small force was wrongly set to zero
         beyond = size > 1.0 + 1e-9
         if not (beyond & ~pressed).any():
             break
@@ -150,13 +151,13 @@ def work_of_loads(loads: FrameLoads, joints: VirtualJoints) -> NDArray:
 
 
 def curvature(joints: VirtualJoints, force: NDArray) -> NDArray:
-    """Return the (N, N) [J] curvature of springs and of round bounds under force."""
+    """Return the (N, N) [J] curvature due to springs and round bounds under force."""
     diagonal = [np.ones(joints.elastic.shape[1]), force[joints.group]]
     return np.diag(np.concatenate([*diagonal, np.zeros(joints.free.shape[1])]))
 
 
 def _normals(joints: VirtualJoints, u: NDArray, pressed: NDArray) -> NDArray:
-    """Return the (N, pressed) normals of the pressed bounds in all unknowns."""
+    """Return the (N, pressed) normals of the active bounds in all unknowns."""
     normals = np.zeros((_count(joints), int(pressed.sum())))
     normals[bounded_unknowns(joints)] = boundary_normals(u, pressed, joints.group)
     return normals
@@ -176,7 +177,7 @@ def held_rows(assembly: Assembly, pressed: NDArray) -> NDArray:
 def newton_step(
     H: NDArray, held: NDArray, left: NDArray, gradient: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Solve for the Newton step of the equations in the module's docstring.
+    """Solve for the Newton step of the equations in the module docstring.
 
     Args:
         H: (N, N) [J] second derivative of the Lagrangian.
@@ -185,8 +186,8 @@ def newton_step(
         gradient: (N,) [J] gradient of the Lagrangian.
 
     Returns:
-        (N,) change of the unknowns, and (m,) change of the multipliers; each of least
-        norm if it is not unique.
+        (N,) change of the unknowns, and (m,) change of the multipliers; the
+        minimum-norm solution if they are not unique.
     """
     closing = -np.linalg.lstsq(held, left, rcond=_RANK)[0]
     Z = null_space(held, rcond=_RANK) if len(held) else np.eye(len(H))

@@ -1,22 +1,21 @@
-r"""Load-deflection path beyond limit points, followed by arc length, without clearance.
+r"""Follow the load-deflection path beyond limit points by arc length.
 
-At a maximum of the load (a limit point), the path of equilibria turns back.  No
-equilibrium nearby exists for larger loads.  The load is therefore treated as an
-unknown.  The path (x, lambda) is followed in steps of given length.  Each step is a
-prediction along the tangent, followed by corrections by Newton's method perpendicular
-to it,
+At a maximum of the load (a limit point), the path of equilibria turns back, and no
+nearby equilibrium exists for larger loads.  The load is therefore treated as an
+unknown, and the path (x, lambda) is followed in steps of given length.  Each step
+consists of a prediction along the tangent and Newton corrections perpendicular to it,
 
         [ Z'HZ   -Z'q ] [ t       ]     [ unbalanced force       ]
         [ tau_x   tau ] [ dlambda ] = - [ error of step's length ].
 
-Z contains the motions that keep the closures, H is the exact second derivative of the
-potential, q the work of a unit load, and tau the direction of the step.  Stable and
-unstable equilibria are found.  Clearances are fixed at zero.
+Z contains the motions that preserve the closures, H is the exact second derivative of
+the potential, q the work of a unit load, and tau the direction of the step.  Both
+stable and unstable equilibria are found.  Clearances are fixed at zero.
 
-The load is critical if an eigenvalue of Z'HZ changes its sign.  At a limit point, the
-load has an extremum.  Otherwise another path branches off, as for a buckled column; the
+The load is critical if an eigenvalue of Z'HZ changes sign.  Either the load has an
+extremum there (limit point), or another path branches off, as for a buckled column; the
 branch is reported but not followed.  Motions without stiffness and load, such as the
-spin of a rod between two ball joints, have no second derivative and are omitted from Z.
+spin of a rod between two ball joints, have no curvature and are omitted from Z.
 
 Sources:
     Riks (1979), An incremental approach to the solution of snapping and buckling
@@ -80,25 +79,24 @@ class _Place:
 
     @property
     def unstable(self) -> int:
-        """Number of modes along which the potential decreases."""
+        """Number of modes with negative curvature."""
         return int((self.curvatures < 0).sum())
 
 
 @dataclass(frozen=True, eq=False)
 class _Path:
-    """A load-deflection path to be followed, and the definition of its arc length.
+    """A load-deflection path, with the definition of its arc length.
 
     Attributes:
         posture: posture of the robot without clearance, with beams cut into pieces.
-        component: component of the load that changes.
-        rest: (6,) [N m, N] the other components of the load.
+        component: component of the load that varies.
+        rest: (6,) [N m, N] constant components of the load.
         gravity: (3,) [m/s^2] gravity vector, or None.
-        weight: factor of squared motions in the squared arc length.  The other term of
-            the squared arc length is the squared load divided by the squared largest
-            load.
-        range: [N or N m] the largest load.
+        weight: factor on squared motions in the squared arc length, to which the
+            squared ratio of load to largest load is added.
+        range: [N or N m] largest load.
         parts: owner of each spring.
-        idle: number of motions that have no stiffness and on which no load acts.
+        idle: number of motions without stiffness on which no load acts.
     """
 
     posture: Posture
@@ -129,7 +127,7 @@ class _Path:
         return self.weight * motion / local.placement.model.units**2
 
     def modes(self, local: Expansion) -> tuple[NDArray, NDArray]:
-        """Return second derivatives of the potential, lowest first, and motions Z."""
+        """Return the curvatures of the potential, lowest first, and the motions Z."""
         B, units = local.basis, local.placement.model.units
         values, motions = curvature_modes(B, B.T @ local.hessian @ B, units)
         kept = np.sort(np.argsort(np.abs(values))[self.idle :])
@@ -147,24 +145,23 @@ def follow_load(
     progress: Progress = lambda what, done, most: None,
     method: Method = "compiled",
 ) -> DeflectionCurve:
-    """Follow the path of equilibria until the load leaves a range.
+    """Follow the path of equilibria until the load reaches a given value.
 
     Args:
         posture: the robot's configuration with its errors; clearances are fixed at
             zero.
-        component: component of the load that changes, 0 to 5.
+        component: component of the load that varies, 0 to 5.
         first: [N m or N] load at which the path begins.
         last: [N m or N] load at which the path ends.
-        load: (6,) [N m, N] the other components of the load.
+        load: (6,) [N m, N] constant components of the load.
         gravity: (3,) [m/s^2] gravity vector in base axes.
-        count: number of steps from the first to the last load if all steps have the
-            length of the first; steps grow to twice that length where the path is
-            straight.
-        progress: function called with the number of points found and its largest value.
+        count: number of steps from the first to the last load if all steps were as long
+            as the first; steps grow to twice that length where the path is straight.
+        progress: function called with the current and the largest number of points.
         method: method of the first equilibrium; the path is then followed in numpy.
 
     Returns:
-        The curve; its events are ``"critical"`` loads, with the mode.
+        The curve, whose events are the ``"critical"`` loads with their modes.
 
     Raises:
         CannotAssemble: the errors cannot be closed.
@@ -258,7 +255,7 @@ def _solve(
     path: _Path, local: Expansion, modes: tuple[NDArray, NDArray], tangent: NDArray,
     left: NDArray,
 ) -> NDArray | None:  # fmt: skip
-    """Return the motion and the change of the load that remove a residual."""
+    """Return the change of the unknowns and of the load that removes a residual."""
     values, Z = modes
     M = np.zeros((len(left), len(left)))
     M[:-1, :-1] = np.diag(values)
@@ -300,7 +297,7 @@ def _critical(path: _Path, low: _Place, high: _Place, step: float) -> Event:
         else:
             high, long_ = middle, (short + long_) / 2
     turns = low.rise * high.rise < 0
-    # the critical mode is the last negative one on the side with more negative modes
+    # on the side with more negative modes, the critical mode is the last negative one
     more = high if high.unstable > low.unstable else low
     soft = more.unstable - 1
     bent = more.modes[:, soft]

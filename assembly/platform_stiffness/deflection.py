@@ -1,17 +1,17 @@
-"""Deflection of the platform as a function of a load: contacts, elasticity, buckling.
+"""Platform deflection as a function of a load, with contact changes and buckling.
 
-One component of the load is changed through a list of values while the others are
-constant.  At each value, the equilibrium is computed by problem (22) or with finite
-motions.  With finite motions, each computation starts from the previous equilibrium, so
-that a path is followed forwards or backwards.  The curve has a kink where the set of
-pressed clearances (clearances that carry a force) changes.  The load is critical where
-the least second derivative of the potential passes through zero.  There, the
-equilibrium branches, or it ends and the platform jumps to another equilibrium.
-Bisection brackets these loads.
+One component of the load takes a list of values while the others are constant.  At each
+value, the equilibrium is computed by problem (22) or with finite motions.  With finite
+motions, each equilibrium serves as the initial guess for the next, so that a path can
+be followed forwards or backwards.  The curve has a kink where the set of closed
+clearances (clearances that carry a force) changes.  The load is critical where the
+smallest curvature of the potential passes through zero.  There, the path of equilibria
+branches, or it ends and the platform jumps to another equilibrium.  Critical loads are
+bracketed by bisection.
 
-The load is prescribed.  If a path turns back, only the part that is stable from one
-side is found, and the jump over the other part is reported; :mod:`.arc_length` follows
-that part.
+Because the load is prescribed, only the stable part of a path that turns back is found,
+and the jump over the unstable part is reported.  Use :mod:`.arc_length` to follow that
+part.
 """
 
 from collections.abc import Callable, Sequence
@@ -53,22 +53,22 @@ _HALVINGS = 14  # bisections that locate an event to 6e-5 of a load step
 # product of force and bound, relative to the largest product, that counts as zero
 _CARRIES = 1e-6
 # largest number of contact changes that are followed within a load step: in symmetric
-# robots, rounding errors can cause forces in some contacts
+# robots, round-off can cause forces in some contacts
 _CHANGES = 8
 # platform motion, relative to the largest motion in a mode, below which the platform
 # counts as fixed
 _STAYS = 1e-6
-_STILL = 1e-12  # smaller motions, in characteristic lengths, count as rounding errors
-# a motion is a jump if it exceeds the motion predicted by both tangents by this factor
+_STILL = 1e-12  # smaller motions, in characteristic lengths, count as round-off
+# a motion is a jump if it exceeds the prediction of both tangents by this factor
 _JUMP = 5.0
-# relative to the largest load: under smaller loads, clearances can leave the pose
+# relative to the largest load: below this load, clearances can leave the pose
 # undetermined
 _NO_LOAD = 1e-9
 
 
 @dataclass(frozen=True)
 class Event:
-    """An event on the load-deflection curve, such as a change of contact.
+    """An event on a load-deflection curve, such as a change of contact.
 
     Attributes:
         load: [N or N m] load at the event, or directly after it.
@@ -86,7 +86,7 @@ class Event:
 
 @dataclass(frozen=True, eq=False)
 class DeflectionCurve:
-    """Motion of the platform under one changing component of the load.
+    """Motion of the platform while one component of the load varies.
 
     Attributes:
         posture: the robot's nominal configuration.
@@ -96,7 +96,7 @@ class DeflectionCurve:
         energies: (k,) [J] elastic energies.
         stiffness: (k,) [N m/rad or N/m] tangent stiffness along the component, with the
             other components of the motion free.
-        pressed: (k,) names of the clearances that carry a force.
+        pressed: (k,) names of the closed clearances, which carry a force.
         open_: (k,) bool, True if clearances leave the pose undetermined.
         events: events in the order of the curve.
         method: requested method of all equilibria: ``"compiled"`` or ``"reference"``.
@@ -158,18 +158,18 @@ def deflection_curve(
     progress: Progress = lambda what, done, most: None,
     method: Method = "compiled",
 ) -> DeflectionCurve:
-    """Compute the platform's motion while one component of the load changes.
+    """Compute the motion of the platform while one component of the load varies.
 
     Args:
         posture: the robot's configuration, with its errors and clearances.
         component: index in ``[mx my mz fx fy fz]``, 0 to 5.
         loads: [N m or N] values of the component, in the order of application.
-        load: (6,) [N m, N] the other components, at the platform's origin, base axes;
-            or a mapping of components such as ``{"fz": -50}``.
+        load: (6,) [N m, N] constant components, at the platform's origin, base axes; or
+            a mapping of components such as ``{"fz": -50}``.
         gravity: (3,) [m/s^2] gravity vector in base axes.
         state: ``"contact"``, by problem (22); ``"exact"``, with finite motions.
-        progress: function called at each load with the number of steps and its largest
-            value.
+        progress: function called at each load with the current and the largest number
+            of steps.
         method: method of :func:`forcefit.assembly.linear.energy.solve_assembly` or
             :func:`forcefit.assembly.exact.exact.solve_exact`.
 
@@ -260,7 +260,7 @@ def _solve(
             posture, wrench, gravity=gravity, progress=progress, method=method
         )
     active, force = active_clearances(equilibrium.expansion)
-    # omit contacts whose forces are only rounding errors
+    # omit contacts whose forces are only round-off
     active &= force > _CARRIES * force.max(initial=0.0)
     names = clearance_names(equilibrium.expansion.placement.model.joints, active)
     return _Point(value, equilibrium, exact_tangent(equilibrium, "unloading"), names)
@@ -272,7 +272,7 @@ def _settled(
 ) -> tuple[NDArray, bool]:  # fmt: skip
     """Return the platform screw, and whether clearances leave the pose undetermined.
 
-    In that case, the screw nearest to nominal is returned.
+    If they do, the screw is the one nearest to nominal.
     """
     equilibrium = point.equilibrium
     others = rest.any() or gravity is not None or driven(equilibrium.posture.robot)
@@ -304,7 +304,7 @@ def clearance_names(joints: VirtualJoints, marked: NDArray) -> frozenset[str]:
 def _events(
     before: _Point, after: _Point, at: _Solver, component: int, most: int = _CHANGES
 ) -> list[Event]:
-    """Return the events between two successive loads."""
+    """Find the events between two successive loads."""
     events = []
     if before.pressed != after.pressed:
         low, high = _bracket(before, after, at, lambda p: p.pressed == before.pressed)
@@ -356,7 +356,7 @@ def _bracket(
 
 
 def _apart(one: _Point, other: _Point) -> float:
-    """Return the distance [m] of two platform poses, with rotations times a length."""
+    """Return the distance [m] between platform poses, with rotations times a length."""
     change = other.equilibrium.platform_screw - one.equilibrium.platform_screw
     return float(np.linalg.norm(change * np.repeat([one.tangent.length, 1.0], 3)))
 
@@ -375,7 +375,7 @@ def _jumps(before: _Point, after: _Point, component: int) -> bool:
 
 
 def _mode(point: _Point) -> str:
-    """Describe the mode of negative stiffness by platform motion and bent part."""
+    """Describe the mode of negative stiffness by platform motion and deformed part."""
     tangent = point.tangent
     soft = int(np.flatnonzero(tangent.signs < 0)[0])
     return "buckles: " + mode_text(
@@ -386,7 +386,7 @@ def _mode(point: _Point) -> str:
 def mode_text(
     screws: NDArray, mode: int, springs: NDArray, parts: Sequence[Part], length: float
 ) -> str:
-    """Return a description of a mode: the platform's motion, and the part that bends.
+    """Describe a mode by the platform motion and the part that deforms most.
 
     Args:
         screws: (6, k) [rad, m] screws of the platform in all modes, with a common
@@ -398,7 +398,7 @@ def mode_text(
 
     Returns:
         Text with the unit screw of the platform, or the statement that it does not
-        move; and the name of the part that bends most.
+        move; and the name of the part that deforms most.
     """
     part = parts[largest_row(np.square(springs))]
     scale, screw = np.repeat([length, 1.0], 3), screws[:, mode]

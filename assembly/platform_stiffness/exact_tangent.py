@@ -1,18 +1,18 @@
-r"""Tangent stiffness of the exact equilibrium on SE(3), with geometric stiffness.
+r"""Tangent stiffness of the exact equilibrium on SE(3), including geometric stiffness.
 
-Near an equilibrium the unknowns move by Z t, along closures and along the bounds of
-pressed clearances.  The total potential (energy minus the work of loads) changes by
-t.Z'HZt / 2.  H is the exact second derivative of the Lagrangian.  It includes the
-springs and the forces of assembly and load on parts that rotate.  A small additional
-wrench w does the work w.(V Z t), where V Z t is the platform's small motion in base
-axes from its current pose.  The compliance is C = V Z (Z'HZ)^-1 Z'V'.
+Near an equilibrium the unknowns move by Z t, which satisfies the closures and keeps
+closed clearances at their bounds.  The total potential (energy minus the work of the
+loads) changes by t.Z'HZt / 2, where H is the exact Hessian of the Lagrangian.  It
+includes the springs and the effect of assembly forces and loads on rotating parts.  A
+small additional wrench w does the work w.(V Z t), where V Z t is the platform's small
+motion from its current pose, in base axes.  The compliance is C = V Z (Z'HZ)^-1 Z'V'.
 
 The potential is stationary at the equilibrium, so its second derivative does not depend
-on the coordinates of SE(3): C and K are symmetric in any coordinates of the platform.
-Both depend on how the existing load follows the motion.  Here the force is dead, and
-the work of the moment m is m . theta, where theta is the rotation vector from the
-nominal posture.  A moment that is constant in base axes has no potential: near
-theta = 0 it adds the antisymmetric skew(m) / 2 to the rotational block of K.
+on the chart of SE(3), and C and K are symmetric in any coordinates of the platform.
+Both depend on how the existing load follows the motion.  Here the force is a dead load,
+and the work of the moment m is m . theta, where theta is the rotation vector from the
+nominal posture.  A moment that is constant in base axes has no potential: near theta =
+0 it adds the antisymmetric skew(m) / 2 to the rotational block of K.
 
 Sources:
     Zefran, Kumar (2002), A geometrical approach to the study of the Cartesian stiffness
@@ -45,8 +45,8 @@ def exact_tangent(
 
     Args:
         equilibrium: the manipulator assembled with finite motions, under its loads.
-        side: state of clearances at their bound without a force: ``"loading"``, in
-            which they stay at the bound, or ``"unloading"``, in which they leave it.
+        side: behaviour of clearances at their bound without a force: ``"loading"`` if
+            they stay at the bound, ``"unloading"`` if they leave it.
 
     Returns:
         The stiffness at the platform's displaced origin, base axes; modes of negative

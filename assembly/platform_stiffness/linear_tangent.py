@@ -4,16 +4,15 @@ Without loads, the small motions of springs y and free joints q satisfy the clos
 
     A_q q + A_y y = 0,      platform screw  P_q q + P_y y.
 
-Multiplication by rows orthogonal to A_q eliminates q and gives Z'A_y y = 0.  The
-solutions y = W t, with W orthonormal, are the modes.  Their energy is t.t / 2, and
-C = L L', where L contains the platform's screws.  The method does not add compliances,
-so stiff and soft springs keep their relative accuracy.
+Multiplication by rows orthogonal to A_q eliminates q, which leads to Z'A_y y = 0.  The
+solutions y = W t, with W orthonormal, are the modes.  Their energy is t.t / 2, and C =
+L L', where L contains the platform's screws.  Because compliances are never added,
+stiff and soft springs retain their relative accuracy.
 
-A clearance is either fixed at zero (the classical model), or has the state of problem
-(22): free within its bound, or pressed against it.  A pressed clearance is rigid in the
-direction normal to its bound.  Along a round bound it is compliant: the curvature
-rotates the force f [J, per unit of the bound], which so acts as a spring of stiffness
-f.
+A clearance is either fixed at zero (classical model) or in its state in problem (22):
+free within its bound, or closed.  A closed clearance is rigid in the direction normal
+to its bound.  Along a round bound it is compliant: sliding along the bound rotates the
+contact force f [J, per unit of the bound], which thus acts as a spring of stiffness f.
 
 Sources:
     Pashkevich, Chablat, Wenger (2009), Stiffness analysis of overconstrained parallel
@@ -49,11 +48,11 @@ from forcefit.assembly.solvers.method import Method
 
 Side = Literal["loading", "unloading"]
 _RANK = 1e-10  # relative size below which a singular value counts as zero
-_NOISE = 1e-12  # relative rounding error of a column that a projection removes
+_NOISE = 1e-12  # relative round-off of a column that a projection removes
 
 
 def without_clearance(posture: Posture) -> PlatformStiffness:
-    """Return the stiffness by the classical model, with clearances fixed at zero.
+    """Return the stiffness of the classical model, with clearances fixed at zero.
 
     Args:
         posture: the robot's configuration.
@@ -67,16 +66,16 @@ def without_clearance(posture: Posture) -> PlatformStiffness:
 
 
 def in_contact(assembly: Assembly, side: Side = "loading") -> PlatformStiffness:
-    """Return the tangent of problem (22), with each clearance free or pressed.
+    """Return the tangent of problem (22), with each clearance free or closed.
 
     Args:
-        assembly: the manipulator with least energy under its loads.
-        side: state of clearances at their bound without a force: ``"loading"``, in
-            which they stay at the bound, or ``"unloading"``, in which they leave it.
+        assembly: minimum-energy assembly under its loads.
+        side: behaviour of clearances at their bound without a force: ``"loading"`` if
+            they stay at the bound, ``"unloading"`` if they leave it.
 
     Returns:
-        The stiffness at the platform's origin, from the second derivative of the least
-        potential.
+        The stiffness at the platform's origin, from the second derivative of the
+        minimum potential.
     """
     return active_tangent(settle(assembly), side)
 
@@ -85,8 +84,8 @@ def active_tangent(assembly: Assembly, side: Side = "loading") -> PlatformStiffn
     """Return the tangent stiffness of an assembly that is nearly in equilibrium.
 
     Args:
-        assembly: assembly with clearances that are accurate to rounding.
-        side: state of clearances at their bound without a force, see
+        assembly: assembly whose clearances are accurate to machine precision.
+        side: behaviour of clearances at their bound without a force, see
             :func:`in_contact`.
 
     Returns:
@@ -140,7 +139,7 @@ def _stiffness(
     lin: Linearisation, state: str, springs: NDArray, parts: list[Part], free: NDArray,
     method: Method,
 ) -> PlatformStiffness:  # fmt: skip
-    """Reduce springs and free motions to modes; see the module's docstring."""
+    """Reduce springs and free motions to modes; see the module docstring."""
     free = free / _sizes(free, lin.size)
     A_q, A_y = lin.rows @ free, lin.rows @ springs
     tolerance = _RANK + 30.0 * lin.posture.mismatch

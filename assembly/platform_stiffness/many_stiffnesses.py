@@ -1,4 +1,4 @@
-"""Stiffness of the platform at many postures, with the parts' contributions."""
+"""Platform stiffness at many postures, with the contribution of each part."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-# relative size below which a singular value of the compliance root counts as rigid
+# relative size below which a singular value of the compliance root denotes rigidity
 _RANK = 1e-10
 
 
@@ -33,8 +33,8 @@ _RANK = 1e-10
 class Stiffnesses:
     """Stiffness of the platform at k postures; ``[i]`` returns posture i.
 
-    The sizes of the arrays of :class:`PlatformStiffness` differ between postures
-    (modes, free motions, rigid directions).  This class therefore stores only arrays of
+    The shapes of the arrays of :class:`PlatformStiffness` (modes, free motions, rigid
+    directions) vary between postures.  This class therefore stores only arrays of
     constant shape: compliances, eigen-stiffnesses and shares.
 
     Attributes:
@@ -45,11 +45,10 @@ class Stiffnesses:
         springs: (k, ny, 6) [sqrt(2 J) per N m and N] deformation of every spring under
             unit wrenches at that point, base axes; NaN for postures in ``apart``.
         parts: (ny,) owner of each spring.
-        method: (k,) method of the solution or of its equilibrium: ``"compiled"`` or
-            ``"reference"``.
-        apart: stiffnesses by posture number that are stored with their modes: those of
-            postures with a free motion of the platform, and all stiffnesses in states
-            other than ``"nominal"``.
+        method: (k,) method used to solve for the stiffness or its equilibrium:
+            ``"compiled"`` or ``"reference"``.
+        apart: stiffnesses stored with their modes, by posture number: those with a free
+            platform motion, and all stiffnesses in states other than ``"nominal"``.
     """
 
     posture: Posture
@@ -174,7 +173,7 @@ class Stiffnesses:
         d, scale = np.asarray(direction), np.repeat([self.length, 1.0], 3)
         compliance = np.sum((self.springs @ d) ** 2, axis=1)
         largest = np.sum((self.springs * scale) ** 2, axis=(1, 2))
-        # along a motion that no part allows, the compliance consists of rounding errors
+        # along a motion that no part allows, the compliance is only round-off
         still = compliance <= _RANK**2 * largest * np.sum((d / scale) ** 2)
         with np.errstate(divide="ignore"):
             K = 1.0 / np.where(still, 0.0, compliance)
@@ -189,7 +188,7 @@ class Stiffnesses:
             direction: (6,) direction of a wrench.
 
         Returns:
-            Shares by part; their sum is 1, or NaN at postures with a free motion.
+            Shares by part, which add up to 1, or NaN at postures with a free motion.
             Clearances and forces are treated as in :meth:`PlatformStiffness.shares`.
         """
         energies = (self.springs @ np.asarray(direction)) ** 2
@@ -206,12 +205,13 @@ class Stiffnesses:
 
 
 def many_without_clearance(posture: Posture, method: Method) -> Stiffnesses:
-    """Return stiffnesses by the classical model, with clearances fixed at zero.
+    """Return the stiffnesses of the classical model, with clearances fixed at zero.
 
     Args:
         posture: k postures.
-        method: ``"compiled"``, with the reference for postures that the compiled method
-            does not cover; or ``"reference"``, in numpy, one posture at a time.
+        method: ``"compiled"``, which falls back on the reference for postures that the
+            compiled method does not cover; or ``"reference"``, in numpy, one posture at
+            a time.
 
     Returns:
         The stiffnesses at the platform's origin.

@@ -1,9 +1,9 @@
-r"""Stiffness and compliance of the platform at a point, and derived quantities.
+r"""Stiffness and compliance matrices of the platform, and derived quantities.
 
-A small wrench w on the platform moves it by s = C w.  To hold the platform at s
-requires the wrench K s.  Both matrices are computed from the modes of the manipulator:
-combinations of all motions that its closures allow.  The energy of a mode is sigma / 2
-per squared unit, with sigma = +-1.
+A small wrench w on the platform moves it by s = C w, and holding the platform at s
+requires the wrench K s.  Both matrices are computed from the modes of the manipulator,
+which are combinations of the motions that its closures allow.  The energy of a mode is
+sigma / 2 per squared unit, with sigma = +-1.
 
 ======  ==============  ========  ====================================================
 symbol  code            shape     meaning
@@ -15,8 +15,8 @@ F       ``free``        (6, f)    unit screws of the platform without resistance
 l       ``length``      m         converts rotations to lengths, for eigenvalues
 ======  ==============  ========  ====================================================
 
-A free motion makes compliances infinite, a rigid direction makes stiffnesses infinite.
-The affected entries are NaN; all other entries remain valid.
+Free motions make compliances infinite, and rigid directions make stiffnesses infinite.
+The affected entries are NaN; all others are valid.
 
 Sources:
     Salisbury (1980), Active stiffness control of a manipulator in Cartesian
@@ -46,14 +46,14 @@ if TYPE_CHECKING:
     import xarray
 
 _RANK = 1e-10  # relative size below which a motion counts as zero
-_ROUNDING = 1e-12  # relative rounding error of platform motions
+_ROUNDING = 1e-12  # relative round-off in platform motions
 _UNTOUCHED = 1e-9  # component of a unit screw below which it counts as zero
 
 
 class Part(NamedTuple):
-    """Part that deforms: the ``link``, ``joint`` or ``clearance`` of a frame.
+    """Deformable part: the ``link``, ``joint`` or ``clearance`` of a frame.
 
-    ``frame`` may be the name of a joint of several frames
+    ``frame`` can be the name of a joint that consists of several frames
     (:func:`forcefit.assembly.model.joint_names.shown_name`).
     """
 
@@ -69,14 +69,14 @@ class Part(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class EigenStiffnesses:
-    """Principal stiffnesses, the stiffest last; rotations are angle times length.
+    """Principal stiffnesses in ascending order, with rotations scaled to lengths.
 
     Attributes:
         values: (6,) [N/m] principal stiffnesses: 0 along free motions, inf along rigid
             directions.
-        screws: (6, 6) [rad, m] screws in columns, of unit size with rotations times
-            length.
-        length: [m] the characteristic length.
+        screws: (6, 6) [rad, m] screws in columns, of unit size after rotations are
+            multiplied by the length.
+        length: [m] characteristic length.
     """
 
     values: NDArray
@@ -104,7 +104,7 @@ class EigenStiffnesses:
 
 @dataclass(frozen=True, eq=False)
 class PlatformStiffness:
-    """Stiffness of the platform at one point; see the module's docstring.
+    """Stiffness of the platform at one point; see the module docstring.
 
     Attributes:
         posture: the robot's nominal configuration.
@@ -115,7 +115,7 @@ class PlatformStiffness:
         signs: (k,) sign of each mode's energy, 1 or -1.
         springs: (m, k) [sqrt(2 J)] deformations of the springs in each mode.
         parts: (m,) owner of each spring.
-        free: (6, f) [rad, m] unit screws without resistance.
+        free: (6, f) [rad, m] unit screws of the free motions.
         method: method of the solution or of its equilibrium: ``"compiled"``, or
             ``"reference"`` for numpy and Clarabel.
     """
@@ -152,7 +152,7 @@ class PlatformStiffness:
         return stiffness_dataset(self)
 
     def to_pandas(self) -> "pandas.DataFrame":
-        """Return a table: the share of each part in the compliance along each axis."""
+        """Return a table with the compliance share of each part along each axis."""
         from forcefit.assembly.model.tables import frame_table
 
         return frame_table(self.to_xarray(), "part")
@@ -162,7 +162,7 @@ class PlatformStiffness:
 
         Args:
             point: (3,) [m] the point, base axes.
-            length: [m] new characteristic length; None to keep it.
+            length: [m] new characteristic length; by default unchanged.
 
         Returns:
             The stiffness at this point.
@@ -188,7 +188,7 @@ class PlatformStiffness:
 
     @property
     def free_text(self) -> str:
-        """Text on platform motions without resistance; empty if there are none."""
+        """Description of the free platform motions; empty if there are none."""
         screws = ", ".join(numbers(screw) for screw in self.free.T)
         return f"the platform moves freely along {screws} [rad, m]" * bool(screws)
 
@@ -209,13 +209,12 @@ class PlatformStiffness:
 
     @cached_property
     def _resisted(self) -> tuple[NDArray, NDArray, NDArray]:
-        """Basis (6, r) of resisted wrenches, stiffness in it, and rigid wrenches."""
+        """Basis (6, r) of resisted wrenches, its stiffness, and rigid wrenches."""
         scale = self._scale[:, None]
         basis = null_space((scale * self.free).T) if self.free.size else np.eye(6)
         whole = scale * self.root
         U, S, Vt = np.linalg.svd(basis.T @ whole)
-        # the contribution of springs along free motions causes rounding errors in other
-        # directions
+        # springs along free motions would cause round-off in other directions
         rounding = _ROUNDING * np.abs(whole).max(initial=0.0)
         rank = int(np.sum(S > max(_RANK * S.max(initial=0.0), rounding)))
         inverse = np.diag(1.0 / S[:rank])
@@ -232,7 +231,7 @@ class PlatformStiffness:
         way, core, rigid = self._resisted
         values, vectors = np.linalg.eigh(core)
         scale = self._scale[:, None]
-        # these screws are orthonormal after multiplication of rotations by the length
+        # the screws are orthonormal after rotations are multiplied by the length
         screws = np.hstack([
             np.linalg.qr(scale * self.free)[0],
             way @ vectors / scale,
@@ -245,7 +244,7 @@ class PlatformStiffness:
         return EigenStiffnesses(values[order], screws[:, order] / scale, self.length)
 
     def along(self, direction: ArrayLike) -> tuple[float, float]:
-        """Return the stiffness along a direction, with other motions free, or blocked.
+        """Return the stiffness along a direction, with other motions free and blocked.
 
         Args:
             direction: (6,) direction of a wrench and of a screw, such as
@@ -271,7 +270,7 @@ class PlatformStiffness:
         screws = self.root.T @ d
         largest = np.linalg.norm(self._scale[:, None] * self.root)
         if np.linalg.norm(screws) <= _RANK * largest * np.linalg.norm(d / self._scale):
-            return 0.0  # no part allows this motion, so the value is a rounding error
+            return 0.0  # no part allows this motion, so the value is round-off
         return float(self.signs @ screws**2)
 
     def _held(self, d: NDArray) -> float:
@@ -283,7 +282,7 @@ class PlatformStiffness:
     def centre(self) -> NDArray:
         """(3,) [m] centre of stiffness, base axes; NaN if there is none.
 
-        At this point, the block of K from translations to moments is symmetric.
+        At this point, the block of K that maps translations to moments is symmetric.
         """
         K = self.stiffness
         turned, shifted = K[:3, 3:], K[3:, 3:]
@@ -299,10 +298,11 @@ class PlatformStiffness:
         """Return the contribution of every part to the compliance.
 
         Returns:
-            (6, 6) by part [rad/(N m) .. m/N].  Their sum is :attr:`compliance`.  In the
-            state ``"exact"``, the sum lacks the effect of forces on rotating parts.  In
-            the other states, each contribution is also the derivative of the compliance
-            with respect to the logarithm of the part's own compliance (Castigliano).
+            (6, 6) by part [rad/(N m) .. m/N], which add up to :attr:`compliance`,
+            except that in the state ``"exact"`` the effect of forces on rotating parts
+            is missing.  In the other states, each contribution equals the derivative of
+            the compliance with respect to the logarithm of the part's own compliance
+            (Castigliano).
         """
         response = self.springs @ (self.signs[:, None] * self.root.T)
         shares: dict[Part, NDArray] = {}
@@ -311,15 +311,15 @@ class PlatformStiffness:
         return {part: _blank(C, self.free) for part, C in shares.items()}
 
     def shares(self, direction: ArrayLike) -> dict[Part, float]:
-        """Return the share of each part in the compliance along a direction.
+        """Return the compliance share of each part along a direction.
 
         Args:
             direction: (6,) direction of a wrench, such as ``[0, 0, 0, 0, 0, 1]``.
 
         Returns:
-            [-] shares by part, largest first; their sum is 1.  The part
-            ``("", "forces")`` is the effect of existing forces on rotating parts; its
-            share can be negative.  NaN if the compliance is infinite or zero.
+            [-] shares by part, largest first, which add up to 1.  The part ``("",
+            "forces")`` stands for the effect of existing forces on rotating parts,
+            whose share can be negative.  NaN if the compliance is infinite or zero.
 
         Raises:
             BadInput: the direction is zero or is not six numbers.
@@ -339,11 +339,11 @@ class PlatformStiffness:
 
 
 def unit_screws(screws: NDArray, length: float) -> NDArray:
-    """Return the independent unit screws that span the same motions.
+    """Return independent unit screws that span the same motions.
 
     Args:
-        screws: (6, k) [rad, m] in units of about 1 rad or length; much smaller screws
-            count as rounding errors.
+        screws: (6, k) [rad, m] screws of the order of 1 rad or length; much smaller
+            ones count as round-off.
         length: [m] length by which rotations are multiplied.
 
     Returns:
@@ -370,19 +370,19 @@ def unit_screws(screws: NDArray, length: float) -> NDArray:
 
 
 def numbers_of(name: str, value: ArrayLike, count: int, unit: str) -> NDArray:
-    """Return an argument as an array with a given number of finite numbers.
+    """Convert an argument to an array with a given number of finite entries.
 
     Args:
         name: name of the argument, for error messages.
         value: the argument.
-        count: the expected number of entries.
+        count: expected number of entries.
         unit: unit of the entries, for the message.
 
     Returns:
         (count,) numbers.
 
     Raises:
-        BadInput: the argument is not such an array.
+        BadInput: the argument cannot be converted.
     """
     fault = find_fault(np.asarray(value).tolist(), (count,))
     if fault:
@@ -394,7 +394,7 @@ def _direction(direction: ArrayLike) -> NDArray:
     """Return the (6,) direction scaled to unit size."""
     d = numbers_of("direction", direction, 6, "N m, N")
     if not d.any():
-        raise BadInput("direction: found only zeros, expected 6 numbers, not all 0")
+        raise BadInput("direction: found only zeros, expected a nonzero direction")
     return d / np.linalg.norm(d)
 
 

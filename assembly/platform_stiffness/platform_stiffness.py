@@ -1,4 +1,4 @@
-"""Stiffness matrix K_C of the platform at a posture, in the requested state."""
+"""Stiffness matrix K_C of the platform in different states of the robot."""
 
 from collections.abc import Sequence
 from typing import Literal, cast, get_args, overload
@@ -56,7 +56,9 @@ def platform_stiffness(
     side: Side = "loading",
     method: Method = "compiled",
 ) -> PlatformStiffness | Stiffnesses:
-    """Return the platform's tangent stiffness: small wrench per small motion.
+    """Compute the tangent stiffness of the platform.
+
+    The stiffness relates a small additional wrench to the resulting small motion.
 
     Args:
         posture: the robot's configuration; or many postures of one robot.
@@ -71,20 +73,19 @@ def platform_stiffness(
         gravity: (3,) [m/s^2] gravity vector in base axes.  It has no effect on the
             classical model.
         at: (3,) [m] reference point of screws and wrenches, in platform axes.
-        side: state of clearances that touch their bound without a force:
-            ``"loading"``, in which they stay at the bound, or ``"unloading"``, in which
-            they leave it.
-        method: ``"compiled"``, with the reference method where necessary; or
-            ``"reference"``, with numpy and Clarabel only.  In the state ``"contact"``,
-            the method is passed to
+        side: behaviour of clearances that touch their bound without a force:
+            ``"loading"`` if they stay at the bound, ``"unloading"`` if they leave it.
+        method: ``"compiled"``, which falls back on the reference method where
+            necessary; or ``"reference"``, which uses only numpy and Clarabel.  In the
+            state ``"contact"``, the method is passed to
             :func:`forcefit.assembly.linear.energy.solve_assembly`, in ``"exact"`` to
             :func:`forcefit.assembly.exact.exact.solve_exact`.  The classical model of
             one posture always uses numpy, and its field ``method`` is then
             ``"reference"``; many postures are computed by the compiled method.
 
     Returns:
-        Stiffness, compliance, free motions and shares at that point, base axes; for
-        many postures, or a :class:`Posture` of many, one
+        Stiffness, compliance, free motions and shares at the reference point, base
+        axes; for many postures, or a :class:`Posture` of many, one
         :class:`~forcefit.assembly.platform_stiffness.many_stiffnesses.Stiffnesses`.
 
     Raises:

@@ -1,4 +1,4 @@
-"""Labelled arrays of stiffness, curves and modes, named as in the file of a sweep.
+"""Labelled arrays of stiffness, curves and modes, with the names used in sweep files.
 
 ========================  ======================================================
 ``compliance``            matrix C
@@ -39,7 +39,7 @@ def tangent_quantities(
 
     Args:
         tangent: stiffness at one posture.
-        parts: parts whose shares are returned, m.
+        parts: m parts whose shares are returned.
 
     Returns:
         ``compliance`` (6, 6), ``stiffness`` (6,), ``eigen_stiffness`` (6,),

@@ -1,8 +1,8 @@
-r"""Derivatives of the platform's compliance with respect to one number of the robot.
+r"""Derivative of the platform compliance with respect to a parameter of the robot.
 
-The stiffness at an equilibrium depends on a number p directly, and through the
-equilibrium (x, lambda, f): unknowns, multipliers of the closures and forces of the
-pressed clearances.  The change of the equilibrium follows from the derivative of its
+The stiffness at an equilibrium depends on a parameter p directly, and through the
+equilibrium (x, lambda, f): unknowns, closure multipliers, and forces on the closed
+clearances.  The change of the equilibrium follows from the derivative of its
 conditions,
 
     [ H   A'  N ] [ dx       ]     [ dg/dp ]
@@ -10,13 +10,13 @@ conditions,
     [ N'  0   0 ] [ df       ]     [   0   ]
 
 (:mod:`.active_set`).  Here g is the gradient of the Lagrangian, r the residual of the
-closures at x, and N the normals of the bounds of pressed clearances.  Both g and r are
-known in closed form for any p, so no problem is solved again.  The tangent is then
-evaluated one step ahead and one step back along (p, x, lambda).  The error of these
-central differences is proportional to the square of the step.
+closures at x, and N the normals of the bounds of closed clearances.  Both g and r are
+known in closed form for any p, so no equilibrium needs to be recomputed.  The tangent
+is then evaluated one step ahead and one step back along (p, x, lambda).  The error of
+these central differences is of second order in the step.
 
-Pressed clearances are assumed to remain pressed.  At a change of contact, the tangent
-has no derivative, and the result is NaN.
+Closed clearances are assumed to remain closed.  At a change of contact, the tangent has
+no derivative, and the result is NaN.
 
 Sources:
     Haftka, Adelman (1989), Recent developments in structural sensitivity analysis
@@ -93,18 +93,18 @@ _Moved = Callable[[Posture, float], tuple[PlatformStiffness, NDArray]]
 def compliance_slope(
     posture: Posture, ahead: Posture, back: Posture, step: float, asked: TangentState
 ) -> NDArray:
-    """Return the compliance's derivative with respect to one number of the robot.
+    """Return the derivative of the compliance with respect to one parameter.
 
     Args:
         posture: the robot's configuration.
-        ahead: the configuration with the number increased by a step.
-        back: the configuration with the number decreased by a step.
-        step: size of the step, in the unit of the number.
+        ahead: the configuration with the parameter increased by a step.
+        back: the configuration with the parameter decreased by a step.
+        step: size of the step, in the unit of the parameter.
         asked: state of the tangent, and its reference point.
 
     Returns:
-        (6, 6) [rad/(N m) .. m/N per unit of the number], base axes; NaN if a motion of
-        the platform is free, or at a change of contact.
+        (6, 6) [rad/(N m) .. m/N per unit of the parameter], base axes; NaN if a motion
+        of the platform is free, or at a change of contact.
 
     Raises:
         CannotAssemble: the errors cannot be closed.
@@ -168,7 +168,7 @@ def _linear(
 
 
 def _like(joints: VirtualJoints, there: Posture) -> VirtualJoints:
-    """Return the virtual joints of a robot that differs in one number."""
+    """Return the virtual joints of a robot that differs in one parameter."""
     return virtual_joints(there.robot, bounded_motion=joints.bounded_motion)
 
 
@@ -223,11 +223,11 @@ def _difference(
     conditions: Callable[[Posture], tuple[NDArray, NDArray]],
     ahead: Posture, back: Posture, step: float,
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
-    """Return the derivatives of closures and gradient with the unknowns fixed."""
+    """Return the partial derivatives of closures and gradient, at fixed unknowns."""
     there, behind = conditions(ahead), conditions(back)
     return (there[0] - behind[0]) / (2 * step), (there[1] - behind[1]) / (2 * step)
 
 
 def _unknown(tangent: PlatformStiffness) -> PlatformStiffness:
-    """Return NaN for the derivative, which does not exist at a change of contact."""
+    """Return NaN, because the derivative does not exist at a change of contact."""
     return replace(tangent, root=np.full_like(tangent.root, np.nan))

@@ -1,17 +1,17 @@
 r"""Natural frequencies and modes at a posture, with the drives fixed.
 
-The stiffness is the tangent of the equilibrium, Z'HZ of
-:mod:`forcefit.assembly.platform_stiffness.exact_tangent`.  The mass M includes all
-moving bodies.  Masses and moments of inertia of frames are rigid bodies.  Beams with a
-density have a consistent mass, for a cubic motion between their clamped ends and with
-the rotary inertia of their sections.
+The stiffness is the tangent Z'HZ of the equilibrium, see
+:mod:`forcefit.assembly.platform_stiffness.exact_tangent`.  The mass matrix M includes
+all moving bodies.  Masses and moments of inertia of frames are treated as rigid bodies.
+Beams with a density have a consistent mass matrix, for a cubic displacement between
+their ends and including the rotary inertia of their sections.
 
     (Z'HZ - omega^2 Z'MZ) t = 0
 
-Because of the cubic approximation, the first frequency of a cantilever in n pieces is
-too high by 0.5 % for n = 1 and by 0.01 % for n = 2.  The mass of a mesh link with a
-density is that of its finite elements, condensed to both ends.  Links given by a matrix
-or a library have no mass.
+The cubic approximation overestimates the first frequency of a cantilever by 0.5 % with
+one piece and by 0.01 % with two pieces.  The mass of a mesh link with a density is that
+of its finite elements, condensed to both ends.  Links given by a matrix or a library
+have no mass.
 
 Sources:
     Przemieniecki (1968), Theory of Matrix Structural Analysis, section 11.3 (consistent
@@ -48,8 +48,8 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-_NULL = 1e-12  # eigenvalues below this share of the largest count as zero
-_ROUNDING = 1e-14  # rounding error of the mass matrix, relative to its largest entry
+_NULL = 1e-12  # eigenvalues below this fraction of the largest count as zero
+_ROUNDING = 1e-14  # round-off in the mass matrix, relative to its largest entry
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,12 +60,12 @@ class NaturalModes:
         posture: the robot's nominal configuration.
         frequencies: (k,) [Hz] natural frequencies; 0 for motions without resistance,
             NaN for unstable modes.
-        platform_screws: (6, k) [rad, m] motions of the platform for a modal mass of
+        platform_screws: (6, k) [rad, m] platform motions, normalised to a modal mass of
             1 kg.
-        shares: for each mode the share of every part in its elastic energy, largest
-            first; empty without elastic energy.
-        idle: number of motions without resistance that leave the platform fixed, such
-            as the spin of a rod between two ball joints; they are not among the modes.
+        shares: for each mode, the energy share of every part, largest first; empty
+            without elastic energy.
+        idle: number of free motions that leave the platform fixed, such as the spin of
+            a rod between two ball joints.  They are not included in the modes.
         method: method of the equilibrium: ``"compiled"`` or ``"reference"``.
     """
 
@@ -100,13 +100,13 @@ def natural_modes(
     state: Literal["nominal", "exact"] = "nominal",
     method: Method = "compiled",
 ) -> NaturalModes:
-    """Return the natural frequencies and modes of a robot with fixed drives.
+    """Compute the natural frequencies and modes of a robot with fixed drives.
 
     Args:
         posture: the robot's configuration.
         count: largest number of modes.
         load: (6,) [N m, N] wrench on the platform; or a mapping of components such as
-            ``{"fz": -50}``.  Only for the state ``"exact"``; the load has no mass.
+            ``{"fz": -50}``.  Only for the state ``"exact"``; the load adds no mass.
         gravity: (3,) [m/s^2] gravity vector, only for the state ``"exact"``.
         state: ``"nominal"``, for the nominal robot with clearances fixed at zero;
             ``"exact"``, around the equilibrium with errors, clearances and loads.
@@ -141,7 +141,7 @@ def natural_modes(
     if not np.trace(M) > 0.0:
         raise BadInput(_no_mass(posture.robot))
     squares, modes = _modes(H, M, rounding)
-    if not squares.size:  # the moving parts have no mass except for rounding errors
+    if not squares.size:  # the mass of the moving parts is only round-off
         raise BadInput(_no_mass(posture.robot))
     squares, modes, idle = _without_idle(
         squares, modes, platform_moves(equilibrium.expansion) @ D
@@ -179,7 +179,7 @@ def _no_mass(robot: Robot) -> str:
 def _without_idle(
     squares: NDArray, modes: NDArray, moves: NDArray
 ) -> tuple[NDArray, NDArray, int]:
-    """Remove free motions that leave the platform fixed, and count them."""
+    """Remove and count free motions that leave the platform fixed."""
     free = squares == 0.0
     if not free.any():
         return squares, modes, 0
@@ -198,7 +198,7 @@ def _modes(K: NDArray, M: NDArray, rounding: NDArray) -> tuple[NDArray, NDArray]
     Args:
         K: (k, k) stiffness.
         M: (k, k) mass.
-        rounding: (k, k) bound of the rounding errors of M as a quadratic form.
+        rounding: (k, k) bound on the round-off in M, as a quadratic form.
 
     Returns:
         (m,) squared frequencies and (k, m) modes.
@@ -207,7 +207,7 @@ def _modes(K: NDArray, M: NDArray, rounding: NDArray) -> tuple[NDArray, NDArray]
     shift = np.trace(K) / np.trace(M) or 1.0
     values, vectors = np.linalg.eigh(K + shift * M)
     least = shift * np.sum(vectors * (rounding @ vectors), axis=0)
-    # omit motions on which neither a mass nor a spring acts
+    # omit motions that involve neither a mass nor a spring
     kept = values > np.maximum(_NULL * values.max(), least)
     if not kept.any():
         return np.zeros(0), np.zeros((len(K), 0))
@@ -222,7 +222,7 @@ def _modes(K: NDArray, M: NDArray, rounding: NDArray) -> tuple[NDArray, NDArray]
 
 
 def _shares(parts: tuple[Part, ...], springs: NDArray) -> dict[Part, float]:
-    """Return the shares of the elastic energy of a mode, largest first."""
+    """Return the energy share of each part in a mode, largest first."""
     energies: dict[Part, float] = {}
     for part, y in zip(parts, springs, strict=True):
         energies[part] = energies.get(part, 0.0) + float(y) ** 2
@@ -307,7 +307,7 @@ def _ends(
 
 
 def _beam_mass(frame: Frame) -> NDArray:
-    """Return (12, 12) consistent mass: rotations and translations of base and tip."""
+    """Return the (12, 12) consistent mass for motions of base and tip."""
     link = frame.link
     assert isinstance(link, BeamLink)
     assert link.density is not None

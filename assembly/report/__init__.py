@@ -1,4 +1,4 @@
-"""Results of assemblies as text, JSON, tables and figures.
+"""Present assembly results as text, JSON, tables and figures.
 
 Start with ``results.py``.
 """

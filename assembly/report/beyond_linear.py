@@ -1,19 +1,20 @@
-"""Remarks on exact equilibria that differ much from the linear model's solution."""
+"""Remark on exact equilibria that differ strongly from the linear solution."""
 
 import numpy as np
 
 from forcefit.assembly.exact.exact import ExactAssembly
 
-# largest accepted relative difference between exact and linear model: of the platform's
-# motion, and of the energy or potential. Links that rotate by 0.1 rad stay below it
+# largest accepted relative difference between exact and linear model, for the platform
+# motion and for the energy or potential. Link rotations of 0.1 rad cause smaller
+# differences
 _FAR = 0.3
 
 
 def far_from_linear(assembly: ExactAssembly) -> list[str]:
     """Return a remark on a loaded robot that may be beyond a critical load.
 
-    Such an equilibrium may be stable, like a buckled column, so a test of stability
-    does not detect it.
+    Such an equilibrium can be stable, like that of a buckled column, so a stability
+    test does not detect it.
 
     Args:
         assembly: assembly with finite motions.

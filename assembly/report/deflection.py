@@ -1,4 +1,4 @@
-"""A load-deflection curve as plain values, as text and as a figure."""
+"""Load-deflection curves as plain values, as text and as a figure."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Literal
@@ -24,7 +24,7 @@ from forcefit.stiffness.screws import SCREW, WRENCH
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_ROWS = 25  # largest number of rows of the text table
+_ROWS = 25  # largest number of rows in the text table
 
 
 def deflection_of(
@@ -37,23 +37,23 @@ def deflection_of(
     follow: bool = False,
     progress: Progress = lambda what, done, most: None,
 ) -> dict[str, Any]:
-    """Return the results of ``assembly deflection`` as a dictionary of plain values.
+    """Compute the results of ``assembly deflection`` as a dictionary of plain values.
 
     Args:
         posture: posture of the robot.
         component: component of the load that varies, 0 to 5.
-        loads: [N m or N] values of this component in the order of their application.
+        loads: [N m or N] values of this component in the order of application.
         load: (6,) [N m, N] constant part of the load.
         gravity: (3,) [m/s^2] gravity in base axes.
         state: ``"exact"`` for finite motions, ``"contact"`` for small screws.
-        follow: whether the path is followed by arc length past limit points, from the
-            first to the last load. This requires finite motions; clearances are then
-            kept at zero.
-        progress: called with the kind of step, the number of finished steps, and the
-            largest number of steps.
+        follow: whether to follow the path by arc length past limit points, from the
+            first to the last load.  This requires finite motions, and clearances are
+            fixed at zero.
+        progress: function called with the kind of step, the number of completed steps,
+            and the largest number of steps.
 
     Returns:
-        Curve and events; ``status`` is ``"ok"`` or the reason why there is no curve.
+        Curve and events; ``status`` is ``"ok"`` or the reason why no curve was found.
     """
     results: dict[str, Any] = {
         "robot": posture.robot.name, "status": "ok", "pose": posture.pose(),
@@ -76,7 +76,7 @@ def deflection_of(
 
 
 def _curve_values(curve: DeflectionCurve) -> dict[str, Any]:
-    """Return a load-deflection curve as plain values."""
+    """Convert a load-deflection curve to plain values."""
     return {
         "loads": curve.loads,
         "deflection": curve.deflection,
@@ -90,7 +90,7 @@ def _curve_values(curve: DeflectionCurve) -> dict[str, Any]:
 
 
 def deflection_text(results: dict[str, Any]) -> str:
-    """Return a curve as text: a table and the list of events."""
+    """Format a curve as text: a table followed by a list of events."""
     head = listing(results["robot"], lines_of(results, "pose status reason state"))
     if "loads" not in results:
         return head
@@ -119,7 +119,7 @@ def deflection_text(results: dict[str, Any]) -> str:
 
 
 def plot_deflection(results: dict[str, Any]) -> "Figure":
-    """Return a figure of load over deflection, with events marked.
+    """Plot load over deflection, with events marked.
 
     Args:
         results: result of :func:`deflection_of`.

@@ -1,7 +1,7 @@
 """Convex set of possible pose errors of the platform.
 
-Support points in many directions approximate the set from inside; the support function
-in the same directions approximates it from outside.
+The set is approximated from inside by its support points in many directions, and from
+outside by its support function in the same directions.
 """
 
 from dataclasses import dataclass
@@ -27,7 +27,7 @@ class ErrorBody:
         points: (k, 3) [rad or m] points of the set, base axes; vertices of the inner
         faces: (m, 3) row indices of ``points`` for each face; empty for a flat set.
         directions: (k, 3) unit vectors.
-        heights: (k,) [rad or m] certified largest component along each direction.
+        heights: (k,) [rad or m] certified upper bound along each direction.
     """
 
     part: str
@@ -45,12 +45,12 @@ class ErrorBody:
         return float(np.max(self.heights - inner))
 
     def contains(self, error: ArrayLike) -> bool:
-        """Return whether an error (3,) may be in the set; False is a proof."""
+        """Return whether an error (3,) may be in the set; False is certain."""
         return bool(np.all(self.directions @ np.asarray(error) <= self.heights))
 
 
 def possible_errors(assembly: Assembly, part: str, assumption: str) -> ErrorBody:
-    """Return the set of errors of an assembled robot's platform.
+    """Compute the set of possible platform errors of an assembled robot.
 
     Args:
         assembly: assembly at one posture.
@@ -61,8 +61,8 @@ def possible_errors(assembly: Assembly, part: str, assumption: str) -> ErrorBody
         The set of possible errors.
 
     Raises:
-        BadInput: the part is unknown, or the platform moves freely, so its errors have
-            no bound.
+        BadInput: the part is unknown, or the platform moves freely, so that its errors
+            are unbounded.
         SolverFailed: the cone solver failed.
     """
     if part not in PARTS:
@@ -71,14 +71,14 @@ def possible_errors(assembly: Assembly, part: str, assumption: str) -> ErrorBody
     if reach.unbounded(PARTS[part].start):
         raise BadInput(
             f"{assembly.posture.robot.name}: found a free motion of the "
-            f"platform, so its {part} error has no bound; expected a "
+            f"platform, so its {part} error is unbounded; expected a "
             "robot without a free platform motion, or no plot of the error"
         )
     return error_body(reach, part)
 
 
 def error_body(reachable: ReachableSet, part: str, count: int = 200) -> ErrorBody:
-    """Return the set of possible errors, from its support function.
+    """Approximate the set of possible errors by means of its support function.
 
     Args:
         reachable: result of
@@ -87,16 +87,16 @@ def error_body(reachable: ReachableSet, part: str, count: int = 200) -> ErrorBod
         count: number of directions, evenly distributed.
 
     Returns:
-        The set, between its inner and outer approximation.
+        The inner and outer approximation of the set.
 
     Raises:
-        ValueError: the part is unknown or has no bound.
+        ValueError: the part is unknown or unbounded.
         SolverFailed: the cone solver failed.
     """
     if part not in PARTS:
         raise ValueError(f"part is {part!r}, expected 'rotation' or 'translation'")
     if reachable.unbounded(PARTS[part].start):
-        raise ValueError(f"the platform moves freely: its {part} has no bound")
+        raise ValueError(f"the platform moves freely: its {part} is unbounded")
     directions = even_directions(count)
     weights = np.eye(6)[PARTS[part]]
     supports = [reachable.support(d @ weights) for d in directions]
@@ -114,7 +114,7 @@ def _faces(points: NDArray) -> NDArray:
 
 
 def even_directions(count: int) -> NDArray:
-    """Return unit vectors distributed evenly over the sphere along a golden spiral.
+    """Return unit vectors that are evenly distributed along a golden spiral.
 
     Args:
         count: number of vectors.

@@ -1,4 +1,4 @@
-"""Validity of the first-order analysis at a posture; solution with finite motions."""
+"""Check the validity of the first-order analysis against finite motions."""
 
 from typing import Any
 
@@ -15,17 +15,17 @@ from forcefit.assembly.model.statuses import BEYOND_LIMITS, SINGULAR
 from forcefit.assembly.solvers.conic import SolverFailed
 from forcefit.results.display import rounded, screw_text
 
-# relative energy difference to finite motions above which first order is invalid
+# relative energy difference above which the first-order analysis counts as invalid
 MOST_ENERGY = 0.5
-# [rad or lengths] joint motion above which first order counts as invalid; the error of
-# the linear closures is then a tenth
+# [rad or lengths] joint motion above which the first-order analysis counts as invalid;
+# the linear closures are then off by about 10 %
 _LARGE = 0.3
 
 
 def linearisation_of(
     assembly: Assembly, gravity: ArrayLike | None
 ) -> tuple[dict[str, Any], str]:
-    """Return linear minus exact results as values, and the exact solution as text."""
+    """Return the linearisation error as values, and the exact solution as text."""
     try:
         exact = solve_exact(assembly.posture, assembly.load, assembly, gravity=gravity)
     except SolverFailed as error:
@@ -39,9 +39,9 @@ def first_order_status(
     """Return status and reason if the first-order analysis is invalid.
 
     Args:
-        assembly: assembly from the first-order analysis.
-        linearisation: difference from :func:`linearisation_of`.
-        finite: text of the exact solution.
+        assembly: result of the first-order analysis.
+        linearisation: linearisation error from :func:`linearisation_of`.
+        finite: description of the exact solution.
 
     Returns:
         ``status`` and ``reason`` of the public format; empty if the analysis is valid.
@@ -104,7 +104,7 @@ def singular_status(
 
 
 def off_by(change: float) -> str:
-    """Return the reason why first order is invalid: its relative energy error."""
+    """Explain by its energy error that the first-order analysis is invalid."""
     return (
         "the first-order analysis is not valid here: its energy is wrong by "
         f"{100 * abs(change):.3g} %"
@@ -117,7 +117,7 @@ def _singular(posture: Posture) -> bool:
 
 
 def _words(exact: ExactAssembly) -> str:
-    """Return as text the energy and pose error of the finite-motion solution."""
+    """Format the energy and the pose error of the exact solution."""
     return (
         f"{rounded(exact.energy):.6g} J, platform error "
         f"{screw_text(exact.platform_screw)}"

@@ -1,4 +1,4 @@
-"""Effect of the order of joining on the assembled robot, as text and values."""
+"""Effect of the order of the assembly steps on the assembled robot."""
 
 from itertools import takewhile
 from typing import Any
@@ -17,17 +17,17 @@ from forcefit.assembly.steps.state import State
 def influences_among_joins(
     machine: Machine, state: State, plan: Plan, number: int
 ) -> list[Influence]:
-    """Return the influences among consecutive joins that begin with a given step.
+    """Return the mutual influences of consecutive joins, starting at a given step.
 
     Args:
-        machine: columns and rows of the robot.
+        machine: columns and closure rows of the robot.
         state: state before the step.
-        plan: the steps.
+        plan: assembly steps.
         number: index of the step, from 0.
 
     Returns:
         The influences; empty if the step is not the first of consecutive joins, or if
-        clearances are loose.
+        clearances are open.
     """
     before = plan.steps[number - 1] if number else None
     if isinstance(before, Join) or not state.is_linear(machine):
@@ -37,11 +37,11 @@ def influences_among_joins(
 
 
 def about_influences(plan: Plan, found: list[Influence]) -> list[str]:
-    """Return sentences on whether the order matters and which steps move openings.
+    """Describe whether the order of the steps matters and which steps move openings.
 
     Args:
-        plan: the steps.
-        found: influences among the plan's joins.
+        plan: assembly steps.
+        found: influences among the joins of the plan.
 
     Returns:
         The sentences.
@@ -52,19 +52,21 @@ def about_influences(plan: Plan, found: list[Influence]) -> list[str]:
     still = [name for name, steps in moved.items() if not steps]
     if {s.name for s in plan.steps if depends_on_state(s)} == set(still):
         return [
-            "the order of joins next to each other does not change the assembled "
-            f"machine: they do not move what {', '.join(still)} finds (influence "
-            "coefficients zero); it changes the closing forces"
+            "the order of consecutive joins does not change the assembled machine: "
+            f"they do not move the openings found by {', '.join(still)} (zero "
+            "influence coefficients); it changes the closing forces"
         ]
     remarks = [about_order(plan)]
     for name, steps in moved.items():
-        moving = f"{', '.join(steps)} moves it" if steps else "no join next to it does"
-        remarks.append(f"{name} holds an opening as it lies: {moving}")
+        moving = (
+            f"moved by {', '.join(steps)}" if steps else "moved by no adjacent join"
+        )
+        remarks.append(f"{name} fixes an opening in its current position, {moving}")
     return remarks
 
 
 def influence_values(pair: Influence) -> dict[str, Any]:
-    """Return the influence of one join on another as a dictionary of plain values.
+    """Convert the influence between two joins to a dictionary of plain values.
 
     Args:
         pair: influence between the two joins.
@@ -79,17 +81,19 @@ def influence_values(pair: Influence) -> dict[str, Any]:
 
 
 def about_order(plan: Plan) -> str:
-    """Return a sentence on whether the result of a plan depends on the order.
+    """Describe whether the result of a plan depends on the order of its steps.
 
     Args:
-        plan: the steps.
+        plan: assembly steps.
 
     Returns:
         The sentence.
     """
     why = why_order_matters(plan)
     if why:
-        return f"the order matters: these steps hold what they find: {why}"
+        return (
+            f"the order matters: these steps fix parts in their current position: {why}"
+        )
     return (
         "the order does not change the assembled machine, because every part is joined "
         "at a fixed position; it changes the closing forces"

@@ -17,7 +17,7 @@ from forcefit.assembly.kinematics.pure_motions import PureMotion, pure_motions
 from forcefit.results.display import listing
 from forcefit.results.text import lines_of
 
-# ratio of singular values below which a rank counts as uncertain
+# singular value ratio below which a rank counts as uncertain
 CERTAIN = 100.0
 _FREE = ("freedom", "freedoms")
 _OVER = ("over-constraint", "over-constraints")
@@ -29,7 +29,7 @@ _VERBS = {
 
 
 def shown_of(posture: Posture) -> dict[str, Any]:
-    """Return the numbers that ``assembly show`` prints besides the picture.
+    """Return the values that ``assembly show`` prints in addition to the picture.
 
     Args:
         posture: posture of the robot.
@@ -66,8 +66,8 @@ def mobility_of(posture: Posture) -> dict[str, Any]:
 
     Returns:
         The counts of :class:`forcefit.assembly.kinematics.mobility.Mobility`, the
-        platform's motions, and whether there are more freedoms than at nearby postures;
-        then also the counts at the nearby postures.
+        platform motions, and whether there are more degrees of freedom than at nearby
+        postures.  In that case, the counts at the nearby postures are included.
     """
     here = mobility(posture)
     near = mobility_near(posture, here)
@@ -77,14 +77,15 @@ def mobility_of(posture: Posture) -> dict[str, Any]:
     singular = near.freedoms < here.freedoms
     singular |= there.freedoms_drives_locked < here.freedoms_drives_locked
     if singular and near.there is not None:
-        # motions are omitted: several modes of motion may intersect at this posture
+        # motions are omitted, because several operation modes may intersect at this
+        # posture
         counts["near"] = vars(near.there)
     counts |= {"singular": singular, "finite_freedoms": near.freedoms}
     return counts | {"words": mobility_words(counts)}
 
 
 def _motions(posture: Posture) -> list[dict[str, Any]]:
-    """Return the platform's motions as plain values, without meaningless keys."""
+    """Convert platform motions to plain values, without keys that do not apply."""
     screws, error = platform_screws(posture)
     motions = pure_motions(
         screws, posture.platform[:3, 3], size_of(posture.robot), error
@@ -95,7 +96,7 @@ def _motions(posture: Posture) -> list[dict[str, Any]]:
 
 
 def mobility_words(counts: Mapping[str, Any]) -> str:
-    """Return as text the freedoms, platform motions and over-constraints.
+    """Describe degrees of freedom, platform motions and over-constraints.
 
     Args:
         counts: result of :func:`mobility_of`.
@@ -114,7 +115,7 @@ def mobility_words(counts: Mapping[str, Any]) -> str:
 
 
 def motion_words(motions: Sequence[PureMotion]) -> str:
-    """Return the motions of a body as text.
+    """Describe the motions of a body.
 
     Args:
         motions: result of
@@ -142,7 +143,7 @@ def _kind(motion: PureMotion) -> str:
 
 
 def _of_kind(kind: str, motions: Sequence[PureMotion]) -> str:
-    """Return motions of one kind as text; rotations intersect in one point."""
+    """Describe motions of one kind; rotations intersect in one point."""
     along = ", ".join(_direction(motion.direction) for motion in motions)
     text = f"{_VERBS[kind]} {along}"
     first = motions[0]
@@ -154,7 +155,7 @@ def _of_kind(kind: str, motions: Sequence[PureMotion]) -> str:
 
 
 def _direction(d: Any) -> str:
-    """Return a direction as text: the name of a base axis, or the components."""
+    """Format a direction as the name of a base axis or by its components."""
     k = int(np.argmax(np.abs(d)))
     if abs(d[k]) > 1 - 1e-9:
         return "xyz"[k]
@@ -162,24 +163,25 @@ def _direction(d: Any) -> str:
 
 
 def _plain(value: float) -> str:
-    """Return a number with 4 digits as text; rounding errors become 0."""
+    """Format a number with 4 digits; round-off becomes 0."""
     return f"{0.0 if abs(value) < 1e-9 else value:.4g}"
 
 
 def _number(count: int, one: str, many: str) -> str:
-    """Return a count followed by its noun."""
+    """Format a count together with its noun."""
     return f"{count} {one if count == 1 else many}"
 
 
 def mobility_lines(counts: Mapping[str, Any]) -> dict[str, str]:
-    """Return the mobility as lines of text.
+    """Format the mobility as lines of text.
 
     Args:
         counts: result of :func:`mobility_of`.
 
     Returns:
-        Texts by title: always the mobility; only if they occur, freedoms with locked
-        drives, redundant drives, a different mobility nearby, and uncertain counts.
+        Texts by title: the mobility and, where applicable, degrees of freedom with
+            locked drives, redundant drives, a different mobility nearby, and uncertain
+            counts.
     """
     lines = {"mobility": counts["words"]}
     if held := counts["freedoms_drives_locked"]:
@@ -193,13 +195,13 @@ def mobility_lines(counts: Mapping[str, Any]) -> dict[str, str]:
     if not counts["counts_certain"]:
         gap = counts["singular_value_gap"]
         lines["counts not certain"] = (
-            f"singular values that count and that do not differ only by {gap:.3g} times"
+            f"nonzero and zero singular values differ only by a factor of {gap:.3g}"
         )
     return lines
 
 
 def _singular(counts: Mapping[str, Any]) -> str:
-    """Return the mobility near a singular posture as text."""
+    """Describe the mobility near a singular posture."""
     if "near" not in counts:
         finite = _number(counts["finite_freedoms"], *_FREE)
         return f"motions at first order only, {finite} of finite size"

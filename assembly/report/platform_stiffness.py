@@ -1,4 +1,4 @@
-"""The platform's stiffness and the parts' shares of compliance, as values and text."""
+"""Platform stiffness and compliance shares of the parts, as values and text."""
 
 from typing import Any
 
@@ -30,10 +30,10 @@ from forcefit.results.text import lines_of, table_lines, value_text
 from forcefit.stiffness.screws import SCREW, WRENCH
 
 DIRECTIONS = tuple(name.lower() for name in SCREW)
-# words of results, which stay, for the two sides of a contact change
+# names of the two sides of a contact change in results
 _SIDES: dict[Side, str] = {"loading": "holding", "unloading": "letting go"}
 _KINDS = {"link": "links", "joint": "joints", "clearance": "clearances"}
-_SHOWN = 12  # number of parts in table and chart; the sum of other parts is one row
+_SHOWN = 12  # number of parts in table and chart; all others are summed in one row
 
 
 def stiffness_of(
@@ -51,13 +51,12 @@ def stiffness_of(
         posture: posture of the robot.
         load: (6,) [N m, N] load on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] gravity in base axes.
-        at: (3,) [m] point of the platform, in platform axes, to which screws and
-            wrenches refer.
+        at: (3,) [m] reference point of screws and wrenches, in platform axes.
         state: ``"nominal"``, ``"contact"`` or ``"exact"``; the nominal state includes
             the tangent of problem (22) if the robot has clearances.
         length: [m] factor on rotations; None for the length of the longest body.
-        direction: (6,) unit screw in base axes, along which stiffness and shares are
-            computed.
+        direction: (6,) unit screw in base axes, along which stiffness and compliance
+            shares are computed.
 
     Returns:
         The keys of the public format. ``status`` is ``"ok"``, ``"free motion"``,
@@ -91,7 +90,7 @@ def stiffness_of(
 def _tangents(
     posture: Posture, load: Any, gravity: Any, state: State
 ) -> tuple[NDArray, list[PlatformStiffness], list[str] | None]:
-    """Return the platform's pose, the tangents on one or both sides, and remarks."""
+    """Return the platform pose, the tangents on one or both sides, and remarks."""
     if state == "nominal":
         return posture.platform, [without_clearance(posture)], None
     if state == "contact":
@@ -109,7 +108,7 @@ def _tangents(
 
 
 def _along(answer: PlatformStiffness, direction: ArrayLike) -> dict[str, Any]:
-    """Return the platform's stiffness, and the parts' shares, along a given screw."""
+    """Return platform stiffness and compliance shares along a given screw."""
     way = np.asarray(direction, dtype=float)
     free, blocked = answer.along(way)
     return {
@@ -126,7 +125,7 @@ def virtual_clearances(posture: Posture) -> bool:
 def _in_contact(
     posture: Posture, load: Any, gravity: Any, point: NDArray, length: float | None
 ) -> list[dict[str, Any]]:
-    """Return the tangent of problem (22); two if a clearance just touches a bound."""
+    """Return the tangent of (22), or two if a clearance just touches a bound."""
     assembly = solve_assembly(posture, load, gravity=gravity)
     pressed, touching = contacts(assembly)
     sides: list[Side] = ["loading"]
@@ -153,7 +152,7 @@ def _status(stiffness: PlatformStiffness) -> str:
 def stiffness_values(
     platform: PlatformStiffness, point: NDArray, length: float | None = None
 ) -> dict[str, Any]:
-    """Return a stiffness as plain values, NaN or infinite where it is undefined.
+    """Convert a stiffness to plain values, NaN or infinite where undefined.
 
     Args:
         platform: stiffness of the platform at a posture.
@@ -161,7 +160,7 @@ def stiffness_values(
         length: [m] factor on rotations.
 
     Returns:
-        Matrices, free motions, eigenscrews, and shares by direction.
+        Matrices, free motions, eigenscrews, and compliance shares by direction.
     """
     platform = platform.at(point, length)
     eigen = platform.eigen
@@ -204,7 +203,7 @@ def _share_values(stiffness: PlatformStiffness, axis: NDArray) -> dict[str, Any]
 
 
 def share_rows(shares: dict[str, dict[str, Any]]) -> dict[str, list[float]]:
-    """Return each part's shares along the six directions, largest first.
+    """Return the compliance shares of each part along the six axes, largest first.
 
     Args:
         shares: shares from :func:`stiffness_values`.
@@ -227,7 +226,7 @@ def share_rows(shares: dict[str, dict[str, Any]]) -> dict[str, list[float]]:
 
 
 def stiffness_text(results: dict[str, Any]) -> str:
-    """Return a stiffness as text: matrix, eigenstiffnesses, compliant parts."""
+    """Format a stiffness as text: matrix, eigenstiffnesses and compliant parts."""
     about = lines_of(results, "pose status reason")
     lines = [listing(results["robot"], about, results.get("remarks", ()))]
     if "compliance" not in results:
@@ -246,7 +245,7 @@ def stiffness_text(results: dict[str, Any]) -> str:
 
 
 def _state_lines(values: dict[str, Any]) -> list[str]:
-    """Return lines on one state: K, free motions, eigenstiffnesses and centre."""
+    """Format one state: K, free motions, eigenstiffnesses and centre of stiffness."""
     K = np.asarray(values["stiffness"])
     size = np.sqrt(np.abs(np.nan_to_num(np.diag(K))))
     K = np.where(np.abs(K) < 1e-10 * np.outer(size, size), 0.0, K)
@@ -272,7 +271,7 @@ def _state_lines(values: dict[str, Any]) -> list[str]:
 
 
 def _share_lines(shares: dict[str, dict[str, Any]]) -> list[str]:
-    """Return lines on the parts' shares of the compliance in per cent."""
+    """Format the compliance shares of the parts in per cent."""
     rows = {
         name: [rounded(100 * value) for value in row]
         for name, row in largest_rows(share_rows(shares)).items()
@@ -282,7 +281,7 @@ def _share_lines(shares: dict[str, dict[str, Any]]) -> list[str]:
 
 
 def _direction_lines(along: dict[str, Any]) -> list[str]:
-    """Return lines on the stiffness along a direction and the most compliant parts."""
+    """Format the stiffness along a direction, with the most compliant parts."""
     parts = sorted(
         (-share, f"{frame} {kind}")
         for kind, word in _KINDS.items()
@@ -297,13 +296,13 @@ def _direction_lines(along: dict[str, Any]) -> list[str]:
 
 
 def largest_rows(rows: dict[str, list[float]]) -> dict[str, list[float]]:
-    """Return the first rows of shares, and the sum of the other rows.
+    """Return the first rows of shares, and the sum of all others.
 
     Args:
         rows: result of :func:`share_rows`, largest first.
 
     Returns:
-        The rows, unchanged if there are few.
+        The rows, unchanged if there are only a few.
     """
     names = list(rows)
     if len(names) <= _SHOWN + 1:

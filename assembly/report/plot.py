@@ -1,7 +1,4 @@
-"""Plots of the deformed robot, and of the set of possible platform errors.
-
-Each function converts a result to a plotter.
-"""
+"""Plot the deformed robot and the set of possible platform errors."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -46,12 +43,13 @@ def plot_assembly(
     assumption: str = "budget",
     off_screen: bool = True,
 ) -> Any:
-    """Return a plot of an assembled robot, optionally with possible platform errors.
+    """Plot an assembled robot, optionally with its possible platform errors.
 
     Args:
         assembly: assembly of the robot.
-        exaggeration: factor on all displacements; by default a well visible one.
-        errors: ``"translation"`` or ``"rotation"``; None to draw no set of errors.
+        exaggeration: factor on all displacements; by default they are clearly visible.
+        errors: ``"translation"`` or ``"rotation"``, the set of errors to draw; None for
+            none.
         assumption: assumption of problem (27) for the set of errors.
         off_screen: True to open no window when the plotter is shown.
 
@@ -59,7 +57,7 @@ def plot_assembly(
         A pyvista plotter.
 
     Raises:
-        BadInput: the platform moves freely, so its errors have no bound.
+        BadInput: the platform moves freely, so that its errors are unbounded.
         SolverFailed: the cone solver failed for the set of errors.
     """
     plotter = robot_plotter(assembly, exaggeration, off_screen)
@@ -76,13 +74,13 @@ def plot_assembly(
 def robot_plotter(
     assembly: Assembly, exaggeration: float | None = None, off_screen: bool = True
 ) -> Any:
-    """Return a plot of the nominal robot (grey) and the deformed one (coloured).
+    """Plot the nominal robot (grey) and the deformed robot (coloured).
 
     Args:
         assembly: assembly of the robot.
-        exaggeration: factor on all displacements, which the plot displays.  By default
-            the largest displacement is a tenth of the robot's size, and no rotation
-            exceeds 0.5 rad.
+        exaggeration: factor on all displacements, which is displayed in the plot.  By
+            default, it is chosen so that displacements are at most 10 % of the robot's
+            size and rotations at most 0.5 rad.
         off_screen: True to open no window.
 
     Returns:
@@ -91,7 +89,7 @@ def robot_plotter(
     import pyvista
     from vtkmodules.vtkCommonCore import vtkLogger
 
-    # without a display, VTK tries other back ends and reports this on stderr
+    # without a display, VTK tries other back ends and reports so on stderr
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
     bodies = displaced_bodies(assembly)
     size = float(np.ptp(bodies.ends, axis=0).max()) or 1.0
@@ -117,7 +115,7 @@ def add_bodies(
     plotter: Any, assembly: Assembly, bodies: DisplacedBodies, factor: float,
     size: float,
 ) -> None:  # fmt: skip
-    """Add the displaced bodies to a plot, replacing bodies added before.
+    """Add displaced bodies to a plot, replacing those added before.
 
     Args:
         plotter: pyvista plotter.
@@ -139,7 +137,7 @@ def add_bodies(
 
 
 def _drawn_rows(robot: Robot, bodies: DisplacedBodies) -> list[int]:
-    """Return indices of bodies to draw, without short bodies and joint contacts."""
+    """Return the indices of bodies to draw, except short bodies and joint contacts."""
     lengths = np.linalg.norm(bodies.ends - bodies.starts, axis=1)
     contacts = contact_frames(robot)
     return [
@@ -161,8 +159,8 @@ def _add_joint_axes(plotter: Any, posture: Posture, size: float) -> None:
 
 
 def fill_window(plotter: Any) -> None:
-    """Point the camera at the middle of the scene and let the scene fill the window."""
-    # share of the window for the scene; captions are above and below
+    """Centre the scene in the window and make it fill the window."""
+    # fraction of the window used by the scene; captions are above and below
     camera, share = plotter.camera, 0.85
     low, high = np.reshape(plotter.bounds, (3, 2)).T
     corners = np.array([[(low, high)[b][c] for c, b in enumerate(bits)]
@@ -185,7 +183,7 @@ def add_error_body(
         body: set of errors.
         origin: (3,) [m] position of zero error: the platform's nominal origin.
         size: [m] size of the largest error in the plot.
-        assumption: assumption of problem (27), which the caption displays.
+        assumption: assumption of problem (27), shown in the caption.
     """
     import pyvista
 
@@ -205,12 +203,12 @@ def add_error_body(
 
 
 def displaced_bodies(assembly: Assembly, closing: float = 1.0) -> DisplacedBodies:
-    """Return the displacements of all bodies by the small screws along the tree.
+    """Compute the displacements of all bodies from the small screws along the tree.
 
     Args:
         assembly: assembly of a robot of n frames.
-        closing: share of the deformations and of the joints' motions. For 0, the bodies
-            have only their geometric errors, and closures are open.
+        closing: fraction of the deformations and joint motions.  For 0, only geometric
+            errors are applied, and closures are open.
 
     Returns:
         The bodies in the order of the robot's frames.
@@ -233,13 +231,13 @@ def displaced_bodies(assembly: Assembly, closing: float = 1.0) -> DisplacedBodie
 
 
 def finitely_displaced_bodies(assembly: ExactAssembly) -> DisplacedBodies:
-    """Return the displacements of all bodies for finite motions.
+    """Compute the displacements of all bodies for finite motions.
 
     Args:
         assembly: assembly of a robot of n frames with finite motions.
 
     Returns:
-        The bodies, whose ends have the exact displacements; rotations are rotation
+        The bodies with the exact displacements of their ends; rotations are rotation
         vectors.
     """
     posture = assembly.posture
@@ -265,15 +263,15 @@ def body_starts(posture: Posture) -> NDArray:
 
 
 def readable_factor(bodies: DisplacedBodies, size: float) -> float:
-    """Return a factor of 1, 2 or 5 times a power of ten that keeps a plot readable.
+    """Return an exaggeration of 1, 2 or 5 times a power of ten for a readable plot.
 
     Args:
         bodies: bodies with their displacements.
         size: [m] size of the robot.
 
     Returns:
-        The largest exaggeration for which no translation exceeds a tenth of the size,
-        and no rotation 0.5 rad.
+        The largest factor for which no translation exceeds 10 % of the size and no
+        rotation exceeds 0.5 rad.
     """
     shift = float(np.abs(bodies.end_screws[:, 3:]).max())
     turn = float(np.abs(bodies.end_screws[:, :3]).max())
@@ -292,7 +290,8 @@ def _shape(bodies: DisplacedBodies, i: int, factor: float) -> NDArray:
         return np.linspace(a, b, 20)
     bend = rotation_matrix(factor * bodies.bends[i])
     chord = b - a
-    # end slopes are halfway between the chord and the chord rotated by the bending
+    # end slopes lie halfway between the chord and the chord rotated by the bending
+    # angle
     slope_a, slope_b = bend.T @ chord, bend @ chord
     slope_a, slope_b = (chord + slope_a) / 2, (chord + slope_b) / 2
     s = np.linspace(0, 1, 20)[:, None]

@@ -1,8 +1,8 @@
-"""Animation of a robot whose loops close, from open loops to the assembly.
+"""Animate the closing of a robot, from open loops to the assembled state.
 
-In the first picture, the bodies have only their geometric errors, so closures are open.
-The deformations and joint motions of the least-energy solution, problem (22), then
-increase from zero to their values.
+In the first frame, only the geometric errors are applied, so the loops are open.  The
+deformations and joint motions then increase from zero to those of the minimum-energy
+solution, problem (22).
 """
 
 from collections.abc import Iterator
@@ -28,14 +28,15 @@ _WINDOW = (720, 540)  # [pixels] size of a picture
 
 
 def closing_gaps(assembly: Assembly, closing: float) -> NDArray:
-    """Return the translations between the two frames of each closure.
+    """Return the gap between the two frames of each closure.
 
     Args:
         assembly: assembly of a robot with k closures.
-        closing: share of the deformations and of the joints' motions, 0 to 1.
+        closing: fraction of the deformations and joint motions, 0 to 1.
 
     Returns:
-        (k, 3) [m] vector from the first to the second frame, base axes, first order.
+        (k, 3) [m] vectors from the first to the second frame, base axes, to first
+        order.
     """
     robot = assembly.posture.robot
     moved = displaced_bodies(assembly, closing).end_screws[:, 3:]
@@ -46,17 +47,17 @@ def closing_gaps(assembly: Assembly, closing: float) -> NDArray:
 def closing_pictures(
     assembly: Assembly, exaggeration: float | None = None
 ) -> Iterator[tuple[NDArray, int]]:
-    """Yield the pictures of a robot during closing.
+    """Yield the frames of an animation of closing.
 
     Args:
         assembly: assembly of the robot.
-        exaggeration: factor on all displacements; by default a well visible one.
+        exaggeration: factor on all displacements; by default they are clearly visible.
 
     Yields:
         A picture as (rows, columns, 3) values from 0 to 255, and its duration [ms].
 
     Raises:
-        BadInput: no closure is open before closing.
+        BadInput: all closures hold without deformation.
     """
     if not np.any(np.abs(closing_gaps(assembly, 0.0)) > 1e-12):
         raise BadInput(
@@ -88,7 +89,7 @@ def _draw(
     plotter: Any, assembly: Assembly, bodies: DisplacedBodies, factor: float,
     size: float,
 ) -> None:  # fmt: skip
-    """Draw the bodies, and a line between the two frames of each open closure."""
+    """Draw the bodies, with a line between the two frames of each open closure."""
     import pyvista
 
     add_bodies(plotter, assembly, bodies, factor, size)

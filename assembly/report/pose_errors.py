@@ -1,4 +1,4 @@
-"""Results of ``assembly error``: bounds of the largest pose errors, problem (27)."""
+"""Results of ``assembly error``: pose error bounds of problem (27)."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -35,14 +35,14 @@ def pose_error_of(
     gravity: ArrayLike | None = None,
     **options: Any,
 ) -> dict[str, Any]:
-    """Return the results of ``assembly error`` as a dictionary of plain values.
+    """Compute the results of ``assembly error`` as a dictionary of plain values.
 
     Args:
         posture: posture of the robot.
-        assumptions: assumptions of problem (27); by default all, under a load all
-            except ``budget``.
+        assumptions: assumptions of problem (27); by default all, except ``budget``
+            under a load.
         point: (3,) [m] point whose translation is bounded, in platform axes.
-        direction: (6,) direction along which the largest error is also bounded.
+        direction: (6,) direction along which the largest error is bounded as well.
         load: (6,) [N m, N] load on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] gravity in base axes.
         options: options of
@@ -120,7 +120,7 @@ def _bounds(bound: PoseError) -> dict[str, Any]:
 
 
 def _worst_left(posture: Posture, offset: NDArray) -> dict[str, Any]:
-    """Return the pose error bounds over all positions of joints when bolted."""
+    """Return the pose error bounds over all positions in which joints can be bolted."""
     worst = worst_left(posture, offset)
     bounds = {
         part: dict(zip(("lower", "upper"), getattr(worst, part), strict=True))
@@ -133,7 +133,7 @@ def _support(
     assembly: Assembly, assumption: str, offset: NDArray, direction: ArrayLike,
     energy_budget: float = 0.05, **_: float,
 ) -> dict[str, Any]:  # fmt: skip
-    """Return bounds of the largest error along a direction, with its screw."""
+    """Bound the largest error along a direction, and return its screw."""
     reach = reachable_screws(assembly, assumption, energy_budget).at_point(offset)
     support = reach.support(direction)
     if support.height == np.inf:
@@ -143,12 +143,12 @@ def _support(
 
 
 def _bracket(bounds: Sequence[float] | NDArray, screw: NDArray) -> dict[str, Any]:
-    """Return two bounds, and the platform screw that attains the lower one."""
+    """Return both bounds and the platform screw that attains the lower one."""
     return {"lower": bounds[0], "upper": bounds[1], "platform_screw": screw}
 
 
 def pose_error_text(results: dict[str, Any]) -> str:
-    """Return the pose error bounds as text, with one line for each assumption."""
+    """Format the pose error bounds, one line per assumption."""
     lines = lines_of(results, "pose status reason")
     for assumption, bounds in (results["error"] or {}).items():
         if "reason" in bounds:
@@ -173,6 +173,6 @@ def pose_error_text(results: dict[str, Any]) -> str:
 
 
 def _bounds_text(part: str, bounds: dict[str, Any]) -> str:
-    """Return two bounds of a rotation or translation as text."""
+    """Format the bounds on a rotation or translation."""
     low, high = bounds["lower"], bounds["upper"]
     return value_text(f"{part}_error", (low, high) if np.isfinite(high) else high)

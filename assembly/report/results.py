@@ -1,4 +1,4 @@
-"""Results of assemblies as plain values (keys of the public format) and as text."""
+"""Assembly results as plain values (keys of the public format) and as text."""
 
 from collections.abc import Callable
 from typing import Any
@@ -37,11 +37,11 @@ from forcefit.assembly.solvers.conic import SolverFailed
 from forcefit.results.display import listing
 from forcefit.results.text import lines_of, value_text
 
-# numbers of a certificate; they are relative, except the duality gap [J]
+# numbers of a certificate, all relative except the duality gap [J]
 _PROOF = (
     "closure_residual clearance_excess duality_gap relative_gap stationarity iterations"
 )
-# quantities of the margins; clearances suffice up to a margin of 1
+# margins and related quantities; clearances suffice up to a margin of 1
 _ZONE = (
     "zone.assemblable zone.margin zone.assemblable_free zone.margin_free zone.status "
     "zone.reason"
@@ -53,7 +53,7 @@ _UNSTABLE = (
 
 
 def zone_of(posture: Posture) -> dict[str, Any]:
-    """Return the margins, problem (21), for rigid and for free compliant joints."""
+    """Compute the margins of problem (21) for rigid and for free compliant joints."""
     rigid, free = zone_margin(posture, "rigid"), zone_margin(posture, "free")
     unproved_parts = "; ".join(filter(None, (rigid.unproved, free.unproved)))
     return {
@@ -68,7 +68,7 @@ def zone_of(posture: Posture) -> dict[str, Any]:
 
 
 def _finite(value: float) -> float | None:
-    """Return a margin; None if no clearance size allows the robot to assemble."""
+    """Return a margin; None if the robot cannot be assembled with any clearance."""
     return None if np.isinf(value) else value
 
 
@@ -86,7 +86,7 @@ def solution_of(
     load: ArrayLike | None = None,
     gravity: ArrayLike | None = None,
 ) -> dict[str, Any]:
-    """Return the results of ``assembly solve`` as a dictionary of plain values.
+    """Compute the results of ``assembly solve`` as a dictionary of plain values.
 
     Args:
         posture: posture of the robot.
@@ -94,10 +94,10 @@ def solution_of(
         gravity: (3,) [m/s^2] gravity in base axes.
 
     Returns:
-        The keys of the public format.  ``status`` is ``"ok"``; or ``"not proved"``,
-        with the solution, and with the gap of its certificate as ``reason``; or
-        ``"singular"``, with the invalid first-order solution, and with the solution for
-        finite motions in ``reason``; or the kind of failure, without a solution.
+        The keys of the public format.  ``status`` is ``"ok"``; ``"not proved"``, in
+        which case ``reason`` states the gap of the certificate; ``"singular"``, in
+        which case the first-order solution is invalid and ``reason`` describes the
+        solution with finite motions; or the kind of failure, without a solution.
     """
     robot = posture.robot
     names = [f.name for f in robot.frames]
@@ -164,7 +164,7 @@ def _assembly_results(assembly: Assembly, bound: ScrewBound) -> dict[str, Any]:
 
 
 def _screws_and_wrenches(assembly: Assembly | ExactAssembly) -> dict[str, Any]:
-    """Return energy, pose error, and screws and wrenches of all frames and closures."""
+    """Return energy and pose error, with screws and wrenches of frames and closures."""
     robot = assembly.posture.robot
     frames = {
         f.name: {
@@ -200,7 +200,7 @@ def exact_of(
     gravity: ArrayLike | None = None,
     progress: Callable[[int, int], None] = lambda done, most: None,
 ) -> dict[str, Any]:
-    """Return the results of ``assembly solve --state exact`` as plain values.
+    """Compute the results of ``assembly solve --state exact`` as plain values.
 
     Args:
         posture: posture of the robot.
@@ -244,7 +244,7 @@ def exact_of(
 
 
 def exact_text(results: dict[str, Any]) -> str:
-    """Return an exact solution as text."""
+    """Format an exact solution as text."""
     return listing(
         results["robot"],
         lines_of(results, "pose")
@@ -263,7 +263,7 @@ def _joint_frames(robot: Robot) -> dict[str, dict[str, str]]:
 
 
 def solution_text(results: dict[str, Any]) -> str:
-    """Return a solution as text.
+    """Format a solution as text.
 
     Args:
         results: result of :func:`solution_of`.
@@ -287,7 +287,7 @@ def solution_text(results: dict[str, Any]) -> str:
 
 
 def _linearisation_lines(results: dict[str, Any]) -> dict[str, str]:
-    """Return lines of text on the linearisation error, linear minus exact."""
+    """Format the linearisation error, linear minus exact."""
     error = results.get("linearisation_error", {})
     if "rotation" not in error:
         words = "linearisation error"
@@ -296,8 +296,8 @@ def _linearisation_lines(results: dict[str, Any]) -> dict[str, str]:
         f"linearisation_{part}": float(np.linalg.norm(error[part]))
         for part in ("rotation", "translation")
     } | {"linearisation_energy": error["relative_energy"]}
-    # differences of equal solutions are rounding errors: 1e-12 rad, 1e-15 m, and 1e-11
-    # of the energy
+    # identical solutions differ by round-off: 1e-12 rad, 1e-15 m, and 1e-11 of the
+    # energy
     least = (1e-12, 1e-15, 1e-11)
     for name, small in zip(sizes, least, strict=True):
         sizes[name] = sizes[name] if abs(sizes[name]) >= small else 0.0
@@ -305,7 +305,7 @@ def _linearisation_lines(results: dict[str, Any]) -> dict[str, str]:
 
 
 def _bound_lines(results: dict[str, Any]) -> dict[str, str]:
-    """Return lines on the bound of the screw's error, and on undetermined motions."""
+    """Format the error bound on the screw, and undetermined motions."""
     bound, largest = results["certificate"], results["worst_error"]
     lines = lines_of(bound, "screw_rotation_error screw_translation_error")
     if (
@@ -322,20 +322,20 @@ def _bound_lines(results: dict[str, Any]) -> dict[str, str]:
 
 
 def status_line(results: dict[str, Any]) -> str:
-    """Return a line with a result's status and reason, unless the status is ok."""
+    """Format status and reason of a result, unless the status is ok."""
     status, reason = results["status"], results["reason"]
     return reason if reason.startswith(status) else f"{status}: {reason}"
 
 
 def worst(assembly: Assembly) -> dict[str, Any] | None:
-    """Return certified bounds of the largest pose error for the assumption ``frozen``.
+    """Compute certified pose error bounds under the assumption ``frozen``.
 
     Args:
-        assembly: the least-energy solution.
+        assembly: minimum-energy assembly.
 
     Returns:
-        Upper bounds ``rotation`` [rad] and ``translation`` [m]; None if there is no
-        proof.
+        Upper bounds ``rotation`` [rad] and ``translation`` [m]; None if they are
+        unproved.
     """
     try:
         bound = bound_pose_error(assembly, "frozen")

@@ -23,21 +23,21 @@ from forcefit.page.charts import scene
 from forcefit.results.units import shown_in
 from forcefit.stiffness.screws import skew
 
-# number of points along a body, sufficient for the cubic shape of a bent beam
+# number of points along a body, which resolves the cubic shape of a bent beam
 _SAMPLES = 9
 
 
 def robot_scene(
     assembly: Assembly, closing: NDArray | None, body: ErrorBody | None, caption: str
 ) -> str:
-    """Return the nominal and the assembled robot as HTML.
+    """Return an HTML scene of the nominal and the assembled robot.
 
-    Displacements are small screws, linear in the exaggeration; a bent link is a cubic
+    Displacements are linear in the exaggeration, and a bent link is drawn as a cubic
     curve.
 
     Args:
         assembly: assembly of a robot of n frames.
-        closing: (k, n, 4, 4) poses of the frames in a simulated closing, or None.
+        closing: (k, n, 4, 4) frame poses during a simulated closing, or None.
         body: set of possible platform errors, or None.
         caption: text below the figure.
 
@@ -62,7 +62,7 @@ def forced_scene(
 def exact_scene(assembly: ExactAssembly) -> dict[str, Any]:
     """Return the data of a scene of an assembly with finite motions.
 
-    Small displacements are exaggerated, large ones are drawn to scale.
+    Small displacements are exaggerated, whereas large ones are drawn to scale.
     """
     bodies = finitely_displaced_bodies(assembly)
     forces = _forces(assembly, assembly.transforms)
@@ -75,7 +75,7 @@ def exact_scene(assembly: ExactAssembly) -> dict[str, Any]:
 
 
 def nominal_scene(posture: Posture) -> dict[str, Any]:
-    """Return the data of a scene of a robot without errors, clearances and loads."""
+    """Return the data of a scene of the nominal robot, without errors and loads."""
     still = np.zeros((len(posture.robot.frames), 6))
     bodies = DisplacedBodies(
         body_starts(posture), posture.transforms[:, :3, 3], still, still, still[:, :3]
@@ -110,7 +110,7 @@ def _spec(
 
 
 def _body(robot: Robot, bodies: DisplacedBodies, i: int) -> dict[str, Any]:
-    """Return the data of a body: points along it, their displacements, its joint."""
+    """Return the data of a body: its points, their displacements, and its joint."""
     frame, parent = robot.frames[i], int(robot.parents[i])
     start, end = bodies.starts[i], bodies.ends[i]
     s = np.linspace(0.0, 1.0, _SAMPLES)[:, None]
@@ -125,12 +125,12 @@ def _body(robot: Robot, bodies: DisplacedBodies, i: int) -> dict[str, Any]:
 
 
 def _moved(bodies: DisplacedBodies, i: int, s: NDArray) -> NDArray:
-    """Return displacements (k, 3) [m] along a body: a cubic from its end rotations."""
+    """Return (k, 3) [m] displacements along a body, as a cubic curve."""
     chord = bodies.ends[i] - bodies.starts[i]
     a, b = bodies.start_screws[i, 3:], bodies.end_screws[i, 3:]
     if not np.any(bodies.bends[i]):
         return a + s * (b - a)
-    # exact for a cantilever loaded at its end, whose deflection is a cubic
+    # exact for a cantilever loaded at its end, whose deflection is cubic
     turn = bodies.start_screws[i, :3]
     slope_a, slope_b = skew(turn) @ chord, skew(turn + bodies.bends[i]) @ chord
     return (
@@ -156,7 +156,7 @@ def _forces(
 
 
 def _error_body(body: ErrorBody, origin: NDArray) -> dict[str, Any]:
-    """Return the set of possible platform errors, with its origin, as plain values."""
+    """Convert the set of possible platform errors to plain values, with its origin."""
     sizes = np.linalg.norm(body.points, axis=1)
     shown = shown_in("m", float(sizes.max(initial=0.0)))
     text = f"possible platform errors, up to {sizes.max() * shown.factor:.4g}"

@@ -1,4 +1,4 @@
-"""The scene of a page, drawn as a matplotlib figure."""
+"""Draw the scene of a page as a matplotlib figure."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -17,7 +17,7 @@ _ELEVATION, _AZIMUTH = 22.0, -62.0  # [deg] view from the front right, from abov
 
 
 def scene_figure(spec: Mapping[str, Any], title: str) -> "Figure":
-    """Return a three-dimensional figure of a nominal, or nominal and forced, robot.
+    """Draw a robot in three dimensions, nominal or both nominal and forced.
 
     Args:
         spec: data from :mod:`forcefit.assembly.report.scene`, in SI units.
@@ -64,14 +64,14 @@ def scene_figure(spec: Mapping[str, Any], title: str) -> "Figure":
 
 
 def _moved(body: Mapping[str, Any], factor: float, scale: float) -> NDArray:
-    """Return points (k, 3) along a displaced body, in the displayed unit."""
+    """Return (k, 3) points along a displaced body, in the displayed unit."""
     return np.asarray(scale * (body["nominal"] + factor * body["moved"]))
 
 
 def _draw(
     axes: Any, lines: Sequence[NDArray], name: str, color: str, width: float
 ) -> None:
-    """Draw lines with one common name in the legend."""
+    """Draw lines that share one legend entry."""
     gap = np.full((1, 3), np.nan)
     if lines:
         points = np.concatenate([part for line in lines for part in (line, gap)])
@@ -81,7 +81,7 @@ def _draw(
 def _draw_errors(
     axes: Any, body: Mapping[str, Any], factor: float, scale: float
 ) -> None:
-    """Draw the possible errors around the platform's origin, equally exaggerated."""
+    """Draw the possible errors at the platform's origin, with the same exaggeration."""
     points = scale * (body["origin"] + factor * body["points"])
     look = {"color": _GOLD, "label": plot_label(body["text"])}
     if len(body["faces"]):

@@ -1,4 +1,4 @@
-"""Pictures of the parts' shares of the platform's compliance."""
+"""Charts of the compliance shares of the parts."""
 
 from collections.abc import Mapping
 from itertools import cycle
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def plot_shares(results: Mapping[str, Any], figure: "Figure | None" = None) -> "Figure":
-    """Return a bar chart of the parts' shares of the compliance in each direction.
+    """Draw a bar chart of the compliance shares of the parts in each direction.
 
     Args:
         results: result of
@@ -47,7 +47,7 @@ def plot_shares(results: Mapping[str, Any], figure: "Figure | None" = None) -> "
 
 
 def share_chart(shares: Mapping[str, Any], caption: str) -> str:
-    """Return an HTML chart of the largest shares, with one bar per direction.
+    """Return an HTML chart of the largest compliance shares, one bar per direction.
 
     Args:
         shares: shares from
@@ -67,7 +67,7 @@ def share_chart(shares: Mapping[str, Any], caption: str) -> str:
 
 
 def _coloured(shares: Mapping[str, Any]) -> dict[str, tuple[list[float], str]]:
-    """Return the largest shares with colours; the sum of the others is grey."""
+    """Assign colours to the largest shares; the sum of all others is grey."""
     rows = share_rows(dict(shares))
     shown = largest_rows(rows).items()
     return {

@@ -1,4 +1,4 @@
-"""Pictures of robots and results: interactive in a notebook, otherwise matplotlib."""
+"""Show robots and results, interactively in a notebook and otherwise by matplotlib."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -22,9 +22,9 @@ if TYPE_CHECKING:
 
 Shown = Robot | Posture | Assembly | ExactAssembly | PlatformStiffness
 _NOMINAL = "Red: elastic links; blue: rigid bodies; orange: driven joints."
-_FORCED = f"Nominal (grey) and forced robot of least energy. {_NOMINAL}"
+_FORCED = f"Nominal (grey) and forced minimum-energy robot. {_NOMINAL}"
 _EXACT = f"Nominal (grey) and forced robot with finite motions. {_NOMINAL}"
-_SHARES = "Shares of the parts in the compliance of the platform along each axis."
+_SHARES = "Compliance shares of the parts along each axis of the platform."
 
 
 def show(
@@ -34,30 +34,29 @@ def show(
     assumption: str = "frozen",
     interactive: bool | None = None,
 ) -> "Picture | Figure":
-    """Return a picture of a robot, or of a result at one point.
+    """Show a robot, or a result at one point.
 
     Args:
-        thing: object to draw. A robot is drawn in its home pose. A posture is drawn
-            without errors. An assembly is drawn nominal and forced, with exaggerated
-            displacements. An assembly with finite motions is also drawn nominal and
-            forced, but large displacements are to scale. For a platform stiffness, the
-            shares of its parts are drawn.
-        errors: ``"translation"`` or ``"rotation"`` to add the possible platform errors
+        thing: object to draw.  A robot is drawn in its home pose, and a posture without
+            errors.  An assembly is drawn nominal and forced, with exaggerated
+            displacements; with finite motions, large displacements are drawn to scale.
+            For a platform stiffness, the compliance shares of its parts are drawn.
+        errors: ``"translation"`` or ``"rotation"``, to add the possible platform errors
             within the clearances to an assembly.
         assumption: assumption of problem (27) for these errors: ``"frozen"``,
             ``"free"`` or ``"budget"``.
-        interactive: True for an interactive scene, which a notebook displays and a
-            browser opens (attribute ``html``); False for a matplotlib figure; None for
-            a scene in a notebook and a figure elsewhere.
+        interactive: True for an interactive scene, which is displayed by a notebook or
+            opened in a browser (attribute ``html``); False for a matplotlib figure;
+            None for a scene in a notebook and a figure elsewhere.
 
     Returns:
         The scene; or the figure, which is not displayed: ``savefig`` writes it, and
         ``pyplot.show()`` opens a window.
 
     Raises:
-        BadInput: the object has another type or many points; errors are requested for
-            something else than an assembly, or for one with a free motion; or
-            matplotlib is not installed.
+        BadInput: the object is of an unsupported type or has many points; errors are
+            requested for an object other than an assembly, or for one with a free
+            motion; or matplotlib is not installed.
         SolverFailed: the cone solver failed for the errors.
     """
     if interactive is None:
@@ -102,7 +101,7 @@ def _scene(
 
 
 def _shares(stiffness: PlatformStiffness, interactive: bool) -> "Picture | Figure":
-    """Return a picture of the parts' shares of the compliance."""
+    """Show the compliance shares of the parts."""
     shares = stiffness_values(stiffness, stiffness.point)["shares"]
     name = stiffness.posture.robot.name
     if interactive:

@@ -1,4 +1,4 @@
-"""HTML page of assembly in steps, with the machine after each step."""
+"""HTML page on stepwise assembly, with the machine after each step."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -20,8 +20,8 @@ from forcefit.page.tables import Cell, Column, Value, rotation_and_translation, 
 _ASSUMED = (
     "Small screws at one pose: every step is linear, contacts of clearances excepted.",
     "No friction, no yield; each step ends at rest.",
-    "Where no force determines a position in a clearance, it stays as close as "
-    "possible to where the last step left it.",
+    "Clearances without force stay as close as possible to their position after the "
+    "previous step.",
 )
 _UNITS = {"force": "N", "energy": "J", "error": "m"}
 
@@ -30,7 +30,7 @@ def steps_page(
     results: Mapping[str, Any], machine: Machine, states: Sequence[State],
     provenance: Provenance,
 ) -> str:  # fmt: skip
-    """Return the page of a plan that was carried out as HTML.
+    """Create the HTML page of a plan that was carried out.
 
     Args:
         results: result of :func:`forcefit.assembly.report.steps.steps_of`.
@@ -39,7 +39,7 @@ def steps_page(
         provenance: the command and its input files.
 
     Returns:
-        HTML that refers to no other file.
+        Self-contained HTML.
     """
     done = results["status"] == "ok"
     return page(
@@ -63,7 +63,7 @@ def steps_page(
 
 
 def _verdict(results: Mapping[str, Any]) -> str:
-    """Return a sentence on whether all steps are carried out, and the first remark."""
+    """State whether all steps are carried out, followed by the first remark."""
     verdict = results.get("reason", "")
     if results["status"] == "ok":
         verdict = f"All {len(results['steps'])} steps are carried out"
@@ -74,7 +74,7 @@ def _verdict(results: Mapping[str, Any]) -> str:
 
 
 def _good(results: Mapping[str, Any]) -> bool | None:
-    """Return True if all steps succeed; None if one exceeds its force limit."""
+    """Return True if all steps succeed, or None if one exceeds its force limit."""
     if results["status"] != "ok":
         return False
     return None if any(step.get("exceeded") for step in results["steps"]) else True
@@ -131,7 +131,7 @@ def _charts(results: Mapping[str, Any]) -> str:
 
 
 def _scene(machine: Machine, states: Sequence[State]) -> str:
-    """Return a scene in which the reader selects the state after a step, as HTML."""
+    """Return an HTML scene in which the reader selects the state after a step."""
     assemblies = [assembly_of(machine, state) for state in states]
     closing = np.repeat(machine.posture.transforms[None], len(states), axis=0)
     for transforms, assembly in zip(closing, assemblies, strict=True):
@@ -144,15 +144,15 @@ def _scene(machine: Machine, states: Sequence[State]) -> str:
 
 
 def assembly_of(machine: Machine, state: State) -> Assembly:
-    """Return the displacements of one partly assembled machine as an assembly.
+    """Convert the state of a partly assembled machine to an assembly.
 
     Args:
-        machine: columns and rows of the robot.
+        machine: columns and closure rows of the robot.
         state: state of one machine.
 
     Returns:
-        The screws, with open closures where none is joined yet.  The wrenches are those
-        of the joined closures.
+        The assembly, in which closures that are not yet joined are open and carry no
+        wrench.
     """
     posture, found = machine.posture, state.found
     robot = posture.robot.with_errors(state.errors[0].reshape(-1, 6))
@@ -175,13 +175,13 @@ def assembly_of(machine: Machine, state: State) -> Assembly:
 
 
 def _order(results: Mapping[str, Any]) -> str:
-    """Return a paragraph on the search for an order; empty without a search."""
+    """Return a paragraph on the search for the best order; empty without a search."""
     order = results.get("order")
     if order is None:
         return ""
     unit = _UNITS[order["objective"]]
     parts: list[str | Value] = [
-        f"Least {order['objective']}: ", Value(order["value"], unit),
+        f"Minimum {order['objective']}: ", Value(order["value"], unit),
         "; in any order at least ", Value(order["bound"], unit),
     ]  # fmt: skip
     if order["given"] is not None:

@@ -29,7 +29,7 @@ def vibration_of(
     gravity: ArrayLike | None = None,
     state: Literal["nominal", "exact"] = "nominal",
 ) -> dict[str, Any]:
-    """Return the results of ``assembly frequencies`` as a dictionary of plain values.
+    """Compute the results of ``assembly frequencies`` as a dictionary of plain values.
 
     Args:
         posture: posture of the robot.
@@ -78,7 +78,7 @@ def vibration_of(
 
 
 def vibration_text(results: dict[str, Any]) -> str:
-    """Return the frequencies as text, with the parts that deform most."""
+    """Format the frequencies as text, with the parts that deform most."""
     about = lines_of(results, "pose status reason state idle_motions")
     lines = [listing(results["robot"], about, results["remarks"])]
     for mode in results.get("modes", ()):
@@ -89,7 +89,7 @@ def vibration_text(results: dict[str, Any]) -> str:
 
 
 def _free(mode: dict[str, Any]) -> str:
-    """Return a free motion as text: a platform screw of 1 rad or 1 m."""
+    """Describe a free motion by a platform screw of 1 rad or 1 m."""
     screw = np.asarray(mode["platform_screw"])
     turn, shift = np.linalg.norm(screw[:3]), np.linalg.norm(screw[3:])
     unit = screw / (turn if turn > 1e-6 * shift else shift or 1.0)

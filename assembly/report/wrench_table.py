@@ -1,4 +1,4 @@
-"""Tables of wrenches as text with aligned columns, in SI units."""
+"""Format tables of wrenches as text with aligned columns, in SI units."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -13,7 +13,7 @@ from forcefit.stiffness.screws import WRENCH
 _HEAD = tuple(f"{name} [{'N m' if name[0] == 'M' else 'N'}]" for name in WRENCH)
 
 
-# first words of frame names that belong to a joint, following the joint's name
+# suffixes of frame names that belong to a joint, after the name of the joint
 _OF_JOINT = {
     "first", "second", "third", "turn", "slide", "slide_x", "slide_y"
 }  # fmt: skip
@@ -22,19 +22,19 @@ _OF_JOINT = {
 def wrench_lines(
     frames: Mapping[str, Any], closures: Sequence[Any], joints: Mapping[str, str]
 ) -> list[str]:
-    """Return the wrenches through all frames and closures as lines of text.
+    """Format the wrenches through all frames and closures as lines of text.
 
-    A joint that consists of several frames has one row, at the joint's point in its
-    axes, because the wrench through its other frames is the same.  For the same reason,
-    the last frame of a joint that closes a loop has no row, and the table of closures
-    names the joint.  The contacts of a clearance have no row: together they carry the
-    wrench through their joint.
+    A joint that consists of several frames has a single row, at the point of the joint
+    in its axes, because the wrench through its other frames is the same.  For the same
+    reason, the last frame of a joint that closes a loop has no row, and the joint is
+    named in the table of closures.  Contacts of a clearance have no row, because
+    together they carry the wrench through their joint.
 
     Args:
         frames: wrenches by frame, from
             :func:`forcefit.assembly.report.results.solution_of`.
         closures: wrenches of the closures from the same function.
-        joints: for each joint of several frames, the frame that has its point and axes.
+        joints: for each joint of several frames, the frame with its point and axes.
 
     Returns:
         Lines with one table for each kind of wrench.
@@ -66,7 +66,7 @@ def wrench_lines(
 
 
 def _shown(name: str, joints: Mapping[str, str]) -> str:
-    """Return a frame's name in the table; empty for further frames of a joint."""
+    """Return the name of a frame in the table; empty for frames without a row."""
     for joint, main in joints.items():
         if name == main:
             return joint

@@ -1,6 +1,7 @@
-"""Built-in robots: each module defines one robot and its parameters.
+"""Built-in robots; each module defines one robot and its parameters.
 
-Start with ``five_bar.py``, a short one.  ``placing.py`` creates frames from home poses.
+Start with ``five_bar.py``, a short example.  ``placing.py`` creates frames from their
+home poses.
 """
 
 import os
@@ -32,21 +33,20 @@ BUILT_IN: dict[str, Callable[[], Robot]] = {
 
 
 def load_robot(name: str | Path, close: Closing | None = None) -> Robot:
-    """Return a built-in robot by its name, or the robot of a file.
+    """Load a built-in robot by its name, or a robot from a file.
 
     Args:
         name: name such as ``"irsbot2"``, or the path of a robot file.
-        close: function that makes the closures of the declared robot hold, from
-            :mod:`forcefit.assembly.kinematics.closing`; by default they are not
-            changed.
+        close: function from :mod:`forcefit.assembly.kinematics.closing` that closes the
+            loops of the declared robot; by default they are unchanged.
 
     Returns:
         The robot.  Meshes and libraries of its links are read only by
         :func:`forcefit.assembly.exchange.robot_files.load_robot`.
 
     Raises:
-        BadInput: the name is neither a built-in name nor a file, or the file violates a
-            rule.
+        BadInput: the name is neither that of a built-in robot nor a file, or the file
+            is invalid.
     """
     if str(name) in BUILT_IN:
         robot = BUILT_IN[str(name)]()

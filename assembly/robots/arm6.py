@@ -1,15 +1,16 @@
-"""A serial arm of six axes: the PUMA 560.
+"""Six-axis serial arm: the PUMA 560.
 
-The arm has no closure, and therefore no internal forces: errors and clearances add up
-along the arm.  Under a load on the flange, two parts deform: the drives, whose
-compliance at the flange is J K^-1 J^T, and the two long bodies, which bend.
+The arm has no closure and therefore no internal forces: errors and clearances add up
+along the arm.  Under a load on the flange, the drives deform, whose compliance at the
+flange is J K^-1 J^T, and the two long bodies bend.
 
 Sources:
     Corke, Armstrong-Helouvry (1994), A search for consensus among model parameters
     reported for the PUMA 560 robot, IEEE ICRA: the kinematic parameters, standard
     Denavit-Hartenberg.  Armstrong, Khatib, Burdick (1986), The explicit dynamic model
     and inertial parameters of the PUMA 560 arm, IEEE ICRA: the masses.  Corke (2011),
-    Robotics, Vision and Control, chapter 7: the home angles, his "nominal" posture.
+    Robotics, Vision and Control, chapter 7: the home angles, called the "nominal"
+        posture.
     Drives, sections and clearances are round numbers.
 """
 
@@ -51,7 +52,7 @@ def arm6(parameters: Arm6Parameters | None = None) -> Robot:
     """Return the arm at its home posture.
 
     Args:
-        parameters: parameters of the arm; by default those above.
+        parameters: parameters of the arm; by default those of :class:`Arm6Parameters`.
 
     Returns:
         The arm with 7 frames and no closure; platform ``flange``.  A joint's coordinate
@@ -79,5 +80,5 @@ def arm6(parameters: Arm6Parameters | None = None) -> Robot:
 
 
 def after_joint(d: float, a: float, alpha: float) -> NDArray:
-    """Return the (4, 4) transform from a joint to the next at joint angle zero."""
+    """Return the (4, 4) transform from one joint to the next at zero joint angle."""
     return transform([a, 0.0, d], rotation_matrix([alpha, 0.0, 0.0]))

@@ -1,9 +1,8 @@
-"""Clavel's Delta, R-(SS)2: each of three driven arms moves the platform by two rods.
+"""Clavel's Delta robot, R-(SS)2: three driven arms move the platform by pairs of rods.
 
-The rods between ball joints can spin about their own axes, and each spin is a degree of
-freedom.  The robot has 9 degrees of freedom: 3 of the platform and 6 of the rods.  The
-six rods constrain the platform exactly, so geometric errors move it without elastic
-energy.
+The rods between ball joints can spin about their own axes, so the robot has 9 degrees
+of freedom: 3 of the platform and 6 spins of the rods.  The six rods constrain the
+platform exactly, so geometric errors move it without elastic energy.
 
 Sources:
     Williams, The Delta parallel robot: kinematics solutions, Ohio University (2016):
@@ -30,9 +29,9 @@ AZIMUTHS = (-math.pi / 2, math.pi / 6, 5 * math.pi / 6)  # [rad] directions of t
 class DeltaParameters:
     """Parameters of the Delta robot [m, N m/rad]; the rods are carbon fibre tubes."""
 
-    # side of the base's triangle; the drives are in the middle of its sides
+    # side of the base triangle; the drives are in the middle of its sides
     base_side: float = 0.567
-    # side of the platform's triangle, with the rods at its corners
+    # side of the platform triangle, with the rods at its corners
     platform_side: float = 0.076
     arm: float = 0.524
     rod: float = 1.244
@@ -62,14 +61,15 @@ def delta(parameters: DeltaParameters | None = None) -> Robot:
     """Return the robot at its home pose, on its vertical axis.
 
     Args:
-        parameters: parameters of the robot; by default those above.
+        parameters: parameters of the robot; by default those of
+            :class:`DeltaParameters`.
 
     Returns:
-        The robot with 48 frames and 5 closures; platform ``leg1.a_tip``.  A drive's
-        coordinate is its arm's angle below the base's plane.
+        The robot with 48 frames and 5 closures; platform ``leg1.a_tip``.  The
+        coordinate of a drive is the angle of its arm below the base plane.
 
     Raises:
-        BadInput: the robot does not reach the home pose.
+        BadInput: the home pose is out of reach.
     """
     P = parameters or DeltaParameters()
     angle = drive_angle(P, AZIMUTHS[0], np.array([0.0, 0.0, P.home]))
@@ -85,7 +85,7 @@ def delta(parameters: DeltaParameters | None = None) -> Robot:
 def drive_angle(
     parameters: DeltaParameters, azimuth: float, position: NDArray
 ) -> float:
-    """Return the angle of one arm below the base's plane, elbow outward.
+    """Return the angle of one arm below the base plane, elbow outward.
 
     Args:
         parameters: parameters of the robot.
@@ -96,11 +96,11 @@ def drive_angle(
         [rad] coordinate of the drive.
 
     Raises:
-        BadInput: the leg does not reach the position.
+        BadInput: the position is out of reach.
     """
     P = parameters
     out, across = _radial(azimuth)
-    # vector in the leg's plane, from the drive to the platform's end of the rods
+    # vector in the plane of the leg, from the drive to the platform end of the rods
     x = position @ out + P.platform_radius - P.base_radius
     z = -position[2]
     reach = math.hypot(x, z)

@@ -1,9 +1,9 @@
-"""A planar five-bar robot, 5R: two driven arms, and two arms joined by a pin.
+"""Planar five-bar robot, 5R: two driven arms, and two arms joined by a pin.
 
 Sources:
     Campos, Bourbonnais, Bonev, Bigras (2010), Development of a five-bar parallel robot
-    with large workspace, ASME IDETC: size of DexTAR, whose four arms are also equal.
-    The dimensions here are round numbers; sections and clearances are typical.
+    with large workspace, ASME IDETC: size of DexTAR, whose four arms are also of equal
+        length.  Dimensions are rounded; sections and clearances are typical values.
 """
 
 from dataclasses import dataclass
@@ -35,15 +35,16 @@ def five_bar(parameters: FiveBarParameters | None = None) -> Robot:
     """Return the robot at its home pose, both elbows outward.
 
     Args:
-        parameters: parameters of the robot; by default those above.
+        parameters: parameters of the robot; by default those of
+            :class:`FiveBarParameters`.
 
     Returns:
         The robot with 9 frames and 1 closure.  The platform ``left.tip`` is on the
-        right leg's second arm, beyond the pin.  A drive's coordinate is its arm's angle
-        to the x axis.
+        second arm of the right leg, beyond the pin.  The coordinate of a drive is the
+        angle between its arm and the x axis.
 
     Raises:
-        BadInput: the robot does not reach the home pose.
+        BadInput: the home pose is out of reach.
     """
     P = parameters or FiveBarParameters()
     tip = np.array(P.home)

@@ -1,18 +1,18 @@
-"""Hoeken's linkage: a planar four-bar linkage that draws a straight line.
+"""Hoeken's linkage: a planar four-bar linkage that traces a straight line.
 
-In units of the crank, ground and coupler and rocker have lengths 2, 2.5 and 2.5.  The
-tracing point is as far beyond the coupler's pin as the coupler is long.  Crank pin,
-rocker's foot and tracing point are on a circle about the coupler's middle pin (Thales),
-so the lines from the foot to the other two are perpendicular, and
+In units of the crank length, ground link, coupler and rocker have the lengths 2, 2.5
+and 2.5.  The tracing point extends beyond the coupler pin by the length of the coupler.
+Crank pin, rocker foot and tracing point lie on a circle about the coupler pin (Thales),
+so the lines from the foot to the other two points are perpendicular, and
 
     P = [2, 0] + 2 sqrt((5 + cos t) / (5 - 4 cos t)) [sin t, 2 - cos t],
 
-where t is the crank's angle to the ground link.  The point is exactly at height 4 for t
-= 90, 180 and 270 degrees.
+where t is the angle between crank and ground link.  The point is exactly at height 4
+for t = 90, 180 and 270 degrees.
 
 Sources:
     Norton, Design of Machinery, chapter 3, Hoeken's linkage: the proportions.  Size,
-    sections and clearances are round numbers, of the size of a bench-top machine.
+    sections and clearances are rounded values typical of a bench-top machine.
 """
 
 import math
@@ -44,11 +44,13 @@ def four_bar(parameters: FourBarParameters | None = None) -> Robot:
     """Return the linkage at its home angle.
 
     Args:
-        parameters: parameters of the linkage; by default those above.
+        parameters: parameters of the linkage; by default those of
+            :class:`FourBarParameters`.
 
     Returns:
-        The linkage with 8 frames and 1 closure; the platform ``point`` is the tracing
-        point.  ``crank`` is driven; its coordinate is the angle to the ground link.
+        The linkage with 8 frames and 1 closure.  The platform ``point`` is the tracing
+        point.  The coordinate of the driven joint ``crank`` is its angle to the ground
+        link.
     """
     P = parameters or FourBarParameters()
     foot, tip, middle, point = (P.crank * p for p in corners(P.home))
@@ -72,18 +74,17 @@ def four_bar(parameters: FourBarParameters | None = None) -> Robot:
 
 
 def corners(angle: float) -> tuple[NDArray, ...]:
-    """Return the positions of the linkage at a crank angle, in units of the crank.
+    """Return the pin positions at a crank angle, in units of the crank length.
 
     Args:
         angle: [rad] angle of the crank to the ground link.
 
     Returns:
-        Rocker's foot, crank pin, middle pin and tracing point, (2,) each.
+        Rocker foot, crank pin, coupler pin and tracing point, (2,) each.
     """
     foot, tip = np.array([2.0, 0.0]), direction(angle)
     to_pin = tip - foot
-    # by Thales' theorem: perpendicular to that line, at a distance of 5 from the crank
-    # pin
+    # Thales' theorem: perpendicular to that line, at a distance of 5 from the crank pin
     across = np.array([to_pin[1], -to_pin[0]]) / np.linalg.norm(to_pin)
     point = foot + np.sqrt(25.0 - to_pin @ to_pin) * across
     return foot, tip, (tip + point) / 2, point

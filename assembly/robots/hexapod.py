@@ -1,14 +1,14 @@
-"""A Gough-Stewart platform, 6-UPS: six driven struts between cardan and ball joints.
+"""Gough-Stewart platform, 6-UPS: six driven struts between cardan and ball joints.
 
-A strut between a cardan and a ball joint transmits only an axial force.  The platform's
-stiffness is therefore the sum over struts of k w w^T, with w the unit wrench of the
-strut's line.  Six struts constrain the platform exactly, so geometric errors move it
+A strut between a cardan and a ball joint transmits only an axial force.  The platform
+stiffness is therefore the sum over struts of k w w^T, where w is the unit wrench along
+the strut.  Six struts constrain the platform exactly, so geometric errors move it
 without elastic energy.
 
 Sources:
     Merlet, Parallel Robots (2nd edition, 2006), the prototype called left hand: the
-    centres of the joints, in two planes.  Working height, sections, clearances and
-    drives are round numbers, typical of struts of this size.
+    joint centres, in two planes.  Working height, sections, clearances and drives are
+    rounded values typical of struts of this size.
 """
 
 from dataclasses import dataclass
@@ -54,11 +54,12 @@ def hexapod(parameters: HexapodParameters | None = None) -> Robot:
     """Return the robot at its home pose, with the platform parallel to the base.
 
     Args:
-        parameters: parameters of the robot; by default those above.
+        parameters: parameters of the robot; by default those of
+            :class:`HexapodParameters`.
 
     Returns:
         The robot with 42 frames and 5 closures; platform ``leg1.tip``.  The coordinate
-        of ``legK.strut`` is the distance of its joints' centres.
+        of ``legK.strut`` is the distance between its joint centres.
     """
     P = parameters or HexapodParameters()
     placed: list[PlacedFrame] = []
@@ -70,13 +71,13 @@ def hexapod(parameters: HexapodParameters | None = None) -> Robot:
 
 
 def points() -> tuple[NDArray, NDArray]:
-    """Return the (6, 3) [m] centres of the joints in base axes and in platform axes."""
+    """Return the (6, 3) [m] joint centres in base axes and in platform axes."""
     flat = np.zeros((6, 1))
     return np.hstack([BASE_POINTS, flat]), np.hstack([PLATFORM_POINTS, flat])
 
 
 def _leg(name: str, a: NDArray, b: NDArray, P: HexapodParameters) -> list[PlacedFrame]:
-    """Return a strut from a to b, with its ball joint to the platform at b."""
+    """Return the frames of a strut from a to b, with its ball joint at b."""
     length = float(np.linalg.norm(b - a))
     along = (b - a) / length
     first = np.cross([0.0, 0.0, 1.0], along)
@@ -98,6 +99,6 @@ def _leg(name: str, a: NDArray, b: NDArray, P: HexapodParameters) -> list[Placed
 
 
 def _in_axes(T: NDArray, vector: NDArray) -> tuple[float, float, float]:
-    """Return a direction given in base axes, expressed in the axes of a frame."""
+    """Transform a direction from base axes to the axes of a frame."""
     x, y, z = (T[:3, :3].T @ vector).tolist()
     return x, y, z

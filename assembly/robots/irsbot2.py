@@ -1,14 +1,14 @@
-"""The IRSBot-2 of the paper's section IV, reconstructed.
+"""Reconstruction of the IRSBot-2 of section IV of the paper.
 
 The two legs extend along the x axis; leg 2 is leg 1 rotated by pi about z0.  In each
 leg, a parallelogram (proximal module) carries an elbow body of constant orientation.
 Two parallel links between universal joints (distal module) carry the platform.  The
-figures of the paper that define the axes of the universal joints are not public.  With
-the axes used here, the mobility equals that of the paper everywhere in the workspace;
-with other axes that were tested, the mobility differs.
+paper defines the axes of the universal joints in figures that are not public.  The axes
+used here reproduce the mobility stated in the paper throughout the workspace, unlike
+all other axes that were tested.
 
-Frames have names; the index of a frame in the paper is its position in :data:`NAMES`,
-counted from 1.  Errors act at the frames :data:`ERROR_FRAMES` of the paper.
+The index of a frame in the paper is its position in :data:`NAMES`, counted from 1.  As
+in the paper, errors act at the frames :data:`ERROR_FRAMES`.
 
 ======  ===========================================================================
 symbol  meaning [m, rad]
@@ -88,10 +88,10 @@ class IRSBot2Parameters:
 def irsbot2(
     parameters: IRSBot2Parameters | None = None, x: float = 0.0, z: float = -0.5
 ) -> Robot:
-    """Return the robot with all its joints at zero in one home pose.
+    """Return the robot, whose joint coordinates are all zero in its home pose.
 
     Args:
-        parameters: parameters of the robot; by default the paper's.
+        parameters: parameters of the robot; by default those of the paper.
         x: [m] platform position in the home pose.
         z: [m] platform position in the home pose.
 
@@ -100,7 +100,7 @@ def irsbot2(
         base.
 
     Raises:
-        BadInput: the robot does not reach the home pose.
+        BadInput: the home pose is out of reach.
     """
     parameters = parameters or IRSBot2Parameters()
     turned = transform(np.zeros(3), np.diag([-1.0, -1.0, 1.0]))
@@ -123,18 +123,18 @@ def irsbot2(
 
 
 def drive_angle(parameters: IRSBot2Parameters, x: float, z: float) -> float:
-    """Return the angle of leg 1's moving sides to the x axis, elbow outward.
+    """Return the angle between the moving sides of leg 1 and the x axis, elbow outward.
 
     Args:
         parameters: parameters of the robot.
-        x: [m] platform position; for leg 2 its negative.
+        x: [m] platform position; the negative position for leg 2.
         z: [m] platform position.
 
     Returns:
         [rad] the angle q.
 
     Raises:
-        BadInput: the leg does not reach the position.
+        BadInput: the position is out of reach.
     """
     P = parameters
     along = np.array([x - (P.b + P.f - P.p), z - P.e])
@@ -202,13 +202,13 @@ def _link(
 
 
 def _axes(x: NDArray, z: NDArray) -> NDArray:
-    """Return the rotation matrix with given x (scaled to 1) and z axes."""
+    """Return the rotation matrix with given x axis (normalised) and z axis."""
     x = x / np.linalg.norm(x)
     return np.column_stack([x, np.cross(z, x), z])
 
 
 def _frames(leg: str, placed: dict[str, NDArray], P: IRSBot2Parameters) -> list[Frame]:
-    """Return a leg's frames with their joints and links."""
+    """Return the frames of a leg with their joints and links."""
     frames = []
     for name in NAMES:
         above = _PARENTS[name]

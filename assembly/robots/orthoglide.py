@@ -1,22 +1,23 @@
-"""The Orthoglide: three perpendicular linear drives with parallelograms; it translates.
+"""Orthoglide: translational robot with three perpendicular linear drives.
 
-Each leg is a slide, a hinge, a parallelogram and a second hinge parallel to the first:
-PRPaR.  Each leg prevents rotation of the platform about two axes, so the three legs
+Each PRPaR leg consists of a slide, a hinge, a parallelogram and a second hinge parallel
+to the first.  It prevents rotation of the platform about two axes, so the three legs
 impose six constraints where three suffice.  Each planar parallelogram adds three
-redundant constraints.  The robot is therefore overconstrained twelve times, and errors
+redundant constraints.  The degree of overconstraint is therefore twelve, and errors
 cause internal forces.
 
-With the coordinates r of the slides and the position p of the platform, each leg of
-length L keeps (p_x - r_x)^2 + p_y^2 + p_z^2 = L^2, and so on.  At home, p = 0 and
-r = -L, the platform moves as its slides do: the Jacobian is the identity.
+With the coordinates r of the slides and the position p of the platform, a leg of length
+L imposes (p_x - r_x)^2 + p_y^2 + p_z^2 = L^2, and so on.  At home, where p = 0 and r =
+-L, the Jacobian is the identity: the platform moves like its slides.
 
 Sources:
     Chablat, Wenger (2003), Architecture optimization of a 3-DOF translational parallel
     mechanism for machining applications, the Orthoglide, IEEE Trans. Robotics and
     Automation 19: the architecture and its isotropic point.  Pashkevich, Chablat,
     Wenger (2009), Stiffness analysis of overconstrained parallel manipulators,
-    Mechanism and Machine Theory 44: which parts deform.  Dimensions are round numbers,
-    of the size of their prototype; sections, clearances and drives are typical.
+    Mechanism and Machine Theory 44: which parts deform.  Dimensions are rounded and
+        similar to those of the prototype; sections, clearances and drives are typical
+        values.
 """
 
 from dataclasses import dataclass
@@ -48,11 +49,12 @@ def orthoglide(parameters: OrthoglideParameters | None = None) -> Robot:
     """Return the robot at its isotropic point.
 
     Args:
-        parameters: parameters of the robot; by default those above.
+        parameters: parameters of the robot; by default those of
+            :class:`OrthoglideParameters`.
 
     Returns:
         The robot with 30 frames and 5 closures; platform ``x.tip``.  The coordinate of
-        ``x.slide`` is r_x, as defined at the head of this module.
+        ``x.slide`` is r_x, see the module docstring.
     """
     P = parameters or OrthoglideParameters()
     axes = np.eye(3)
@@ -70,7 +72,7 @@ def orthoglide(parameters: OrthoglideParameters | None = None) -> Robot:
 def _leg(
     name: str, along: NDArray, hinge: NDArray, P: OrthoglideParameters
 ) -> list[PlacedFrame]:
-    """Return a leg along an axis of the base, with hinges along another axis."""
+    """Return a leg along one axis of the base, with hinges along another."""
     near, far = -(P.leg + P.platform) * along, -P.platform * along
     slide = Frame(
         f"{name}.slide", joint="prismatic", actuated=True, position=-P.leg,

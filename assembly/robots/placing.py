@@ -1,7 +1,7 @@
-"""Frames of built-in robots, defined by their home poses in base axes.
+"""Create the frames of built-in robots from their home poses in base axes.
 
-The data of a robot are easiest to check in base axes.  A tree of frames, however,
-requires each frame relative to its parent, after the parent's joint.  Joints with
+Robot data are easiest to check in base axes, but a tree of frames requires the pose of
+each frame relative to its parent, after the parent's joint.  Joints with
 several degrees of freedom are modelled as coincident revolute joints: two for a cardan
 joint, three for a ball joint.
 """
@@ -17,7 +17,7 @@ from forcefit.stiffness.screws import transform
 def at(
     origin: ArrayLike, z: ArrayLike = (0, 0, 1), x: ArrayLike = (1, 0, 0)
 ) -> NDArray:
-    """Return the transform of a frame from its origin and two of its axes.
+    """Return the transform of a frame, given its origin and two of its axes.
 
     Args:
         origin: (3,) [m] origin of the frame.
@@ -37,7 +37,7 @@ def at(
 def pin(
     name: str, parent: str, clearance: Clearance | None = None, link: Link | None = None
 ) -> Frame:
-    """Return a passive revolute joint, with the body that leads to it."""
+    """Return a passive revolute joint together with the body that leads to it."""
     return Frame(name, parent, joint="revolute", clearance=clearance, link=link)
 
 
@@ -45,7 +45,7 @@ def cardan_joint(
     name: str, parent: str, origin: NDArray, first: NDArray, second: NDArray,
     clearance: Clearance | None = None,
 ) -> list[PlacedFrame]:  # fmt: skip
-    """Return a cardan joint: two perpendicular revolute joints at one point.
+    """Return a cardan joint, modelled as two perpendicular revolute joints at a point.
 
     Args:
         name: name of the joint; its frames are ``name_1`` and ``name_2``.
@@ -69,9 +69,10 @@ def ball_joint(
     name: str, parent: str, origin: NDArray, first: NDArray, second: NDArray,
     clearance: Clearance | None = None, link: Link | None = None,
 ) -> list[PlacedFrame]:  # fmt: skip
-    """Return a ball joint: three revolute joints at one point, perpendicular at home.
+    """Return a ball joint, modelled as three revolute joints at one point.
 
-    The joint is singular if the second revolute joint is rotated by a right angle.
+    The axes are perpendicular at home.  The joint is singular if the second revolute
+    joint is rotated by a right angle.
 
     Args:
         name: name of the joint; its frames are ``name_1`` to ``name_3``.

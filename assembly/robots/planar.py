@@ -32,7 +32,7 @@ class PlanarLeg:
 
 
 def in_plane(point: ArrayLike, angle: float = 0.0) -> NDArray:
-    """Return the (4, 4) frame at (x, y) [m] whose x axis is at an angle [rad]."""
+    """Return the (4, 4) frame at (x, y) [m], rotated about z by an angle [rad]."""
     x, y = np.asarray(point, dtype=float)
     return at([x, y, 0.0], x=[math.cos(angle), math.sin(angle), 0.0])
 
@@ -45,7 +45,7 @@ def direction(angle: float) -> NDArray:
 def arm_angle(
     robot: str, foot: ArrayLike, tip: ArrayLike, near: float, far: float, side: int
 ) -> float:
-    """Return the angle of the first of two arms that connect two points.
+    """Return the angle of the first arm of a two-arm chain between two points.
 
     Args:
         robot: name of the robot, for the error message.
@@ -59,7 +59,7 @@ def arm_angle(
         [rad] angle to the x axis.
 
     Raises:
-        BadInput: the arms do not reach the tip.
+        BadInput: the tip is out of reach.
     """
     along = np.asarray(tip, dtype=float) - foot
     reach = math.hypot(*along)
@@ -75,9 +75,9 @@ def arm_angle(
 def two_arms(
     name: str, foot: NDArray, angle: float, tip: NDArray, leg: PlanarLeg
 ) -> list[PlacedFrame]:
-    """Return the drive, the elbow and the frame at the second arm's end.
+    """Return the drive, the elbow and the frame at the end of the second arm.
 
-    The drive's coordinate is the arm's angle to the x axis.
+    The coordinate of the drive is the angle between its arm and the x axis.
 
     Args:
         name: name of the leg.

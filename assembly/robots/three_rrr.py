@@ -1,11 +1,11 @@
-"""A planar 3-RRR robot: three legs of two arms and a triangular platform.
+"""Planar 3-RRR robot: three legs of two arms each and a triangular platform.
 
 Sources:
     Gosselin, Angeles (1988), The optimum kinematic design of a planar
     three-degree-of-freedom parallel manipulator, J. Mechanisms, Transmissions and
     Automation in Design 110: the architecture and its inverse kinematics, three
-    independent legs of two arms.  Dimensions are round numbers, of the size of
-    laboratory machines; sections and clearances are typical.
+    independent legs of two arms.  Dimensions are rounded and similar to those of
+    laboratory machines; sections and clearances are typical values.
 """
 
 import math
@@ -42,26 +42,28 @@ class ThreeRRRParameters:
     )
 
     def feet(self) -> NDArray:
-        """Return (3, 2) [m] positions of the drives, which are on a circle."""
+        """Return the (3, 2) [m] positions of the drives, which lie on a circle."""
         return self.base_radius * _triangle()
 
     def corners(self) -> NDArray:
-        """Return (3, 2) [m] positions of the platform's pins, in platform axes."""
+        """Return the (3, 2) [m] positions of the platform pins, in platform axes."""
         return self.platform_radius * _triangle()
 
 
 def three_rrr(parameters: ThreeRRRParameters | None = None) -> Robot:
-    """Return the robot at its home pose, the platform parallel to the base.
+    """Return the robot at its home pose, with the platform parallel to the base.
 
     Args:
-        parameters: parameters of the robot; by default those above.
+        parameters: parameters of the robot; by default those of
+            :class:`ThreeRRRParameters`.
 
     Returns:
-        The robot with 15 frames and 2 closures; platform ``leg1.tip``, the triangle's
-        centre.  A drive's coordinate is its arm's angle to the x axis.
+        The robot with 15 frames and 2 closures; platform ``leg1.tip``, the centre of
+        the triangle.  The coordinate of a drive is the angle between its arm and the x
+        axis.
 
     Raises:
-        BadInput: the robot does not reach the home pose.
+        BadInput: the home pose is out of reach.
     """
     P = parameters or ThreeRRRParameters()
     leg = P.leg

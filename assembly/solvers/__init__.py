@@ -1,5 +1,5 @@
-"""Solvers of cone programmes on plain arrays, independent of robots.
+"""Solvers for second-order cone programs on plain arrays, independent of robots.
 
-Start with ``conic.py``, the second-order cone programme with its certificate.
-``one_problem.py`` calls the compiled methods of ``assembly/kernels/solvers``.
+Start with ``conic.py``, which returns certified solutions.  ``one_problem.py`` calls
+the compiled methods of ``assembly/kernels/solvers``.
 """

@@ -35,7 +35,7 @@ class Positions:
     def start_chains(
         self, u: NDArray, rng: np.random.Generator, walks: NDArray
     ) -> None:
-        """Compute start points of the chains near the boundary, in random directions.
+        """Generate initial points near the boundary, in random directions.
 
         Args:
             u: (nu,) centre of the ellipsoid.
@@ -49,13 +49,13 @@ class Positions:
     def walk(
         self, u: NDArray, every: int, rng: np.random.Generator, trace: NDArray
     ) -> None:
-        """Continue a random chain and record its platform screw at regular intervals.
+        """Advance a random chain and record its platform screw at regular intervals.
 
         Args:
             u: (nu,) current point of the chain, overwritten.
-            every: number of trajectories of the walk between two recorded screws.
+            every: number of trajectories between two recorded screws.
             rng: generator of random numbers.
-            trace: (kept, 6) [rad, m] overwritten with the recorded screws.
+            trace: (kept, 6) [rad, m] array to fill with the recorded screws.
         """
         bits = rng.bit_generator
         with bits.lock:

@@ -22,5 +22,5 @@ def cone_sizes(values: NDArray, group: NDArray) -> NDArray:
 
 
 def into_cones(u: NDArray, group: NDArray) -> NDArray:
-    """Return vectors whose part in each cone is shortened to length 1 if longer."""
+    """Project vectors onto the unit cones, leaving vectors inside unchanged."""
     return u / np.maximum(1.0, cone_sizes(u, group))[group]

@@ -1,13 +1,14 @@
-"""Second-order cone programmes in the clearances, with certified solutions.
+"""Second-order cone programs in the clearances, with certified solutions.
 
-The module solves two problems: the least energy of a reduced problem (22), and the
-least factor on the clearances of problem (21).  Both are scaled here to size 1.
-Clarabel solves the second problem.  With ``"reference"``, Clarabel also solves the
-first problem, and :mod:`forcefit.assembly.solvers.pressed_cones` refines each solution.
-With ``"compiled"``, the compiled interior-point method solves the first problem, and
-Clarabel solves it if the compiled solution is not proved.  Newton's method on the dual
-(:mod:`forcefit.assembly.solvers.one_problem`) then refines each solution.  The solution
-with the smallest certified gap is returned; the gap does not depend on the solvers.
+The module solves two problems: the minimum energy of a reduced problem (22), and the
+smallest clearance factor of problem (21).  Both are scaled to size 1.  The second
+problem is solved by Clarabel.  With ``"reference"``, Clarabel also solves the first
+problem, and :mod:`forcefit.assembly.solvers.pressed_cones` refines each solution.  With
+``"compiled"``, the compiled interior-point method solves the first problem, and
+Clarabel is used if the compiled solution cannot be certified.  Newton's method on the
+dual (:mod:`forcefit.assembly.solvers.one_problem`) then refines each solution.  The
+solution with the smallest certified gap is returned.  The gap is evaluated
+independently of the solvers.
 
 Sources:
     Goulart, Chen (2024), Clarabel: an interior-point solver for conic programs with
@@ -30,19 +31,20 @@ from forcefit.assembly.solvers.pressed_cones import refine
 
 _TOLERANCE = 1e-13
 # Clarabel's default static regularisation, 1e-8, stops 3 of 12 points of the paper's
-# robot at a relative gap of 1e-6; without it the gap is 1e-13 for all of them
+# robot at a relative gap of 1e-6; without regularisation, the gap is 1e-13 at all of
+# them
 _REGULARISATIONS = (0.0, 1e-10, 1e-8)
 # largest gap at which a solution counts as proved: relative to the energy, and to the
 # energy without clearance
 GAP, GAP_WITHOUT_CLEARANCE = 1e-8, 1e-12
 _GAP_WITHIN = 1e-12  # required relative gap of the interior-point method
-# share of that gap that is required here, because the full problem increases the gap
+# fraction of that gap that is required here, because the full problem increases the gap
 _SHARE = 0.1
-_STOP = 1e-2  # share of the required gap at which Newton's method stops
+_STOP = 1e-2  # fraction of the required gap at which Newton's method stops
 # largest number of Newton steps, and first sigma of the method
 _STEPS, _FIRST_SIGMA = 150, 1e6
-_RESIDUAL = 1e-11  # accepted residual of rows without springs
-# largest factor on the clearances, up to which infeasibility is proved
+_RESIDUAL = 1e-11  # accepted residual of equations without springs
+# largest factor on the clearances for which infeasibility is proved
 _LARGEST_FACTOR = 1e8
 _UNPROVED = "PrimalInfeasible, but its multipliers do not prove it"
 
@@ -52,7 +54,7 @@ class SolverFailed(RuntimeError):
 
     Attributes:
         problem: name of the problem.
-        status: status that the solver reported.
+        status: status reported by the solver.
     """
 
     def __init__(self, problem: str, status: str) -> None:
@@ -70,8 +72,8 @@ class ConicSolution:
             the duality gap.
         rigid_multipliers: (p,) [J] multipliers of the rows without springs.
         value: [J] value of the objective.
-        bound: [J] certified lower bound of the objective.
-        feasible: whether there are clearances that satisfy the rows without springs.
+        bound: [J] certified lower bound on the objective.
+        feasible: whether some clearances satisfy the rows without springs.
     """
 
     clearances: NDArray
@@ -88,7 +90,7 @@ class ConicSolution:
 
 
 class ConeProgramme(NamedTuple):
-    """Arguments of :func:`minimise_energy`, scaled so that their size is about 1."""
+    """Arguments of :func:`minimise_energy`, scaled to order 1."""
 
     G: NDArray
     h: NDArray
@@ -111,8 +113,8 @@ def minimise_energy(
         H: (p, nu) matrix of full row rank.
         k: (p,) vector.
         group: (nu,) cone of each column, counted from 0.
-        method: ``"compiled"``, with Clarabel if the compiled solution is not proved;
-            or ``"reference"`` for Clarabel only.
+        method: ``"compiled"``, which falls back on Clarabel if the solution cannot be
+            certified; or ``"reference"``, which uses only Clarabel.
 
     Returns:
         The minimiser with a certified lower bound.
@@ -120,7 +122,7 @@ def minimise_energy(
     Raises:
         SolverFailed: Clarabel returned no usable solution.
     """
-    if not (h.any() or d.any() or k.any()):  # the closures fit and no load acts
+    if not (h.any() or d.any() or k.any()):  # the closures hold and no load acts
         zeros = np.zeros(len(h)), np.zeros(len(k))
         return ConicSolution(np.zeros(len(d)), *zeros, 0.0, 0.0)
     if G.shape[1] == 0:
@@ -154,7 +156,7 @@ def minimise_energy(
         if best is not None and _proved(best, scaled.h):
             break
     if best is None:
-        raise SolverFailed("least energy", status)
+        raise SolverFailed("minimum energy", status)
     joule = size**2
     return ConicSolution(
         clearances=best.clearances,
@@ -186,7 +188,7 @@ def _by_clarabel(
     regularisation: float, G: NDArray, h: NDArray, d: NDArray, H: NDArray, k: NDArray,
     group: NDArray,
 ) -> tuple[NDArray | None, NDArray, str]:  # fmt: skip
-    """Solve by Clarabel, with v = -G u - h as separate variables."""
+    """Solve by Clarabel, with v = -G u - h as additional variables."""
     r, nu = G.shape
     cones, radii = _unit_cones(group, np.ones(nu))
     rows = np.vstack([G, H, cones.toarray()])
@@ -217,7 +219,7 @@ _SOLVERS: dict[Method, tuple[_Solver, ...]] = {
 def _certified(
     problem: ConeProgramme, u: NDArray, rigid: NDArray, method: Method
 ) -> Iterator[ConicSolution]:
-    """Yield a solution certified by its springs, then solutions refined by Newton."""
+    """Yield a certified solution, followed by solutions refined by Newton's method."""
     own = _certify(problem, u, problem.G @ u + problem.h, rigid)
     if method == "reference":  # Clarabel's multipliers are rarely better
         for refined in refine(problem, u, rigid):
@@ -247,7 +249,7 @@ def _checked(
 def _certify(
     problem: ConeProgramme, u: NDArray, springs: NDArray, rigid: NDArray
 ) -> ConicSolution:
-    """Return a solution with its value and the bound by its multipliers."""
+    """Return a solution with its objective and the bound from its multipliers."""
     strain = problem.G @ u + problem.h
     value = float(strain @ strain) / 2 - float(problem.d @ u)
     bound = _energy_bound(problem, springs, rigid)
@@ -262,7 +264,7 @@ def _certify(
 
 
 def _energy_bound(problem: ConeProgramme, spring: NDArray, rigid: NDArray) -> float:
-    """Return a certified lower bound of problem (22) from estimated multipliers.
+    """Compute a certified lower bound on problem (22) from estimated multipliers.
 
     For every y and n:  |Gu + h|^2/2 - d.u  >=  y.(Gu + h) - y.y/2 - d.u + n.(k - Hu).
     The minimum of the right side over the unit cones has a closed form.
@@ -284,7 +286,7 @@ def _energy_bound(problem: ConeProgramme, spring: NDArray, rigid: NDArray) -> fl
 def least_factor(
     B: NDArray, right: NDArray, group: NDArray, scaled: NDArray
 ) -> tuple[float | None, NDArray, NDArray]:
-    """Return the least t with B u = right and |u_k| <= t (or <= 1 if not scaled).
+    """Return the smallest t with B u = right and |u_k| <= t (or <= 1 if not scaled).
 
     Args:
         B: (m, nu) matrix of full row rank, m >= 1.
@@ -301,8 +303,7 @@ def least_factor(
     """
     m, nu = B.shape
     rows = np.linalg.norm(B, axis=1)
-    # if every cone is scaled, t is proportional to ``right``, which is scaled to length
-    # 1
+    # if every cone is scaled, t is proportional to ``right``, which is normalised
     size = np.linalg.norm(right / rows) if scaled.all() else 1.0
     unit_cones, radii = _unit_cones(group, np.where(scaled, 0.0, 1.0))
     _, factors = _unit_cones(group, np.where(scaled, -1.0, 0.0))
@@ -344,7 +345,7 @@ def _unit_cones(group: NDArray, radius: NDArray) -> tuple[csc_matrix, NDArray]:
 
 
 class _Cones(NamedTuple):
-    """Rows of a programme: equations, then inequalities, then cones."""
+    """Constraints of a program: equations, then inequalities, then cones."""
 
     equal: int
     group: NDArray
@@ -370,7 +371,7 @@ def _clarabel(
     solution = clarabel.DefaultSolver(P, q, A, b, sets, settings).solve()
     status = str(solution.status)
     x, z = np.array(solution.x), np.array(solution.z)
-    # an inaccurate solution is accepted here; its certificate decides later
+    # an inaccurate solution is accepted here, because its certificate is checked later
     usable = {"Solved", "AlmostSolved", "InsufficientProgress", "MaxIterations"}
     if status not in usable or not (np.isfinite(x).all() and np.isfinite(z).all()):
         return None, z, status
@@ -380,9 +381,9 @@ def _clarabel(
 def _proves_no_point(
     n: NDArray, H: NDArray, k: NDArray, group: NDArray, radius: NDArray
 ) -> bool:
-    """Return whether n proves that no u with |u_k| <= radius_k satisfies H u = k."""
+    """Return whether n proves infeasibility of H u = k with |u_k| <= radius_k."""
     # n.H u is at most the sum of radius_k |(H^T n)_k|, so n.k > that sum is a proof if
-    # the difference also exceeds the rounding errors of the terms
+    # the difference also exceeds the round-off errors of the terms
     most = float(cone_sizes(H.T @ n, group) @ radius)
     rounding = 1e-13 * float(np.abs(n) @ (np.abs(k) + np.abs(H).sum(axis=1)))
     return bool(float(n @ k) > most + rounding)

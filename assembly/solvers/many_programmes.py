@@ -1,8 +1,8 @@
-"""Compiled solution of cone programmes with equal matrices and many right sides.
+"""Compiled solution of cone programs that differ only in their right-hand sides.
 
-Each programme has the form of :func:`forcefit.assembly.solvers.conic.minimise_energy`.
-Each lane of the processor's vector registers solves one programme.  Programmes whose
-solution is not proved are solved again, one at a time.
+Each program has the form of :func:`forcefit.assembly.solvers.conic.minimise_energy` and
+is solved in one lane of the processor's vector registers.  Programs whose solution
+cannot be certified are solved again, one at a time.
 """
 
 from typing import NamedTuple
@@ -19,10 +19,10 @@ from forcefit.assembly.solvers.conic import (
     minimise_energy,
 )
 
-# share of the proved gap that is required here, because callers increase the gap
+# fraction of the proved gap that is required here, because callers increase the gap
 _SHARE = 0.1
 _RESIDUAL = 1e-11  # accepted residual of a row without springs
-# a cone counts as loaded if its force exceeds this share of the force without clearance
+# a cone counts as loaded if its force exceeds this fraction of that without clearance
 _LOADED = 1e-9
 
 
@@ -54,10 +54,10 @@ def minimise_energies(
         group: (nu,) cone of each column, counted from 0.
 
     Returns:
-        The minimisers, each with a proved gap.
+        The minimisers, each with a certified gap.
 
     Raises:
-        SolverFailed: a programme has no usable solution.
+        SolverFailed: no usable solution was found for one of the programs.
     """
     rows = np.linalg.norm(H, axis=1)
     unit, sides = H / rows[:, None], k / rows
@@ -75,7 +75,7 @@ def minimise_energies(
 
 
 def into_cones_of_each(u: NDArray, group: NDArray) -> NDArray:
-    """Return (n, nu) vectors; parts in a cone longer than 1 are shortened to 1."""
+    """Project (n, nu) vectors onto the unit cones by shortening long components."""
     return u / np.maximum(1.0, cone_sizes(u, group))[:, group]
 
 
@@ -103,12 +103,12 @@ def _proved(problem: tuple[NDArray, ...], u: NDArray, n: NDArray) -> NDArray:
 def closest_of_same_energy(
     minima: Minima, last: NDArray, rows: NDArray, problem: tuple[NDArray, ...]
 ) -> NDArray:
-    """Return the points of equal energy that are closest to given points.
+    """Return the minimisers that are closest to given points.
 
     Args:
         minima: n solutions of :func:`minimise_energies`.
         last: (n, nu) given points.
-        rows: (p, nu) orthonormal rows whose products with the points are kept.
+        rows: (p, nu) orthonormal rows whose products with the points are preserved.
         problem: G, h, d, H and group of :func:`minimise_energies`.
 
     Returns:
@@ -133,7 +133,7 @@ def closest_of_same_energy(
 
 
 def _closest(u: NDArray, last: NDArray, rows: NDArray, group: NDArray) -> NDArray:
-    """Return the closest point as the solution of a cone programme."""
+    """Find the closest point by solving a cone program."""
     eye, zero = np.eye(len(u)), np.zeros(len(u))
     try:
         found = minimise_energy(eye, -last, zero, rows, rows @ u, group)

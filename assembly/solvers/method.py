@@ -1,4 +1,4 @@
-"""Names of the two solution methods that every public solver offers."""
+"""Names of the two solution methods offered by every public solver."""
 
 import logging
 from typing import Literal, get_args
@@ -24,13 +24,13 @@ def check_method(method: str) -> None:
 
 
 def log_reference(robot: str, what: str, left: int, count: int) -> None:
-    """Log that the reference solves points that the compiled method did not prove.
+    """Log that some points must be solved by the reference method.
 
     Args:
         robot: name of the robot.
-        what: name of the quantity that is computed.
-        left: number of points that the reference method solves.
-        count: number of all points.
+        what: name of the computed quantity.
+        left: number of points that the compiled method could not certify.
+        count: total number of points.
     """
     _LOG.info(
         "%s: %s of %d of %d points by the reference method, because the compiled "

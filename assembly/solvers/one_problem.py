@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from forcefit.assembly.kernels.choice import kernels
 
 Problem = tuple[NDArray, NDArray, NDArray, NDArray, NDArray]
-# function of a direction that returns the certified height, a (6,) screw that attains
-# the height approximately, and the (nv,) gradient
+# function of a direction that returns the certified height, a (6,) screw that
+# approximately attains it, and the (nv,) gradient
 Support = Callable[[NDArray], tuple[float, NDArray, NDArray]]
 
 
@@ -22,7 +22,7 @@ class SolverLimits(NamedTuple):
 
     Attributes:
         relative: required gap relative to |G u + h|^2 / 2.
-        absolute: required gap that is added to the relative one.
+        absolute: required absolute gap, added to the relative one.
         first_sigma: first sigma of Newton's method, relative to the mean |G_k^T h|.
         steps: largest number of Newton steps.
     """
@@ -61,8 +61,8 @@ def newton(
         problem: see :func:`interior_point`.
         starts: see :func:`interior_point`.
         limits: limits of the iteration.
-        u: (nu,) first estimate within the cones; overwritten with the solution.
-        y: (r + p,) first estimate of the multipliers of the rows of G and of H;
+        u: (nu,) initial guess within the cones; overwritten with the solution.
+        y: (r + p,) initial guess for the multipliers of the rows of G and H;
             overwritten with the solution.
     """
     kernels.newton(*_contiguous(*problem), _integers(starts), *limits, u, y)
@@ -84,7 +84,8 @@ def farthest_points(
     Returns:
         u (k, nu) and the multipliers n (k, p) of the rows at the last iterate.  They
         satisfy d.u <= n.right + sum |(d - rows^T n)_c|.  Also (k,) bool, True if the
-        gap between both sides is small enough and the rows hold to rounding.
+        gap between both sides is within the tolerance and the rows hold to machine
+        precision.
     """
     count, (p, nu) = len(directions), rows.shape
     points, multipliers = np.zeros((count, nu)), np.zeros((count, p))
@@ -109,14 +110,14 @@ def farthest(
         start: (nv,) point within the unit cones.
         starts: (cones + 1,) index of the first column of each cone, then nv.
         half: 0 for the rotation, 3 for the translation.
-        tolerance: [rad or m] required difference of upper and lower bound.
+        tolerance: [rad or m] required gap between upper and lower bound.
         support: function of a direction (3,) of that half, called if the compiled
             method is not accurate enough.  Its gradient is X^T d minus the contribution
             of the rows' multipliers.
 
     Returns:
         (2,) lower and upper bound; (6,) the screw that attains the lower bound; and the
-        number of support functions computed.  The bounds can be wider than required if
+        number of support functions evaluated.  The bounds can be wider than required if
         400 support functions do not suffice.
     """
 
@@ -134,10 +135,10 @@ def farthest(
 
 
 def _contiguous(*arrays: NDArray) -> tuple[NDArray, ...]:
-    """Return the arrays as contiguous arrays of float in C order, for C++."""
+    """Convert the arrays to C-contiguous arrays of float, for C++."""
     return tuple(np.ascontiguousarray(array, dtype=float) for array in arrays)
 
 
 def _integers(array: NDArray) -> NDArray:
-    """Return a contiguous array of 64-bit integers, for C++."""
+    """Convert an array to contiguous 64-bit integers, for C++."""
     return np.ascontiguousarray(array, dtype=np.int64)

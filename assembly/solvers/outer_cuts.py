@@ -1,9 +1,9 @@
-"""Bounds of the farthest screw of a convex set by cuts, in numpy (reference method).
+"""Bound the farthest screw of a convex set by cuts, in numpy (reference method).
 
-Each support function d.x <= h(d) cuts off a half space.  The cuts form a polytope
-around the set.  The farthest corner of the polytope is an upper bound of the distance.
-The farthest point that attains a support function is a lower bound.  The next cut is
-made in the direction of that corner.
+Each support function d.x <= h(d) cuts off a half space, and the cuts form a polytope
+around the set.  The farthest corner of the polytope gives an upper bound on the
+distance, and the farthest point that attains a support function gives a lower bound.
+The next cut is made in the direction of the farthest corner.
 
 Sources:
     Hoffman (1981), A method for globally minimizing concave functions over convex sets,
@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from forcefit.assembly.solvers.one_problem import Support
 
 _MOST = 400  # largest number of support functions
-# distance of every cut from the set, so that the polytope around a flat set has corners
-# too: relative to the tolerance, and at least relative to the size of the set
+# offset of every cut from the set, so that the polytope around a flat set has corners
+# as well: relative to the tolerance, but at least relative to the size of the set
 _SLACK, _LEAST_SLACK = 0.25, 1e-7
 
 
@@ -29,12 +29,12 @@ def farthest(
     Args:
         centre: (6,) [rad, m] screw of the set.
         half: 0 for the rotation, 3 for the translation.
-        tolerance: [rad or m] required difference of upper and lower bound.
+        tolerance: [rad or m] required gap between upper and lower bound.
         support: support function of a direction (3,) of that half.
 
     Returns:
         Lower and upper bound; (6,) the screw that attains the lower bound; and the
-        number of support functions computed.  The bounds can be wider than required if
+        number of support functions evaluated.  The bounds can be wider than required if
         400 support functions do not suffice.
     """
     part = slice(half, half + 3)

@@ -1,8 +1,8 @@
-r"""Refinement of a minimum of :func:`.conic.minimise_energy` in numpy.
+r"""Refine a minimum of :func:`.conic.minimise_energy` in numpy.
 
-A cone solver stops at a small duality gap.  If the cones at their bounds, with contact
+A cone solver stops at a small duality gap.  Once the cones in contact, with contact
 forces f, are known, the minimum satisfies equations that Newton's method solves to
-rounding.  Let y be the springs and n the multipliers of H:
+machine precision.  Let y be the springs and n the multipliers of H:
 
     G u + h - y = 0,  G' y - d - H' n + f_c u_c = 0,  H u = k,  (|u_c|^2 - 1) / 2 = 0.
 
@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 from forcefit.assembly.solvers.cones import cone_sizes
 
 _STEPS = 4  # largest number of Newton steps; two are usual
-_SETTLED = 1e-12  # [-] size of the clearances' last step at convergence
+_SETTLED = 1e-12  # [-] size of the last clearance step at convergence
 _GUESSES = 6  # largest number of guesses of the cones in contact; usually one suffices
 # [-] distances from the bound below which a cone with a force counts as in contact
 _NEAR = 1e-2, 0.0
-_BEYOND = 1e-9  # [-] accepted excess over the bound of a cone that is not in contact
+_BEYOND = 1e-9  # [-] accepted excess over its bound for a cone that is not in contact
 
 _Problem = tuple[NDArray, NDArray, NDArray, NDArray, NDArray, NDArray]
 _Point = tuple[NDArray, NDArray, NDArray]
@@ -55,7 +55,7 @@ def refine(problem: _Problem, u: NDArray, n: NDArray) -> Iterator[_Point]:
 def _settled(
     problem: _Problem, start: _Point, pressed: NDArray, force: NDArray
 ) -> _Point:
-    """Return the minimum after adding exceeded cones and removing negative forces."""
+    """Update the set of cones in contact until it is consistent with the minimum."""
     for _ in range(_GUESSES):
         settled, forces = _with_pressed(problem, start, pressed, force)
         beyond = ~pressed & (cone_sizes(settled[0], problem[-1]) > 1.0 + _BEYOND)

@@ -1,17 +1,17 @@
-"""Uniformly distributed positions of the clearances, drawn by the billiard walk.
+"""Sample uniformly distributed clearance positions by the billiard walk.
 
 The set of positions is {u : rows (u - start) = 0, |u_k| <= 1 for each cone k}.  Near
 the edge of an assembly zone this set is thin in some directions, and a walk with
-isotropic steps would mix slowly.  Directions are therefore drawn from Dikin's ellipsoid
-at the analytic centre, which has the proportions of the set.  The ellipsoid is
-contained in the set, and the set is contained in the ellipsoid scaled by the number of
-cones.  The walk is affine invariant.
+isotropic steps would mix slowly.  Directions are therefore drawn from the Dikin
+ellipsoid at the analytic centre, which has the proportions of the set: it is contained
+in the set, and the set is contained in the ellipsoid scaled by the number of cones.
+The walk is affine invariant.
 
 A trajectory moves straight for a random time and is reflected at every bound.  It
-crosses the set several times, while a step of hit-and-run ends at the first bound.
-Several chains from different starts are compared.  The length of the chains is doubled,
-and their first half is discarded, until split R-hat and the effective sample size of
-every component of the platform's screw meet their criteria.
+crosses the set several times, whereas a hit-and-run step ends at the first bound.
+Several chains from different initial points are compared.  Their length is doubled, and
+their first half discarded, until the split R-hat and the effective sample size of every
+component of the platform screw meet their criteria.
 
 Sources:
     Gryazina, Polyak (2014), Random sampling: billiard walk algorithm; Nesterov,
@@ -22,11 +22,11 @@ Sources:
 import numpy as np
 from numpy.typing import NDArray
 
-# number of chains, and number of points of each chain that are compared
+# number of chains, and number of points compared in each chain
 CHAINS, KEPT = 4, 64
 # largest accepted split R-hat, and smallest accepted effective sample size
 R_HAT, EFFECTIVE = 1.05, 100.0
-# largest number of doublings of the chains: 4 x 65 472 trajectories for a draw
+# largest number of doublings of the chains: 4 x 65 472 trajectories per sample
 DOUBLINGS = 10
 _CONSTANT = 1e-12  # [rad or m] standard deviation below which a component is constant
 _NEWTON = 300  # largest number of Newton iterations
@@ -36,13 +36,13 @@ def sample_uniform_position(
     Z: NDArray, starts: NDArray, to_screw: NDArray, u: NDArray,
     rng: np.random.Generator, doublings: int = DOUBLINGS,
 ) -> bool:  # fmt: skip
-    """Overwrite u with a point that is uniformly distributed over the set.
+    """Overwrite u with a sample from the uniform distribution over the set.
 
     Args:
         Z: (nu, n) orthonormal columns: directions in which u can move.
         starts: (cones + 1,) index of the first clearance of each cone, then nu.
-        to_screw: (6, nu) [rad, m] map from u to the platform's screw.
-        u: (nu,) a point of the set, overwritten with the new point.
+        to_screw: (6, nu) [rad, m] map from u to the platform screw.
+        u: (nu,) a point of the set, overwritten with the sample.
         rng: generator of random numbers.
         doublings: largest number of doublings of the chains.
 
@@ -77,8 +77,8 @@ def _ellipsoid(
 ) -> tuple[NDArray, NDArray] | None:
     """Return the analytic centre, and the (nu, n) axes of Dikin's ellipsoid there.
 
-    Damped Newton steps minimise -sum log(rho^2 - |u_k|^2) and stay inside.  The first
-    rho is large enough for the start to be inside; rho then decreases to 1.
+    Damped Newton steps minimise -sum log(rho^2 - |u_k|^2) and stay inside.  Initially
+    rho is large enough for the start point to be inside; it then decreases to 1.
 
     Returns:
         Centre and axes in columns; None if the set has an empty interior.
@@ -114,7 +114,7 @@ def _ellipsoid(
 
 
 def _largest(heads: NDArray, u: NDArray) -> float:
-    """Return the largest norm of u over all cones, which is 1 on the set's boundary."""
+    """Return the largest norm of u over all cones, which is 1 on the boundary."""
     return float(np.sqrt(np.add.reduceat(u * u, heads).max()))
 
 
@@ -129,14 +129,14 @@ def is_mixed(trace: NDArray) -> bool:
 
 
 def diagnose(x: NDArray) -> tuple[float, float]:
-    """Return split R-hat and the effective sample size of one component.
+    """Compute split R-hat and the effective sample size of one component.
 
     Args:
         x: (chains, 2 k) values along each chain; each half counts as a chain.
 
     Returns:
         R-hat and effective sample size.  R-hat tends to 1 as the chains become
-        independent of their starts; it is infinite if no chain moves.
+        independent of their initial points; it is infinite if no chain moves.
     """
     k = x.shape[1] // 2
     halves = x[:, : 2 * k].reshape(-1, k)

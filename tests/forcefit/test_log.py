@@ -46,8 +46,8 @@ def test_point_without_certificate_is_logged_with_its_robot(caplog):
     solve_assembly([rigid()] * 3)
     name = rigid().robot.name
     assert [message.split(" by the ")[0] for message in caplog.messages] == [
-        f"{name}: least energy of 1 of 1 points",
-        f"{name}: least energy of 3 of 3 points",
+        f"{name}: minimum energy of 1 of 1 points",
+        f"{name}: minimum energy of 3 of 3 points",
     ]
 
 

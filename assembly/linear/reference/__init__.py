@@ -1,8 +1,9 @@
 """Reference method in numpy and Clarabel: problems (21), (22), (27) at one posture.
 
-The reference method is slow, but covers all cases: loads, rigid closures, matrices of
-uncertain rank, active bounds of passive joints.  It is the method ``"reference"``, and
-solves the points that the compiled method does not cover or prove.
+The reference method is slow but covers all cases: loads, rigid closures, matrices of
+uncertain rank, active motion limits of passive joints.  It is selected by
+``"reference"`` and also solves points that the compiled method does not cover or cannot
+certify.
 
 =========  ==========================================  ===============================
 paper      quantity or problem                         function
@@ -12,15 +13,15 @@ paper      quantity or problem                         function
            y, so that E = |y|^2 / 2
 --         q and y eliminated: E = |G u + h|^2 / 2,    ``reduction.reduce_problem``
            H u = k where no spring acts
-(21)       the least t with every |u_c| <= t           ``zone.least_margin``
-(22)       the least E - work, every |u_c| <= 1        ``energy.least_energy``
+(21)       smallest t with every |u_c| <= t            ``zone.least_margin``
+(22)       minimum of E - work, every |u_c| <= 1       ``energy.least_energy``
 (23)-(26)  wrenches, from multipliers of the closures  ``assembled.Assembly``
 (27)       the set of dx_p that (22) leaves; its       ``pose_error.reachable_screws``,
            farthest                                    ``ReachableSet.farthest``
 =========  ==========================================  ===============================
 
-``closure.py`` and ``assembled.py`` are in the parent folder, because the compiled
-methods use these modules too.  :mod:`forcefit.assembly.solvers.conic` solves the cone
-programmes.  ``as_printed.py`` solves (21) and (22) a second time in cvxpy, as printed
-in the paper.
+``closure.py`` and ``assembled.py`` are in the parent folder because the compiled
+methods use them as well.  :mod:`forcefit.assembly.solvers.conic` solves the cone
+programs.  ``as_printed.py`` solves (21) and (22) a second time in cvxpy, as printed in
+the paper.
 """

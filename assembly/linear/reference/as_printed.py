@@ -3,12 +3,12 @@
 The module is deliberately slow and simple: every screw of every frame is a variable,
 and every constraint is an equation of the paper.  Tests compare the results of
 :mod:`forcefit.assembly.linear.energy` and :mod:`forcefit.assembly.linear.zone` with
-those of this module.  All three use the same robot, bounds c-bar, compliances and
-eqs (13)-(15), but share no code that solves the problems.
+those of this module.  All three use the same robot, bounds c-bar, compliances and eqs
+(13)-(15), but no common code for solving the problems.
 
-The problems differ from the printed ones in two details.  The screws are in mrad and
-mm, which suits the solver's absolute tolerances.  In a rigid direction, the screw is
-fixed at zero.
+The implementation deviates from the paper in two details.  Screws are expressed in mrad
+and mm, which suits the absolute tolerances of the solver, and a screw is fixed at zero
+in rigid directions.
 """
 
 import warnings
@@ -68,7 +68,7 @@ def energy_as_printed(
 
 
 def margin_as_printed(posture: Posture, own_axes_free: bool = False) -> float | None:
-    """Return the margin of problem (21): the least factor on clearances that assembles.
+    """Return the margin of problem (21): the smallest feasible factor on clearances.
 
     Args:
         posture: the robot's configuration.
@@ -151,7 +151,7 @@ def _solve(problem: Any, allowed: set[str]) -> None:
 
     tight = {"tol_gap_abs": 1e-12, "tol_gap_rel": 1e-11, "tol_feas": 1e-11}
     try:
-        # the warning is redundant: the status also reports inaccurate solutions
+        # the warning is redundant, because the status also reports inaccuracy
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             problem.solve(solver=cp.CLARABEL, **tight)

@@ -28,10 +28,10 @@ _RIGID_BESIDE = 1e19
 
 
 class CannotAssemble(Exception):
-    """Raised if clearances and elasticity of the model cannot close the closures.
+    """Raised if neither clearances nor elasticity can close the loops of a robot.
 
-    The exception reports a result, not a mistake of the caller: a closure is open in a
-    direction in which all parts are rigid.
+    The exception reports a result rather than a usage error: a closure remains open in
+    a direction in which all parts are rigid.
     """
 
 
@@ -39,9 +39,9 @@ def least_energy(
     posture: Posture, load: NDArray, frame_loads: FrameLoads,
     own_axes_free: bool = False,
 ) -> Assembly:  # fmt: skip
-    """Close a manipulator with the least energy, as ``solve_assembly`` does.
+    """Close a manipulator with minimum energy, as ``solve_assembly`` does.
 
-    Bounds of passive joints' motions are included if they are active.
+    Motion limits of passive joints are imposed only if they are active.
 
     Args:
         posture: the robot's configuration.
@@ -75,7 +75,7 @@ def least_energy(
 def solve_with(
     lin: Linearisation, joints: VirtualJoints, load: NDArray, frame_loads: FrameLoads
 ) -> Assembly:
-    """Return the assembly of least energy for given virtual joints.
+    """Return the minimum-energy assembly for given virtual joints.
 
     Args:
         lin: the assembly constraints.
@@ -111,22 +111,22 @@ def solve_with(
     residual = assembly.closure_residual() + assembly.rounding
     if frame_loads or differs_from_zero(assembly.stored, 0.0, multipliers, residual):
         return assembly
-    # the closures need no energy, so deformations and wrenches are rounding errors
+    # no energy is needed, so deformations and wrenches are round-off
     return replace(
         assembly, elastic=np.zeros_like(y), multipliers=np.zeros_like(multipliers)
     )
 
 
 def _minimise(reduced: Reduction) -> ConicSolution:
-    """Solve a reduced problem; name the open closure if the problem is infeasible."""
+    """Solve a reduced problem; report the open closure if it is infeasible."""
     joints = reduced.joints
     spread = stiffness_spread(joints, reduced.linearisation.size)
     beyond = ""
     if spread > _RIGID_BESIDE:
         beyond = (
             f"; the stiffest spring is {spread:.0e} times as stiff as the "
-            "softest, more than double precision resolves: the stiffest "
-            "springs count as rigid"
+            "softest, which exceeds double precision: the stiffest springs "
+            "count as rigid"
         )
     if reduced.inconsistent:
         raise CannotAssemble(

@@ -1,16 +1,16 @@
-"""Set of platform screws that are possible under an assumption of problem (27).
+"""Set of platform screws that an assumption of problem (27) admits.
 
 Clearances v move within their cones, and free motions q follow through the closures:
 
     A_q dq + A_v dv = 0,        platform screw = centre + P_v dv + P_q dq.
 
-A free motion that no closure constrains either does not move the platform, or makes
+A free motion that no closure constrains either leaves the platform fixed or makes
 components of its screw unbounded.
 
-The motions of passive joints are bounded.  Most of these bounds are never active, and a
-cone of 10 rad together with cones of 1e-5 reduces the accuracy.  Each bound is
-therefore omitted unless the largest possible motion, the sum over the cones of
-|A_q^+ A_v|, exceeds it.
+Motions of passive joints are limited.  Most of these limits are never active, and
+mixing cones of 10 rad with cones of 1e-5 reduces the accuracy.  A limit is therefore
+omitted unless the largest possible motion, the sum over the cones of |A_q^+ A_v|,
+exceeds it.
 """
 
 from collections.abc import Callable
@@ -49,7 +49,7 @@ from forcefit.stiffness.screws import skew
 
 ASSUMPTIONS = ("frozen", "free", "budget")
 # accepted excess of squared clearances over their cones. A smaller value hardly
-# improves solutions, and a cone at its bound would then stop the step of all other
+# improves solutions, but a cone at its bound would then block the step of all other
 # cones
 _EXCESS = 1e-8
 
@@ -59,8 +59,8 @@ class Support:
     """Largest component of a set of screws along a direction.
 
     Attributes:
-        height: certified upper bound of direction . screw over the set.
-        screw: (6,) [rad, m] screw of the set that attains the height approximately.
+        height: certified upper bound on direction . screw over the set.
+        screw: (6,) [rad, m] screw of the set that approximately attains the height.
         gradient: (nv,) derivative of the component with respect to v, minus the
             contribution of the closures' multipliers.
     """
@@ -88,10 +88,10 @@ class MovingCones(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class ReachableSet:
-    """Platform screws that remain possible: centre + map @ (v - start).
+    """Set of possible platform screws: centre + map @ (v - start).
 
     The points v are in unit cones and satisfy rows @ (v - start) = 0.  Because this
-    equation is homogeneous, an error of the solution of (22) adds no motion.
+    equation is homogeneous, errors in the solution of (22) add no motion.
 
     Attributes:
         centre: (6,) [rad, m] the screw at ``start``.
@@ -167,7 +167,7 @@ class ReachableSet:
 
     def _screw_near(self, v: NDArray) -> NDArray:
         """Return the (6,) [rad, m] screw of a nearby v within all rows and cones."""
-        # rows are satisfied to rounding, cones to 5e-9 of their size
+        # rows are satisfied to machine precision, cones to 5e-9 of their size
         start, group = self.start, self.group
         step = v - start
         step = step - self.rows.T @ (self.rows @ step)
@@ -185,17 +185,17 @@ class ReachableSet:
     def farthest(
         self, part: int, tolerance: float, method: Method = "compiled"
     ) -> tuple[tuple[float, float], NDArray, int]:
-        """Return bounds of the largest rotation or translation, and a screw.
+        """Bound the largest rotation or translation, and return a screw.
 
         Args:
             part: 0 for the rotation, 3 for the translation.
-            tolerance: [rad or m] required difference of upper and lower bound.
+            tolerance: [rad or m] required gap between upper and lower bound.
             method: ``"compiled"``; or ``"reference"``, which uses only numpy and
                 Clarabel.
 
         Returns:
             (lower, upper) bounds; (6,) [rad, m] screw that attains the lower bound; and
-            the number of support functions computed.
+            the number of support functions evaluated.
 
         Raises:
             SolverFailed: the cone solver did not converge.
@@ -225,15 +225,15 @@ class ReachableSet:
 def reachable_screws(
     assembly: Assembly, assumption: str, energy_budget: float = 0.05
 ) -> ReachableSet:
-    """Return the set of platform screws that are possible under an assumption of (27).
+    """Return the set of platform screws that an assumption of (27) admits.
 
     Args:
-        assembly: assembly of least energy.
+        assembly: minimum-energy assembly.
         assumption: ``"frozen"``, ``"free"`` or ``"budget"``.
         energy_budget: eta of assumption ``"budget"``, >= 0.
 
     Returns:
-        The set, in which all bounds of passive joints' motions are satisfied.
+        The set, in which all motion limits of passive joints are satisfied.
 
     Raises:
         ValueError: the assumption is unknown, or ``budget`` is used under a load.
@@ -274,7 +274,7 @@ def within_bounds(
     assembly: Assembly, kept: frozenset[int],
     moving: Callable[[VirtualJoints], MovingCones], own_axes_free: bool = False,
 ) -> ReachableSet:  # fmt: skip
-    """Return the platform screws of moving cones and the free motions that follow.
+    """Return the screws reached by moving cones and the resulting free motions.
 
     Args:
         assembly: assembly at the start.
@@ -284,7 +284,7 @@ def within_bounds(
             True, no spring acts.
 
     Returns:
-        The set, in which all bounds are satisfied.
+        The set, in which all motion limits are satisfied.
     """
     kept = kept | assembly.joints.bounded_motion
     while True:
@@ -301,7 +301,7 @@ def within_bounds(
 
 @dataclass(frozen=True, eq=False)
 class _Motion:
-    """Moving cones and the free motions that follow them through the closures."""
+    """Moving cones together with the free motions that the closures impose."""
 
     assembly: Assembly
     joints: VirtualJoints
@@ -309,7 +309,7 @@ class _Motion:
 
     @cached_property
     def _follow(self) -> tuple[NDArray, NDArray]:
-        """(nq, m) pseudoinverse of A_q; (6, nq) platform motions without resistance."""
+        """(nq, m) pseudoinverse of A_q; (6, nq) unresisted platform motions."""
         lin = self.assembly.linearisation
         A_q, P_q = lin.rows @ self.joints.free, lin.platform @ self.joints.free
         inverse = np.linalg.pinv(A_q, rcond=self._with_mismatch(RANK))
@@ -318,16 +318,15 @@ class _Motion:
         return inverse, np.where(large, free, 0.0)
 
     def _with_mismatch(self, threshold: float) -> float:
-        """Return a threshold [-] plus the rounding error of the nominal closures."""
+        """Return a threshold [-] plus the round-off of the nominal closures."""
         return rank_tolerance(self.assembly.posture.mismatch, threshold)
 
     @cached_property
     def passed(self) -> frozenset[int]:
-        """Frames whose joint motion can exceed a motion limit that is omitted here."""
+        """Frames whose joint motion can exceed a limit that was omitted."""
         inverse, free = self._follow
         row = self.joints.free.argmax(axis=0)
-        # under every assumption, the motion limit of a joint without a spring is
-        # included
+        # the motion limit of a joint without a spring is always included
         robot, group = self.joints.robot, self.cones.group
         limit = component_bounds(clearance_bounds(robot)).ravel()[row]
         clearance = component_bounds(scales_with_margin(robot)).ravel()[row]
@@ -339,7 +338,7 @@ class _Motion:
         most = np.abs(middle)
         for c in np.unique(group):
             most = most + np.linalg.norm(step[:, group == c], axis=1)
-        # a motion that only its limit resists reaches that limit
+        # a motion resisted only by its limit reaches that limit
         passing = limited & ((most > limit) | free.any(axis=0))
         return frozenset((row[passing] // 6).tolist())
 
@@ -368,16 +367,16 @@ def clearances_in(assembly: Assembly, joints: VirtualJoints) -> NDArray:
 
 
 def _rows(A: NDArray, noise: float) -> NDArray:
-    """Return an orthonormal basis of the span of the rows of A, up to rounding."""
+    """Return an orthonormal basis of the row space of A."""
     _, S, Vt = svd(A, full_matrices=False)
     return Vt[: rank_of(S, ROWS_RANK, noise)]
 
 
 def loaded_cones(assembly: Assembly, joints: VirtualJoints) -> NDArray:
-    """Return the clearances whose constraint is active, by strict complementarity.
+    """Find the clearances with an active constraint, by strict complementarity.
 
     Args:
-        assembly: assembly of least energy.
+        assembly: minimum-energy assembly.
         joints: virtual joints whose columns are tested.
 
     Returns:
@@ -388,7 +387,7 @@ def loaded_cones(assembly: Assembly, joints: VirtualJoints) -> NDArray:
     screws = clearance_components(joints.robot, assembly.clearance_screws).ravel()
     u = joints.cones.T @ screws / (joints.cones**2).sum(axis=0)
     slack = np.maximum(0.0, 1.0 - cone_sizes(u, joints.group))
-    # the product of a clearance's force and its distance from the bound is about the
-    # solver's gap, so one of them is nearly zero
+    # the product of contact force and distance from the bound is about the solver's
+    # gap, so one of the two is nearly zero
     scale = max(assembly.energy, 1e-9 * assembly.energy_without_clearance, 1e-300)
     return ((load > scale * slack) & (load > 1e-9 * scale))[joints.group]

@@ -1,4 +1,4 @@
-"""Reduction of problem (22): free motions and springs are eliminated exactly.
+"""Exact elimination of free motions and springs from problem (22).
 
 With the columns of :mod:`forcefit.assembly.linear.closure`, the assembly constraints
 are
@@ -6,16 +6,16 @@ are
     A_q q + A_u u + A_y y = -misfit,      |u_k| <= 1 for each cone k.
 
 First, the free motions q are eliminated by projection on the complement of the columns
-of A_q.  Then the springs y are eliminated: the remaining rows are separated into rows
-with springs and rows without.  The only unknowns of the reduced problem are the
-clearances u,
+of A_q.  Then the springs y are eliminated by separating the remaining equations into
+those with springs and those without.  The unknowns of the reduced problem are the
+clearances u alone,
 
     minimise  |G u + h|^2 / 2 - d.u      subject to  H u = k,  |u_k| <= 1,
 
 where G u + h is the scaled deformation of the springs in addition to the deformation
 under the loads alone.  Ranks are determined from the square roots of the springs'
-compliances.  In sums of compliances, such as 1 and 1e-8 rad/(N m), rounding would
-remove the contribution of stiff springs.
+compliances.  Adding compliances, for example 1 and 1e-8 rad/(N m), would lose the
+contribution of the stiff springs to round-off.
 
 Sources:
     Golub, Van Loan, Matrix Computations, 4th ed., sections 5.4-5.5 (rank-revealing
@@ -44,10 +44,10 @@ from forcefit.assembly.linear.load import FrameLoads, loads_on_frames
 from forcefit.results.display import html_table, numbers, short_repr
 from forcefit.stiffness.screws import SCREW
 
-# relative to the largest joint motion: smaller motions count as rounding errors
+# relative to the largest joint motion: smaller motions count as round-off
 _STILL = 1e-6
 _NAMED = 4  # largest number of joints that a message lists
-# relative to the largest load: smaller loads count as rounding errors
+# relative to the largest load: smaller loads count as round-off
 _LOAD_ROUNDING = 1e-13
 
 
@@ -57,7 +57,7 @@ class FreeMotion(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class Reduction:
-    """Reduced problem, and the data to compute the full solution from its solution.
+    """Reduced problem, with the data needed to recover the full solution.
 
     Attributes:
         linearisation: the assembly constraints.
@@ -67,13 +67,13 @@ class Reduction:
         d: (nu,) [J] work of the loads per unit of each clearance.
         H: (p, nu) rows without springs.
         k: (p,) right sides of the rows H.
-        inconsistent: [-] scaled closure error that no motion can close; 0 if none.
+        inconsistent: [-] scaled closure error that no motion can remove; 0 if none.
         frame_loads: loads on every small screw.
         load_multipliers: (6 closures,) multipliers that balance the loads on free
             motions.
         basis: (6 closures, m) orthonormal basis, orthogonal to all free motions.
         rigid: (m, p) combinations of the columns of ``basis`` that form the rows H.
-        elastic_inverse: (ny, m) pseudoinverse of the springs' columns.
+        elastic_inverse: (ny, m) pseudoinverse of the spring columns.
         spread: (ny, r) orthonormal map from the springs of the reduced problem to all
             springs.
         ranks: numbers of free, elastic, rigid and redundant rows.
@@ -110,19 +110,19 @@ class Reduction:
 
     @property
     def energy_without_clearance(self) -> float:
-        """[J] elastic energy if every bounded clearance remained zero."""
+        """[J] elastic energy with every bounded clearance equal to zero."""
         bent, h = self.load_springs, self.h
         return float(h @ h + 2 * (self.spread @ h) @ bent + bent @ bent) / 2
 
     def motions(self, u: NDArray, y: NDArray) -> NDArray:
-        """Return the (nq,) smallest free motions that fit clearances and springs."""
+        """Return the minimum-norm (nq,) free motions for given u and y."""
         A = self.linearisation.rows
         moved = self.joints.cones @ u + self.joints.elastic @ y
         right = -self.linearisation.misfit - A @ moved
         return np.linalg.lstsq(A @ self.joints.free, right, rcond=RANK)[0]
 
     def multipliers(self, springs: NDArray, rigid_multipliers: NDArray) -> NDArray:
-        """Return the (6 closures,) scaled closure wrenches of least norm."""
+        """Return the minimum-norm (6 closures,) scaled closure wrenches."""
         all_springs = self.spread @ springs
         inner = self.elastic_inverse.T @ all_springs + self.rigid @ rigid_multipliers
         return self.load_multipliers + self.basis @ inner
@@ -212,7 +212,7 @@ def spring_deformations(
     frame_loads: FrameLoads,
     multipliers: NDArray,
 ) -> NDArray:
-    """Return the deformations of the springs in equilibrium with closures and loads.
+    """Compute the spring deformations in equilibrium with closures and loads.
 
     Args:
         lin: the assembly constraints.
@@ -235,7 +235,7 @@ def _load_multipliers(
     """Return the multipliers that balance the loads along every free motion."""
     A_q, drive = lin.rows @ joints.free, joints.free.T @ frame_loads.joint
     multipliers = np.linalg.lstsq(A_q.T, -drive, rcond=RANK)[0]
-    # the part orthogonal to the rows of A_q is a free motion that the load drives
+    # the component orthogonal to the rows of A_q is a free motion driven by the load
     left = A_q.T @ multipliers + drive
     most = np.maximum(
         1e-8 * np.abs(drive).max(initial=1e-300),
@@ -252,7 +252,7 @@ def _load_multipliers(
 def _load_rounding(
     lin: Linearisation, joints: VirtualJoints, frame_loads: FrameLoads
 ) -> NDArray:
-    """Return the (nq,) rounding errors of the work of the loads on free motions."""
+    """Return the (nq,) round-off in the work of the loads on free motions."""
     # factors for screws; those for wrenches are the inverse
     lengths = in_reference_lengths(lin.size)
     largest = np.abs(frame_loads.joint.reshape(-1, 6) / lengths).max(initial=0.0)
@@ -296,8 +296,8 @@ def _rigid_rows(
     rank = rank_of(S, ROWS_RANK, noise)
     errors = np.abs(lin.rows * lin.posture.robot.errors.ravel()).max(initial=0.0)
     unclosed = np.abs(U[:, rank:].T @ wanted).max(initial=0.0)
-    # rows count as rigid within a tolerance, so they contain a small part of the
-    # deformation under loads
+    # rows are classified as rigid within a tolerance, so they contain a small part of
+    # the deformation under loads
     bent = np.abs(right).max(initial=0.0)
     allowed = 1e-12 + 10 * tolerance * max(errors, bent)
     independent = U[:, :rank]

@@ -1,4 +1,4 @@
-"""Problem (21) by the reference method: the least t with every |u_c| <= t."""
+"""Problem (21) by the reference method: smallest t with every |u_c| <= t."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,11 +23,11 @@ from forcefit.assembly.solvers.conic import least_factor
 
 
 def least_margin(posture: Posture, own_axes_free: bool) -> tuple[float, float]:
-    """Return the factor on all clearances at which a rigid manipulator assembles, (21).
+    """Compute the clearance factor at which a rigid manipulator can be assembled, (21).
 
     Args:
         posture: the robot's configuration.
-        own_axes_free: whether compliant joints turn freely about their own axis.
+        own_axes_free: whether compliant joints rotate freely about their own axis.
 
     Returns:
         The margin and its certified lower bound; inf for both if no factor suffices.
@@ -74,14 +74,14 @@ def margin_with(
 
 
 def _margin_of(reduced: Reduction) -> tuple[float, float, NDArray]:
-    """Return the margin of a reduced problem, its bound, and its clearances."""
+    """Return the margin of a reduced problem, its lower bound, and the clearances."""
     joints = reduced.joints
     u = np.zeros(joints.cones.shape[1])
     if reduced.inconsistent:
         return np.inf, np.inf, u
     if not np.any(reduced.k):
         return 0.0, 0.0, u
-    # orthonormal rows make the result independent of the units of the closures
+    # with orthonormal rows, the result does not depend on the units of the closures
     U, S, B = svd(reduced.H, full_matrices=False)
     right = U.T @ reduced.k / S
     t, u, y = least_factor(B, right, joints.group, joints.scaled)

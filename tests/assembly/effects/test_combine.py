@@ -1,4 +1,4 @@
-"""A declared effect and a fitted difference combine into one effect."""
+"""Combination of a declared effect with a fitted difference."""
 
 import numpy as np
 import pytest
@@ -50,7 +50,7 @@ IN_TURN = {
 
 @pytest.fixture(scope="module")
 def standing():
-    """Three elastic drives and two tubes, loaded, warm, some time after the start."""
+    """Three elastic drives and two tubes under load, at some temperature and time."""
     turning = {"joint": "revolute", "actuated": True, "joint_stiffness": SPRING}
     robot = Robot("arm", "tool", (
         Frame("j1", **turning),
@@ -65,7 +65,7 @@ def standing():
 
 
 @pytest.mark.parametrize("name", IN_TURN)
-def test_combined_effect_predicts_the_same_reading_as_both_effects_applied_in_turn(
+def test_combined_effect_predicts_the_reading_of_both_effects_in_sequence(
     name, standing
 ):
     declared, found = ({name: values} for values in IN_TURN[name])
@@ -77,7 +77,7 @@ def test_combined_effect_predicts_the_same_reading_as_both_effects_applied_in_tu
 
 
 def test_every_additive_effect_has_a_combination_case():
-    """Clearances add up, contact laws cannot, finite motions have no parameter."""
+    """Clearances add up, contact laws do not, and finite motions have no parameter."""
     others = {"joint_clearance", "contact_stiffening", "geometric_stiffening"}
     assert IN_TURN.keys() | others == LIBRARY.keys()
 
@@ -97,16 +97,16 @@ def test_effects_at_different_places_are_combined_without_change():
 
 
 def test_effects_with_different_exponents_or_time_constants_cannot_be_combined():
-    """Series springs with laws of different exponents; two time constants."""
+    """Springs in series with different exponents, and different time constants."""
     law = {"a.coefficient": 1e7, "a.exponent": 1.5}
     slow, slower = ({"a": 1e-5, "a.time_constant": t} for t in (60.0, 90.0))
     with pytest.raises(ValueError, match="two delayed expansions"):
         combined({"delayed_expansion": slow}, {"delayed_expansion": slower})
-    with pytest.raises(ValueError, match="two contact laws of one joint"):
+    with pytest.raises(ValueError, match="two contact laws in series at one joint"):
         combined({"contact_stiffening": law}, {"contact_stiffening": law})
     other = {"b.coefficient": 2e7, "b.exponent": 2.0}
     both = combined({"contact_stiffening": law}, {"contact_stiffening": other})
     assert both == {"contact_stiffening": law | other}
     drifts = [{"drift": {"amplitude.tz": 1e-5, "time_constant": t}} for t in (60, 600)]
-    with pytest.raises(ValueError, match="two drifts of different"):
+    with pytest.raises(ValueError, match="two drifts with different"):
         combined(*drifts)

@@ -1,4 +1,4 @@
-"""Every effect of the library against a closed form on an arm of one beam."""
+"""Every effect of the library, compared with a closed form for a single-beam arm."""
 
 from dataclasses import replace
 from math import cos, exp, pi, sin
@@ -41,7 +41,7 @@ def here(robot, load=(0, 0, 0, 0, 0, 0), q=0.0, **covariates):
 
 
 def change(conditions, name, values):
-    """What an effect adds to the reading."""
+    """Change of the reading due to an effect."""
     with_effect = predict(apply_effects(conditions, {name: values}))
     assert list(with_effect.reason) == [""] * len(conditions)
     return (with_effect.deviation - predict(conditions).deviation)[0]
@@ -63,7 +63,7 @@ def test_thermal_expansion_lengthens_the_beam_along_its_axis():
     assert seen == pytest.approx([0, 0, 0, dL * cos(0.4), dL * sin(0.4), 0], abs=1e-18)
 
 
-def test_drive_compliance_turns_the_drive_by_moment_over_stiffness():
+def test_drive_compliance_rotates_the_drive_by_moment_over_stiffness():
     F = 30.0
     seen = change(
         here(arm(rigid=True), (0, 0, 0, 0, F, 0)), "drive_compliance", {"drive": K}
@@ -75,12 +75,12 @@ def test_base_compliance_deflects_by_the_force_and_its_moment():
     F = 50.0
     stiff = {"stiffness.ry": 2e5, "stiffness.tz": 1e6}
     seen = change(here(arm(), (0, 0, 0, 0, 0, F)), "base_compliance", stiff)
-    turn = -F * L / 2e5  # a force up at the tip turns the base about -y
+    turn = -F * L / 2e5  # an upward force at the tip rotates the base about -y
     expected = [0, turn, 0, 0, 0, F / 1e6 - turn * L]
     assert seen == pytest.approx(expected, rel=1e-6, abs=1e-12)
 
 
-def test_encoder_offset_turns_the_arm_by_that_angle():
+def test_encoder_offset_rotates_the_arm_by_the_offset():
     seen = change(here(arm(), q=0.7), "encoder_offset", {"drive": 1e-5})
     expected = [0, 0, 1e-5, -1e-5 * L * sin(0.7), 1e-5 * L * cos(0.7), 0]
     assert seen == pytest.approx(expected, rel=1e-4, abs=1e-10)
@@ -109,7 +109,7 @@ def test_body_without_a_beam_expands_along_the_line_between_its_joints(frame):
 
 
 def test_delayed_expansion_lags_the_temperature_with_its_time_constant():
-    """Behind a ramp r t the body is at r (t - T + T exp(-t/T))."""
+    """For a ramp r t, the body temperature is r (t - T + T exp(-t/T))."""
     time, late = np.array([0.0, 50.0, 80.0, 300.0]), 100.0
     rows = together([place_robot(arm(), joints={"drive": 0.0})] * 4)
     covariates = {"temperature": 5.0 + 0.02 * time, "time": time}
@@ -122,7 +122,7 @@ def test_delayed_expansion_lags_the_temperature_with_its_time_constant():
 
 
 def test_device_scale_multiplies_positions_from_the_device_origin():
-    """The device's origin is at (-1, 0, 0), and its axes are turned by 90 degrees."""
+    """The device origin is at (-1, 0, 0), and its axes are rotated by 90 degrees."""
     there = here(arm(), q=0.4)
     seen = change(there, "device_scale", {"factor": 1.001})
     at = np.array([L * cos(0.4), L * sin(0.4), 0])
@@ -133,7 +133,7 @@ def test_device_scale_multiplies_positions_from_the_device_origin():
 
 
 def test_body_mass_effect_deflects_the_beam_as_in_closed_form():
-    """m g L^3/3 E I of a mass at the tip; a moment along x bends by m c g L^2/2 E I."""
+    """m g L^3/3 E I for a mass at the tip, and m c g L^2/2 E I for an offset centre."""
     there = replace(here(arm()), gravity=np.array([[0, 0, -G]]))
     seen = change(there, "body_mass", {"tip.mass": 3.0})
     assert seen[5] == pytest.approx(-3.0 * G * L**3 / (3 * E * I), rel=1e-9)
@@ -142,7 +142,7 @@ def test_body_mass_effect_deflects_the_beam_as_in_closed_form():
 
 
 def test_registration_applies_a_finite_rotation_and_translation():
-    """p' = R p + t for the device's frame, and the tool moves with the platform."""
+    """p' = R p + t for the device frame; the tool moves with the platform."""
     b, t = 0.3, np.array([0.01, -0.02, 0.03])
     values = {"base.rz": b, "base.tx": t[0], "base.ty": t[1], "base.tz": t[2]}
     seen = change(here(arm(), q=0.5), "registration", values)
@@ -162,7 +162,7 @@ def test_modulus_scale_divides_the_bending_deflection():
 
 
 def test_load_moves_a_joint_to_the_bound_of_its_clearance():
-    """A disc of radius c and a cone of angle t, in the direction of the load."""
+    """The joint moves by the radius c and the tilt t in the direction of the load."""
     values = {"drive.radial": 2e-5, "drive.axial": 1e-5, "drive.tilt": 3e-5}
     # force along y and z at the tip: moment (0, -Fz L, Fy L) at the drive
     seen = change(
@@ -172,14 +172,14 @@ def test_load_moves_a_joint_to_the_bound_of_its_clearance():
     assert seen == pytest.approx(expected, rel=1e-6, abs=1e-9)
 
 
-def test_clearance_without_load_leaves_the_row_undetermined():
+def test_unloaded_clearance_leaves_the_reading_undetermined():
     values = {"joint_clearance": {"drive.radial": 2e-5}}
     found = predict(apply_effects(here(arm(rigid=True)), values))
     assert found.undetermined.all()
     assert found.deviation == pytest.approx(0.0, abs=1e-18)
 
 
-def test_friction_turns_an_elastic_drive_against_the_approach_direction():
+def test_friction_rotates_an_elastic_drive_against_the_approach_direction():
     for approach in (-1.0, 1.0):
         seen = change(
             here(arm(K), approach=approach), "friction_hysteresis", {"drive": 2.0}
@@ -188,7 +188,7 @@ def test_friction_turns_an_elastic_drive_against_the_approach_direction():
 
 
 def test_effects_of_a_driven_screw_move_along_its_thread():
-    """Each turns the nut by an angle, which moves it by the lead times the angle."""
+    """Each rotates the nut by an angle, which moves it by the lead times the angle."""
     lead, F = 0.004 / (2 * pi), 500.0
     K_B = np.diag([np.inf, np.inf, K, np.inf, np.inf, np.inf])
     drive = Frame("drive", joint="helical", pitch=0.004, actuated=True)
@@ -225,7 +225,7 @@ def test_load_gain_scales_and_offsets_the_recorded_load():
 
 
 def test_geometric_stiffening_of_a_hinged_rod_equals_its_balance_equation():
-    """k a = F L cos a - P L sin a for a rigid rod on a torsion spring."""
+    """A rigid rod on a torsion spring satisfies k a = F L cos a - P L sin a."""
     P, F = 4e4, 200.0
     seen = change(
         here(arm(K, rigid=True), (0, 0, 0, P, F, 0)), "geometric_stiffening", {}
@@ -241,7 +241,7 @@ def test_drift_approaches_its_amplitude_exponentially():
     assert seen == pytest.approx([0, 2e-5 * part, 0, 1e-5 * part, 0, 0], abs=1e-18)
 
 
-# all rows together against the cone solver, row by row
+# all measurements together, compared with the cone solver one by one
 CASES = {
     "drive_compliance": {"leg1.drive": 3e4, "leg2.drive": 5e4},
     "self_weight": {"g.x": 1.0, "g.z": -G},
@@ -254,7 +254,7 @@ CASES = {
 
 @pytest.fixture(scope="module")
 def parallel():
-    """A 3-RRR with elastic links, at two postures under different loads."""
+    """A 3-RRR robot with elastic links, at two postures under different loads."""
     robot = load_robot("3rrr")
     beam = BeamLink({"radius": 0.012, "inner_radius": 0.008}, 70e9, 0.33, 2700.0)
     links = {
@@ -275,7 +275,7 @@ def parallel():
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_effects_of_all_rows_together_equal_the_cone_solver(name, parallel):
+def test_effects_on_all_measurements_together_match_the_cone_solver(name, parallel):
     there = apply_effects(parallel, {name: CASES[name]})
     fast = predict(there).deviation
     slow = read(
@@ -286,7 +286,7 @@ def test_effects_of_all_rows_together_equal_the_cone_solver(name, parallel):
     assert np.abs(fast - slow).max() < 1e-7 * np.abs(fast).max()
 
 
-def test_friction_needs_an_elastic_joint_and_slip_a_joint_without_clearance():
+def test_friction_requires_an_elastic_joint_and_slip_a_joint_without_clearance():
     """Friction: a joint spring of any stiffness. Slip: no clearance except spin."""
     own = np.diag([np.inf, np.inf, 0.4, np.inf, np.inf, np.inf])
     robot = Robot("chain", "tip", (

@@ -1,4 +1,4 @@
-"""Columns of function forms against SciPy, NumPy and their definitions."""
+"""Columns of function forms, compared with SciPy, NumPy and their definitions."""
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ def columns(form, names, inputs=(X,), **shapes):
     return FORMS[form].basis(names, list(inputs), shapes)
 
 
-def test_powers_and_waves_of_two_variables_equal_numpy():
+def test_powers_and_harmonics_of_two_variables_equal_numpy():
     assert columns("powers", ["0", "3"]) == pytest.approx(np.array([X**0, X**3]).T)
     found = columns("powers", ["1.2"], (X, Y))[:, 0]
     assert found == pytest.approx(X * Y**2)
@@ -84,7 +84,7 @@ def test_spline_of_fewer_than_three_knots_has_zero_roughness(count):
 
 
 def test_knee_changes_its_slope_at_the_given_load():
-    """A spring of 2 rad/(N m) up to 3 N m, of 0.5 beyond; and a jump of 0.1."""
+    """Compliance 2 rad/(N m) up to 3 N m and 0.5 beyond, with a jump of 0.1."""
     load = np.array([-5.0, -3.0, -1.0, 0.0, 2.0, 7.0])
     found = FORMS["knee"].basis(["below", "above"], [load], {"at": 3.0})
     assert found @ [2.0, 0.5] == pytest.approx([-7, -6, -2, 0, 4, 8])
@@ -92,7 +92,7 @@ def test_knee_changes_its_slope_at_the_given_load():
     assert 0.1 * jump[:, 0] == pytest.approx([-0.1, -0.1, -0.1, 0, 0.1, 0.1])
 
 
-def test_scaled_waves_are_waves_times_the_second_variable():
+def test_scaled_waves_are_harmonics_times_the_second_variable():
     force = np.linspace(-3.0, 5.0, len(X))
     found = FORMS["scaled_waves"].basis(["0.cosine", "2.sine"], [X, force], {})
     assert found == pytest.approx(np.column_stack([force, force * np.sin(2 * X)]))

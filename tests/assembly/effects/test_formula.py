@@ -1,4 +1,4 @@
-"""Formulas: values against Python's eval, units by hand, refusal of other code."""
+"""Formulas: values from Python's eval, units by hand, and rejection of other code."""
 
 import math
 
@@ -37,7 +37,7 @@ def test_formula_value_equals_python_eval(text):
     "q := 1", "f(q)", "1e999*q", "(" * 90 + "q" + ")" * 90, "-" * 90 + "q", "q" * 600,
     "q; q", "1j", "a and b", "q % 2", "q // 2",
 ])  # fmt: skip
-def test_text_that_is_not_a_formula_is_refused(text):
+def test_text_that_is_not_a_formula_is_rejected(text):
     if text == "sin":  # a name like any other, which is not declared
         assert names_in(parse_formula(text)) == ["sin"]
     elif text.startswith("(("):  # brackets alone are no depth
@@ -68,14 +68,14 @@ def test_parameter_units_follow_from_variables_and_result(
     ("a*t + a", {"t": S}, {}), ("2**t", {"t": S}, {}), ("t**q", {"t": S, "q": {}}, M),
     ("exp(2*t)", {"t": S}, {}),
 ])  # fmt: skip
-def test_formula_with_inconsistent_units_is_refused(text, variables, result):
+def test_formula_with_inconsistent_units_is_rejected(text, variables, result):
     with pytest.raises(BadInput, match="units clash"):
         parameter_units(parse_formula(text), variables, result)
 
 
 @pytest.mark.parametrize("around", ["-{}", "+{}", "abs({})", "(a+{})", "({}*a)"])
-def test_formula_nested_deeper_than_fifty_operations_is_refused(around):
-    """Each kind of operation, nested on either side."""
+def test_formula_nested_deeper_than_fifty_operations_is_rejected(around):
+    """Each kind of operation is nested on either side."""
     text = "q"
     for _ in range(50):
         text = around.format(text)
@@ -84,14 +84,14 @@ def test_formula_nested_deeper_than_fifty_operations_is_refused(around):
         parse_formula(around.format(text))
 
 
-def test_formula_longer_than_500_characters_is_refused():
+def test_formula_longer_than_500_characters_is_rejected():
     parse_formula("q" * 500)
     with pytest.raises(BadInput, match="found 501 characters"):
         parse_formula("q" * 501)
 
 
 def test_exponents_of_units_add_up_across_powers():
-    """(a t)^2 sqrt(b t) / t is a length: a and b share it, one of them is a number."""
+    """(a t)^2 sqrt(b t) / t is a length, which determines a and b up to one unit."""
     tree = parse_formula("(a*t)**2*t**0.5*sqrt(b)/t")
     found = parameter_units(tree, {"t": S}, M)
     a, b = ({**dict.fromkeys("ms", 0), **found[name]} for name in "ab")

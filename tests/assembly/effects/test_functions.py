@@ -1,4 +1,4 @@
-"""Functions in robot files against closed forms of an arm and equivalent springs."""
+"""Functions in robot files, compared with closed forms and equivalent springs."""
 
 from dataclasses import replace
 from math import cos, exp, sin
@@ -25,7 +25,7 @@ RIGID = arm(rigid=True)
 
 
 def seen(conditions, *functions):
-    """What functions add to the reading."""
+    """Change of the reading due to functions."""
     both = predict(apply_functions(conditions, functions))
     assert list(both.reason) == [""] * len(conditions)
     return both.deviation - predict(conditions).deviation
@@ -36,19 +36,19 @@ def at_drive(parameters, form="powers", variables=("q.drive",), **more):
 
 
 def turned(angle, q):
-    """Reading of an arm whose drive stands off by a small angle."""
+    """Reading of an arm whose drive is off by a small angle."""
     return [0, 0, angle, -angle * L * sin(q), angle * L * cos(q), 0]
 
 
 @pytest.mark.parametrize("q", [-0.8, 0.0, 0.7])
-def test_joint_waves_turn_the_arm_by_their_sum(q):
+def test_joint_harmonics_rotate_the_arm_by_their_sum(q):
     waves = at_drive({"1.sine": 2e-5, "3.cosine": -1e-5}, "waves")
     angle = 2e-5 * sin(q) - 1e-5 * cos(3 * q)
     found = seen(here(RIGID, q=q), waves)[0]
     assert found == pytest.approx(turned(angle, q), rel=1e-4, abs=1e-9)
 
 
-def test_formula_effect_turns_the_drive_by_its_value():
+def test_formula_effect_rotates_the_drive_by_its_value():
     formula = at_drive(
         {"a": 1e-5, "b": 2e-6, "n": 2.0}, "formula", formula="a*sin(3*q)**n - b/2"
     )
@@ -56,8 +56,8 @@ def test_formula_effect_turns_the_drive_by_its_value():
     assert seen(here(RIGID, q=0.3), formula)[0][2] == pytest.approx(angle, rel=1e-9)
 
 
-def test_base_functions_turn_and_shift_the_whole_robot():
-    """A turned base swings the tip about the base's origin; a shifted one shifts it."""
+def test_base_functions_rotate_and_translate_the_whole_robot():
+    """The tip rotates about the base origin, or translates together with the base."""
     turn = Function("base", ("ry",), ("cov.tilt",), "powers", {"1": 1.0})
     shift = Function("base", ("tx",), ("temperature",), "powers", {"1": 1e-6})
     shift = replace(shift, variables=("cov.temperature",))
@@ -79,7 +79,7 @@ def test_load_and_reading_functions_change_the_load_and_the_reading():
 
 
 def test_compliance_function_equals_an_elastic_drive():
-    """M / k of an elastic drive, softer where the angle is larger."""
+    """M / k of an elastic drive whose compliance increases with the angle."""
     soft = at_drive({"0": 1e-5, "2": 3e-5}, kind="compliance")
     F, q = 30.0, 0.7
     there = here(RIGID, (0, 0, 0, 0, F, 0), q=q)
@@ -94,7 +94,7 @@ def test_compliance_function_equals_an_elastic_drive():
     assert one.energy == pytest.approx(assemble_row(sprung, 0).energy, rel=1e-9)
 
 
-def test_function_of_a_wrench_turns_the_joint_by_the_square_of_the_moment():
+def test_function_of_a_wrench_rotates_the_joint_by_the_squared_moment():
     square = at_drive({"2": 1e-7}, variables=("wrench.drive.mz",))
     F, q = 30.0, 0.5
     there = here(RIGID, (0, 0, 0, 0, F, 0), q=q)
@@ -109,7 +109,7 @@ def three_rrr(load):
 
 @pytest.mark.parametrize("exact", [False, True])
 def test_compliance_in_a_closed_chain_equals_a_joint_spring(exact):
-    """Newton's method for the function, against a spring of the robot."""
+    """Newton's method for the function, compared with a spring of the robot."""
     there = replace(three_rrr([0, 0, 5, 40, -30, 0]), exact=exact)
     robot = there.robot
     names = [f.name for f in robot.frames if f.actuated]
@@ -143,7 +143,7 @@ def test_nonlinear_law_in_a_closed_chain_holds_at_the_solved_wrench():
 
 
 def campaign_of(times, **columns):
-    """Rows of an arm measured one after the other."""
+    """Readings of an arm, measured in sequence."""
     q = np.array(columns.pop("q", np.zeros(len(times))), dtype=float)
     coordinates = np.column_stack([q, np.zeros(len(q))])
     postures, _ = place_many_joints(RIGID, coordinates)
@@ -163,7 +163,7 @@ def test_lag_function_approaches_its_gain_exponentially():
     )
 
 
-def test_selected_rows_keep_the_history_of_all_rows():
+def test_selected_readings_retain_the_complete_history():
     t = np.linspace(0, 900, 10)
     rows = campaign_of(t, temperature=5 * np.sin(t / 200), q=np.sin(t / 100))
     lag = at_drive({"time_constant": 100.0}, "lag", ("cov.temperature",))
@@ -174,11 +174,11 @@ def test_selected_rows_keep_the_history_of_all_rows():
         assert some == pytest.approx(whole[[7, 2, 4]], rel=1e-12)
 
 
-def test_reversal_sign_follows_the_motion_since_the_previous_row():
+def test_reversal_sign_follows_the_motion_since_the_previous_reading():
     q = [0.0, 0.5, 0.5, 0.2, 0.9]
     rows = campaign_of(np.arange(5.0), q=q, approach=-1.0)
     back = at_drive({"0": 1e-5, "1": 1e-5}, "reversal", ("q.drive", "q.drive"))
-    side = np.array([-1, 1, 1, -1, 1])  # the first as the column says
+    side = np.array([-1, 1, 1, -1, 1])  # the first sign comes from the column
     expected = side * (1e-5 + 1e-5 * np.array(q))
     assert seen(rows, back)[:, 2] == pytest.approx(expected, rel=1e-9)
 
@@ -191,7 +191,7 @@ def test_slip_function_follows_the_drive_within_its_depth():
     assert seen(rows, slack)[:, 2] == pytest.approx(expected, rel=1e-9, abs=1e-15)
 
 
-def test_reversal_waves_vary_the_backlash_around_a_turn():
+def test_reversal_waves_vary_the_backlash_over_one_turn():
     q = [0.0, 0.5, 0.5, 0.2, 0.9]
     rows = campaign_of(np.arange(5.0), q=q, approach=-1.0)
     side = np.array([-1, 1, 1, -1, 1])
@@ -203,7 +203,7 @@ def test_reversal_waves_vary_the_backlash_around_a_turn():
     assert seen(rows, scaled)[:, 2] == pytest.approx(expected, rel=1e-9)
 
 
-def test_session_effects_act_only_on_rows_of_their_session():
+def test_session_effects_act_only_on_readings_of_their_session():
     rows = campaign_of(np.zeros(3), session=np.array(["a", "b", "a"]))
     own = at_drive({"0": 1e-5}, session="a")
     assert seen(rows, own)[:, 2] == pytest.approx([1e-5, 0, 1e-5], abs=1e-15)

@@ -15,7 +15,7 @@ from tests.assembly.effects.test_effects import K, L, arm, change, here
 
 
 def public(name, values, robot=None):
-    """Parameters of an effect from what a fit finds."""
+    """Convert fitted unknowns to the parameters of an effect."""
     return LIBRARY[name].public(robot or arm(), values)
 
 
@@ -95,7 +95,7 @@ def test_functions_name_the_covariates_of_their_sessions(form, variables, needed
     assert list(covariates_of(in_one, ["b", "a"])) == needed
 
 
-def test_geometric_stiffening_without_finite_motions_is_refused():
+def test_geometric_stiffening_without_finite_motions_is_rejected():
     robot = replace(arm(K), effects={"geometric_stiffening": {}})
     check_covariates(robot, {}, finite=True)
     with pytest.raises(BadInput, match="is defined for finite motions only"):

@@ -34,19 +34,19 @@ UNITS = [
     # powers of two variables divide by both
     ("tip tx", "position.x cov.temperature", "powers 0.0 1.0 2.1 3.2",
      "m, 1, 1/(m K), 1/(m^2 K^2)"),
-    # a reversal's powers are of what its size depends on
+    # powers of a reversal refer to the variable on which its size depends
     ("drive tx", "q.drive load.fz", "reversal 0 2", "m, m/N^2"),
     ("drive tx", "q.drive", "reversal 0", "m"),
     # scaled waves divide by their second variable alone
     ("drive tx", "q.drive load.fz", "scaled_waves 1.sine", "m/N"),
     ("drive tx", "q.drive position.x", "reversal_waves 1.sine", "m"),
-    # a period has the unit of what turns
+    # a period has the unit of its variable
     ("tip rz", "position.x load.fz", "scaled_waves period", "m"),
     ("tip tx", "time", "slow_wave period", "s"),
     # a knee is a slope up to a load and beyond it; a depth is of what slips
     ("tip tx", "load.fz", "knee below above size at", "m/N, m/N, m, N"),
     ("drive tx", "load.fz", "slip size depth", "m, N"),
-    # ends of a spline are of their own variable
+    # the ends of a spline have the unit of their variable
     ("tip rz", "position.x cov.temperature",
      "spline first.1 last.1 first.2 last.2", "m, m, K, K"),
     ("drive rz", "cov.temperature", "lag gain start time_constant", "rad/K, rad, s"),
@@ -82,7 +82,7 @@ def test_units_of_a_formula_make_its_value_an_angle():
     assert units_of(RIGID, formula) == {"a": "1", "k": "1/s"}
 
 
-EFFECTS = {  # by effect and parameter: of an arm that turns, of one that slides
+EFFECTS = {  # by effect and parameter: units for a revolute arm and for a prismatic arm
     ("encoder_offset", "drive"): ("rad", "m"),
     ("encoder_eccentricity", "drive.amplitude"): ("rad", "rad"),
     ("encoder_eccentricity", "drive.phase"): ("rad", "rad"),
@@ -112,7 +112,7 @@ def test_effect_units_depend_on_the_kind_of_joint(effect, name):
     ("drive_compliance", "{}.compliance", "{}"),
     ("base_compliance", "compliance.{}", "stiffness.{}"),
 ])  # fmt: skip
-def test_fitted_compliance_becomes_a_stiffness_and_zero_is_left_out(
+def test_fitted_compliance_becomes_a_stiffness_and_zero_is_omitted(
     effect, before, after
 ):
     found = {"rx": 2e-6, "tz": 1e-8, "rz": 0.0}

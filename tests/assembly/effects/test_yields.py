@@ -1,4 +1,4 @@
-"""Functions that deform a frame by its own wrench or by another frame's wrench."""
+"""Functions whose deformation depends on the wrench at the same or another frame."""
 
 from dataclasses import replace
 from math import cos
@@ -26,16 +26,16 @@ def loaded(q):
 
 
 @pytest.mark.parametrize("place", ["base", "drive"])
-def test_function_of_the_base_moment_turns_the_drive(place):
-    """The base's origin is the drive's, so both carry the same moment about z."""
+def test_function_of_the_base_moment_rotates_the_drive(place):
+    """Base and drive share an origin, so both carry the same moment about z."""
     law = at_drive({"2": 1e-7}, variables=(f"wrench.{place}.mz",))
     turn = 1e-7 * (F * L * cos(0.5)) ** 2
     found = seen(loaded(0.5), law)[0]
     assert found == pytest.approx(turned(turn, 0.5), rel=1e-4, abs=1e-9)
 
 
-def test_compliance_linear_in_the_moment_turns_by_its_closed_form():
-    """The turn is (c + d M) M."""
+def test_compliance_linear_in_the_moment_matches_its_closed_form():
+    """The drive rotates by (c + d M) M."""
     soft = at_drive(
         {"0": 1e-5, "1": 2e-7}, variables=("wrench.drive.mz",), kind="compliance"
     )
@@ -46,7 +46,7 @@ def test_compliance_linear_in_the_moment_turns_by_its_closed_form():
 
 
 def test_reversal_of_a_wrench_scales_with_the_absolute_moment():
-    """The deformation is the direction times |M|, for either sign of M."""
+    """The deformation is the direction of motion times |M|, for either sign of M."""
     q = [0.0, 0.5, 0.2]
     rows = campaign_of(np.arange(3.0), q=q, approach=1.0)
     side = np.array([1, 1, -1])

@@ -1,4 +1,4 @@
-"""Least quadratic energies within cones: conditions that hold at a minimum."""
+"""Minimum of a quadratic energy within cones: optimality conditions."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ def sizes(u):
 
 
 def problem(rng, rows):
-    """Convex, some cones at their bound at the minimum, others not."""
+    """A convex problem in which only some cones are active at the minimum."""
     A = rng.normal(size=(6, 6))
     inside = rng.normal(size=6)
     inside *= rng.uniform(0.2, 0.7, 3)[GROUP] / sizes(inside)[GROUP]
@@ -34,7 +34,7 @@ def energy(p, u):
 
 
 def least_by_slsqp(p):
-    """From the start, where all is within the cones."""
+    """The step from a start point within all cones."""
     within = {"type": "ineq", "fun": lambda u: 1 - sizes(u) ** 2}
     closed = {"type": "eq", "fun": lambda u: p.rows @ u - p.right}
     scale = np.abs(p.S).max()
@@ -46,7 +46,7 @@ def least_by_slsqp(p):
 
 
 def unbalanced(p, step):
-    """What balance, bounds and closures lack at the end of a step, relative."""
+    """Relative violation of balance, bounds and closures at the end of a step."""
     v, rigid = step
     u = p.start + v
     gradient = p.s + p.S @ v - p.rows.T @ rigid
@@ -71,8 +71,8 @@ def test_energy_after_a_convex_clearance_step_equals_that_of_scipy_slsqp(seed, r
 
 
 @pytest.mark.parametrize("units", [1e-9, 1.0, 1e6])
-def test_negative_curvature_leads_to_the_bound_on_the_side_of_the_force(units):
-    """Energy -v^2 about the middle of an interval, and a small force to one side."""
+def test_negative_curvature_leads_to_the_bound_in_the_direction_of_the_force(units):
+    """Energy -v^2 about the middle of an interval, with a small force to one side."""
     group = np.array([0])
     p = ClearanceProblem(
         -units * np.eye(1), np.array([-1e-3 * units]), np.zeros(1), group,

@@ -1,4 +1,4 @@
-"""Weights and loads on bodies with finite motions: closed forms, balance, limits."""
+"""Weights and body loads under finite motions: closed forms, balance, limits."""
 
 from dataclasses import replace
 
@@ -25,7 +25,7 @@ G = 9.81
 
 
 def heavy(robot, rng):
-    """The same robot with random masses, and beams with a density for its links."""
+    """The same robot with random masses, whose links are beams with a density."""
     frames = []
     for frame in robot.frames:
         link = frame.link
@@ -45,7 +45,7 @@ def on_a_hinge(stiffness, *frames):
 
 
 @pytest.mark.parametrize("stiffness", [3.0, 30.0])
-def test_arm_with_a_mass_rests_at_its_moment_balance(stiffness):
+def test_arm_with_a_mass_rests_where_its_moments_balance(stiffness):
     """k a + m g (x cos a - y sin a) = 0 for a mass at (x, y) from the hinge."""
     arm = Frame("arm", "hinge", [0.4, 0, 0], mass=2.0, centre_of_mass=[0.1, 0.2, 0])
     x, y, weight = 0.5, 0.2, 2.0 * G
@@ -64,7 +64,7 @@ def test_arm_with_a_mass_rests_at_its_moment_balance(stiffness):
 
 
 def test_weight_of_a_displaced_beam_acts_at_the_displaced_middle():
-    """The middle is half a length behind the displaced end, along its axis."""
+    """The middle of the beam is half its length behind the displaced end."""
     beam = BeamLink({"radius": 0.02}, 1e16, 0.3, density=8000.0)
     turn, off = 0.3, np.array([0.01, 0.05])
     tip = Frame("tip", "hinge", [0.6, 0, 0], link=beam,
@@ -80,7 +80,7 @@ def test_weight_of_a_displaced_beam_acts_at_the_displaced_middle():
 
 
 def test_couple_on_a_body_balances_as_two_dead_forces():
-    """k a = m cos a: the work of a couple m is m sin a."""
+    """k a = m cos a, since the work of a couple m is m sin a."""
     posture = on_a_hinge(10.0, Frame("arm", "hinge", [0.5, 0, 0]))
     angle = brentq(lambda a: 10.0 * a - 9.0 * np.cos(a), 0.0, 1.5)
     bodies = np.zeros((2, 6))
@@ -101,7 +101,7 @@ def test_force_on_the_platform_body_equals_a_platform_load():
 
 
 def test_base_reactions_balance_the_whole_weight():
-    """Forces and moments of a closed loop on its base, in the deformed posture."""
+    """Forces and moments of a closed loop on its base balance in the deformed state."""
     rng = np.random.default_rng(3)
     robot = with_bodies(random_robot(rng, legs=3), rng)
     g = np.array([1.0, -2.0, -G])
@@ -145,8 +145,8 @@ def test_rotating_robot_and_gravity_together_rotates_the_solution(seed):
 @pytest.mark.parametrize("gravity", [[0, 0, -9.81], [300.0, -200.0, -500.0]])
 def test_exact_solution_with_weight_equals_the_multibody_simulation(gravity):
     """Bodies of a kilogram or two off their frames' origins, links as springs, at 60 g
-    too.  Poses agree as without weight, see ``test_exact``.  The energy alone is not
-    least under a load: it differs by the weight's work on what the poses differ.
+    too.  Poses agree as without weight, see ``test_exact``. Under a load the energy
+    alone is not minimal: it differs by the work of the weight on the pose difference.
     """
     robot = without_clearance(irsbot2_with(NUMBERS["cases"][1]))
     robot = with_bodies(robot, np.random.default_rng(4), heaviest=2, off=0.05)

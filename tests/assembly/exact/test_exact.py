@@ -1,4 +1,4 @@
-"""Exact equilibria: closed forms at large turns, and the simulation."""
+"""Exact equilibria, compared with closed forms at large rotations and simulation."""
 
 from dataclasses import replace
 
@@ -30,12 +30,12 @@ K_ONE, K_TWO, K_BAR = 40.0, 70.0, 9e4  # [N m/rad], [N m/rad], [N/m]
 
 
 def only(row, value):
-    """K_B of a spring in one direction, rigid in the others."""
+    """K_B of a joint that is elastic in one direction and rigid in all others."""
     return np.diag([value if k == row else np.inf for k in range(6)])
 
 
 def two_bars(longer, clearance=None, stretch=False):
-    """Two bars on elastic hinges that meet in a pin; bar two is made longer."""
+    """Two bars on elastic hinges, joined by a pin; the second bar is too long."""
     soft = only(3, K_BAR) if stretch else None
     frames = (
         Frame("one", rotation=[0, 0, ALPHA], joint="revolute",
@@ -53,7 +53,7 @@ def two_bars(longer, clearance=None, stretch=False):
 
 
 def triangle(length):
-    """Turns of the two bars from home when bar two has a length: law of cosines."""
+    """Rotations of both bars for a given length of bar two, by the law of cosines."""
     one = np.arccos((A**2 + D**2 - length**2) / (2 * A * D)) - ALPHA
     two = np.pi - np.arccos((length**2 + D**2 - A**2) / (2 * length * D)) - BETA
     return np.array([one, two])
@@ -72,7 +72,7 @@ def pendulum(stiffness, length):
 
 @pytest.mark.parametrize("longer", [1e-4, 0.05, 0.12])
 def test_two_bars_close_by_the_law_of_cosines(longer):
-    """Both turns equal those of the triangle; up to 0.4 rad."""
+    """Both rotations equal those of the triangle, up to 0.4 rad."""
     one, two = triangle(B + longer)
     answer = solve_exact(two_bars(longer))
     assert abs(one) > 0.2 or longer < 0.1
@@ -86,7 +86,7 @@ def test_two_bars_close_by_the_law_of_cosines(longer):
 
 
 def test_linearisation_error_is_the_linear_minus_the_exact_solution():
-    """The linear model uses the triangle's slopes at home; differences of 1e-6."""
+    """The linear model uses the slopes of the triangle at home."""
     longer, step = 0.06, 1e-6
     slopes = (triangle(B + step) - triangle(B - step)) / (2 * step)
     energy = (np.array([K_ONE, K_TWO]) @ (slopes * longer) ** 2) / 2
@@ -99,15 +99,15 @@ def test_linearisation_error_is_the_linear_minus_the_exact_solution():
 
 
 def bar_force(e, longer):
-    """dE/de of the stretched bar: turns of a triangle per length of a side."""
+    """dE/de of the stretched bar, from the rotations of the triangle."""
     length, step = B + longer + e, 1e-6
     slope = (triangle(length + step) - triangle(length - step)) / (2 * step)
     return K_BAR * e + np.array([K_ONE, K_TWO]) * triangle(length) @ slope
 
 
 @pytest.mark.parametrize("longer", [0.05, 0.12])
-def test_energy_of_an_elastic_bar_equals_its_share_in_closed_form(longer):
-    """One scalar equation; differences of 1e-6 leave 1e-10 of the force."""
+def test_energy_of_an_elastic_bar_equals_its_closed_form(longer):
+    """Solution of one scalar equation; differences of 1e-6 are accurate to 1e-10."""
     e = brentq(bar_force, -longer, longer, args=(longer,), xtol=1e-15)
     one, two = triangle(B + longer + e)
     answer = solve_exact(two_bars(longer, stretch=True))
@@ -121,9 +121,9 @@ def test_energy_of_an_elastic_bar_equals_its_share_in_closed_form(longer):
 
 @pytest.mark.parametrize(("longer", "bound"), [(0.12, 0.1), (-0.1, 0.4)])
 def test_passive_joint_stops_exactly_at_its_bound(longer, bound):
-    """The bar deforms until the pin is within its bound.
+    """The bar deforms until the pin reaches its bound.
 
-    The second bound is beyond what the linear model turns the pin by, 0.352 rad, and
+    The second bound exceeds the pin rotation of the linear model, 0.352 rad, and is
     reached only by finite motions, 0.497 rad.
     """
     free = solve_exact(two_bars(longer, stretch=True))
@@ -142,15 +142,15 @@ def test_passive_joint_stops_exactly_at_its_bound(longer, bound):
 
 
 def pin_gap(one, two, longer):
-    """Vector from the end of bar two to that of bar one."""
+    """Vector from the end of bar two to the end of bar one."""
     first = A * np.array([np.cos(ALPHA + one), np.sin(ALPHA + one)])
     second = (B + longer) * np.array([np.cos(BETA + two), np.sin(BETA + two)])
     return first - second - [D, 0]
 
 
 @pytest.mark.parametrize("longer", [0.02, 0.06])
-def test_pin_with_clearance_rests_on_its_rim_at_least_energy(longer):
-    """Least k turn^2 / 2 with the ends at most one clearance apart."""
+def test_pin_with_clearance_rests_on_its_rim_at_minimum_energy(longer):
+    """Minimum of k angle^2 / 2 with the bar ends at most one clearance apart."""
     clearance = 5e-3
 
     def balance(z):
@@ -182,13 +182,13 @@ def test_error_within_the_clearance_stores_no_energy():
     """The bar is 4 mm too long, the clearance is 5 mm."""
     answer = solve_exact(two_bars(4e-3, Clearance(radial=5e-3)))
     assert energy_of(answer.placement) < 1e-12  # [J], of 0.04 J without clearance
-    assert answer.energy == 0.0  # 1e-31 J is rounding
+    assert answer.energy == 0.0  # 1e-31 J is round-off
     assert answer.closure_residual() < 1e-12
     assert answer.clearance_excess() == 0.0
 
 
 def test_tilt_clearance_closes_axes_that_are_not_parallel():
-    """Axes 0.1 rad apart need 0.1 rad of tilt, for any turn of the bars."""
+    """Axes 0.1 rad apart require 0.1 rad of tilt for any rotation of the bars."""
     posture = two_bars(0.06, Clearance(tilt=0.2))
     errors = posture.robot.errors.copy()
     errors[4, 0] = 0.1  # about bar two, which no spring and no pin can undo
@@ -198,7 +198,7 @@ def test_tilt_clearance_closes_axes_that_are_not_parallel():
     assert answer.closure_residual() < 1e-12
 
 
-def test_load_passes_through_pressed_clearances_of_rigid_parts():
+def test_load_passes_through_closed_clearances_of_rigid_parts():
     """Clearance far moves by 0.2 mm, near by 0.5 + 0.2 mm; 5 N pass through far."""
     frames = (
         Frame("near", clearance=Clearance(axial=1e-3)),
@@ -216,7 +216,7 @@ def test_load_passes_through_pressed_clearances_of_rigid_parts():
 
 
 @pytest.mark.parametrize(("force", "side"), [(30.0, 1.0), (10.0, -8.0), (0.0, 25.0)])
-def test_pendulum_under_a_dead_load_rests_at_its_moment_balance(force, side):
+def test_pendulum_under_a_dead_load_rests_where_its_moments_balance(force, side):
     """k a = L (P sin a + F cos a); with k = 10 and P L = 15 it buckles to 1.5 rad."""
     stiffness, length = 10.0, 0.5
 
@@ -234,8 +234,8 @@ def test_pendulum_under_a_dead_load_rests_at_its_moment_balance(force, side):
     assert answer.least_curvature == pytest.approx(curvature, rel=1e-7)
 
 
-def test_moment_turns_a_pendulum_by_moment_over_stiffness():
-    """k a = M, by the definition of the moment's work, also at 0.8 rad."""
+def test_pendulum_rotates_by_moment_over_stiffness():
+    """k a = M, by definition of the work of the moment, also at 0.8 rad."""
     answer = solve_exact(pendulum(10.0, 0.5), [0, 0, 8.0, 0, 0, 0])
     assert answer.joint_screws[0, 2] == pytest.approx(0.8, rel=1e-12)
     assert answer.platform_screw[:3] == pytest.approx([0, 0, 0.8], abs=1e-12)
@@ -251,7 +251,7 @@ def test_unstable_equilibrium_has_a_negative_smallest_curvature():
 # What cannot be solved
 
 
-def test_rigid_parts_that_cannot_close_are_refused():
+def test_rigid_parts_that_cannot_close_are_rejected():
     robot = coaxial_beams([0, 0, 0, 1e-3, 0, 0], clearance=small_clearance())
     rigid = robot.with_links({"one": None, "two": None})
     with pytest.raises(CannotAssemble):
@@ -259,7 +259,7 @@ def test_rigid_parts_that_cannot_close_are_refused():
 
 
 @pytest.mark.parametrize("load", [None, [0, 0, 0, 1, 0, 0]])
-def test_start_from_the_solution_of_another_problem_is_refused(load):
+def test_start_from_the_solution_of_another_problem_is_rejected(load):
     posture = two_bars(0.01)
     start = solve_assembly(posture if load else two_bars(0.02))
     with pytest.raises(ValueError, match="start: found the linear solution of another"):
@@ -286,7 +286,7 @@ def test_too_few_steps_raise_an_error_of_no_convergence_with_both_residuals(
 
 @pytest.mark.parametrize("case", CASES)
 def test_exact_solution_of_the_paper_robot_converges_at_full_errors(case):
-    """Points in the middle, in flat valleys of clearance, at the workspace's rim."""
+    """Points in the middle, in flat energy valleys, and at the workspace boundary."""
     places = [(0, -0.5), (-0.525, -0.1), (0.35, -0.075), (-0.6, 0), (0.025, -0.6)]
     poses = np.full((len(places), 6), np.nan)
     poses[:, [0, 2]] = places
@@ -301,7 +301,7 @@ def test_exact_solution_of_the_paper_robot_converges_at_full_errors(case):
 
 
 def as_springs(robot, **options):
-    """The multibody model whose links are springs of the robot's own stiffness."""
+    """Multibody model whose links are springs with the stiffness of the robot."""
     stiffness = {
         frame.name: np.linalg.inv(link_compliance(frame))
         for frame in robot.frames
@@ -338,7 +338,7 @@ def test_exact_solution_equals_the_multibody_simulation_at_full_errors(case, pla
 @pytest.mark.exudyn
 @pytest.mark.parametrize("case", CASES)
 def test_exact_solution_with_clearances_equals_the_multibody_simulation(case):
-    """Contacts of the simulation deform; twice their energy is added (first order)."""
+    """Twice the energy of the deforming contacts is added, to first order."""
     robot = irsbot2_with(CASES[case])
     posture = place_robot(robot, pose={"tx": 0.1, "tz": -0.4})
     answer = solve_exact(posture)

@@ -1,4 +1,4 @@
-"""Properties of the exact equilibrium: limits, invariance, balance of wrenches."""
+"""Properties of the exact equilibrium: limits, invariance, and wrench balance."""
 
 from dataclasses import replace
 
@@ -25,8 +25,8 @@ CASES = {case["name"]: case for case in NUMBERS["cases"]}
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_linear_model_error_falls_with_the_square_of_the_errors(case):
-    """The pose differs by s^2, the relative energy by s, for errors scaled by s."""
+def test_linear_model_error_is_of_second_order_in_the_errors(case):
+    """For errors scaled by s, the pose differs by s^2 and the relative energy by s."""
     robot = without_clearance(irsbot2_with(CASES[case]))
     posture = place_robot(robot, pose={"tx": 0.1, "tz": -0.45})
     turns, shifts, energies = [], [], []
@@ -42,7 +42,7 @@ def test_linear_model_error_falls_with_the_square_of_the_errors(case):
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3, 5])
-def test_energy_slope_by_an_error_equals_the_wrench(seed):
+def test_energy_derivative_with_respect_to_an_error_equals_the_wrench(seed):
     """dE / d(delta l) = -force for the first body, by differences of solutions."""
     rng = np.random.default_rng(seed)
     robot, step = random_robot(rng, legs=3), 1e-6
@@ -58,13 +58,13 @@ def test_energy_slope_by_an_error_equals_the_wrench(seed):
                 home_posture(robot.with_errors(errors))
             ).energy
     found = (energies[:, 0] - energies[:, 1]) / (2 * step)
-    # a cone met or left on the way is the only kink; rounding is 1e-14 J / step
+    # only a change of active cones causes a kink; round-off is 1e-14 J / step
     assert np.abs(found - expected).max() < 1e-5 * np.abs(through[:, 3:]).max() + 1e-7
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_exact_solution_converges_along_flat_energy_valleys(seed):
-    """Rods of a Delta spin by radians under a load; the energy changes by 1e-6."""
+    """Delta rods spin by radians under a load while the energy changes by 1e-6."""
     rng = np.random.default_rng(seed)
     robot = delta()
     errors = 1e-4 * rng.uniform(-1, 1, robot.errors.shape)
@@ -82,12 +82,12 @@ def test_exact_solution_converges_along_flat_energy_valleys(seed):
         ("five_bar", 0, 0.01),
     ],
 )  # fmt: skip
-def test_platform_displacement_equals_the_potential_slope_by_the_load(
+def test_platform_displacement_equals_the_potential_derivative_by_castigliano(
     name, component, value
 ):
-    """Castigliano, also where symmetry leaves clearances unloaded that touch.
+    """Castigliano's theorem, also if symmetry leaves touching clearances unloaded.
 
-    They carry forces of the size of rounding, and may move without end.
+    They carry forces of the size of round-off, and their motion is undetermined.
     """
     posture = home_posture(load_robot(name))
     unit, step = np.eye(6)[component], 1e-3
@@ -102,7 +102,7 @@ def test_platform_displacement_equals_the_potential_slope_by_the_load(
 
 
 def loaded_arm(pieces=1):
-    """The six-axis arm, its frames off in all six ways, 50 N at its tip."""
+    """The six-axis arm with errors in all components of all frames, 50 N at its tip."""
     robot = load_robot("arm6")
     rng = np.random.default_rng(2)
     errors = rng.uniform(-1, 1, (len(robot.frames), 6)) * [*[2e-2] * 3, *[1e-3] * 3]
@@ -117,7 +117,7 @@ def loaded_arm(pieces=1):
 
 
 def test_beam_in_pieces_bends_from_its_displaced_position():
-    """Links turned by 0.02 rad bend a little: equal in pieces and as one."""
+    """Links rotated by 0.02 rad bend slightly, so one piece and several agree."""
     whole, cut = loaded_arm(), loaded_arm(pieces=2)
     assert len(cut.placement.transforms) > len(whole.placement.transforms)
     for name in ("link_screws", "wrenches"):
@@ -145,7 +145,7 @@ def test_start_from_a_nearby_solution_leads_to_the_same_equilibrium():
 
 @pytest.mark.parametrize("point", [(0.2, 0.0, 0.0), (-0.1, 0.3, 0.0)])
 def test_force_at_a_platform_point_moves_with_the_platform(point):
-    """k a = r x F with r = L + point, turned by a; also in the linear start."""
+    """k a = r x F, where r = L + point is rotated by a; also in the linear solution."""
     k, L, force = 10.0, 0.5, np.array([4.0, 9.0])
     posture = pendulum(k, L)
     x, y = L + point[0], point[1]
@@ -173,10 +173,10 @@ def test_force_at_a_platform_point_moves_with_the_platform(point):
 @pytest.mark.parametrize("pieces", [1, 3, 5])
 @pytest.mark.parametrize("radius", [0.01, 0.03])
 def test_exact_solution_balances_loads_from_nanonewtons_to_newtons(pieces, radius):
-    """The beam is linear: displacements are proportional to loads down to nanonewtons.
+    """Displacements are proportional to loads down to nanonewtons.
 
-    The energy change of a step is then below the rounding of the load's work, and
-    the step is accepted nevertheless.
+    The energy change of a step is then below the round-off of the work of the load, but
+    the step is still accepted.
     """
     link = BeamLink({"radius": radius}, 7e10, 0.3, pieces=pieces)
     arm = Frame("arm", translation=[0.5, 0.1, 0.2], rotation=[0, 0, 0.4], link=link)
@@ -203,14 +203,14 @@ def test_robot_without_errors_has_zero_displacement_and_energy():
     assert np.abs(answer.platform_screw).max() < 1e-12
 
 
-def test_closures_open_by_file_rounding_store_no_energy():
-    """Crank lengths of six digits leave the closures open by up to 1e-6 m."""
+def test_closures_open_by_rounded_file_numbers_store_no_energy():
+    """Crank lengths rounded to six digits leave closures open by up to 1e-6 m."""
     posture = home_posture(parallelograms(digits=6))
     assert posture.mismatch > 1e-9
     assert solve_exact(posture).energy == 0.0
 
 
-def test_contact_force_equals_the_energy_slope_by_the_clearance():
+def test_contact_force_equals_the_energy_derivative_by_the_clearance():
     """In a closed chain, force times clearance is -c dE/dc, by central differences."""
     clearance, step = 5e-3, 1e-6
     low, here, high = (

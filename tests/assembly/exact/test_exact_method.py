@@ -1,4 +1,4 @@
-"""Solvers with the reference method, which uses NumPy and Clarabel only."""
+"""Solvers with the reference method, which uses only NumPy and Clarabel."""
 
 from dataclasses import replace
 
@@ -68,7 +68,7 @@ QUESTIONS = {
 
 @pytest.fixture
 def nothing_compiled(monkeypatch):
-    """Called, every function of the C++ is refused."""
+    """Make every C++ function raise an error when called."""
 
     class Refused:
         def __getattr__(self, name):
@@ -91,13 +91,13 @@ def test_reference_method_calls_no_compiled_function(question, nothing_compiled)
 
 
 @pytest.mark.parametrize("question", QUESTIONS)
-def test_unknown_method_name_is_refused(question):
+def test_unknown_method_name_is_rejected(question):
     with pytest.raises(ValueError, match="is 'numpy', expected 'compiled' or 'ref"):
         QUESTIONS[question](beams(), "numpy")
 
 
 @pytest.mark.parametrize("start", ["start", "near"])
-def test_reference_method_refuses_a_compiled_start(start):
+def test_reference_method_rejects_a_compiled_start(start):
     posture = beams()
     compiled, reference = (
         {
@@ -116,7 +116,7 @@ def test_reference_method_refuses_a_compiled_start(start):
 
 @pytest.mark.parametrize("name", sorted(BUILT_IN))
 def test_both_methods_satisfy_the_equilibrium_conditions(name):
-    """Closed, within the cones and in balance; the energies are equal."""
+    """Both are closed, within the cones and balanced; their energies agree."""
     posture = home_posture(BUILT_IN[name]())
     one, other = (solve_exact(posture, LOAD, method=method) for method in METHODS)
     for found in (one, other):

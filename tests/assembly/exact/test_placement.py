@@ -24,7 +24,7 @@ from tests.robots_for_tests import random_robot
 
 @pytest.mark.parametrize("size", [1e-7, 1e-2, 0.5, 1.5])
 def test_finite_motion_equals_the_matrix_exponential_of_its_screw(rng, size):
-    """Equal to SciPy's matrix exponential up to rounding."""
+    """Equal to SciPy's matrix exponential to machine precision."""
     s = size * rng.normal(size=6)
     generator = np.zeros((4, 4))
     x, y, z = s[:3]
@@ -48,7 +48,7 @@ def test_left_jacobian_equals_its_power_series(rng, size):
 
 @pytest.mark.parametrize("size", [0.02, 0.3, 1.5, 3.0])
 def test_second_form_equals_differences_of_the_exponential(rng, size):
-    """By the product's expansion, for any turn; central differences leave 1e-8.
+    """Compared with central differences, which are accurate to 1e-8, for any rotation.
 
     log(exp(s + h) exp(-s)) = J h + D(h, h) / 2 + O(h^3): the even part is D.
     """
@@ -71,7 +71,7 @@ def test_second_form_equals_differences_of_the_exponential(rng, size):
 
 
 def moved_unknowns(posture, rng, size):
-    """A finite robot with unknowns of a size in rad and reference lengths."""
+    """A finite robot whose unknowns have a given size in rad and reference lengths."""
     model = FiniteRobot(posture, virtual_joints(posture.robot))
     x, h = rng.normal(size=(2, len(model.frame))) / np.sqrt(np.diag(model.metric))
     return model, size * x, h
@@ -91,7 +91,7 @@ def test_closure_and_platform_rows_equal_central_differences(seed):
 
 
 def expansion(seed):
-    """Far from home, where the closures hold nevertheless, under loads of all kinds."""
+    """A closed placement far from home, under loads of all kinds."""
     rng = np.random.default_rng(seed)
     posture = home_posture(heavy(random_robot(rng, 3, 3), rng))
     model, x, h = moved_unknowns(posture, rng, 0.1)
@@ -106,7 +106,7 @@ def expansion(seed):
 
 @pytest.mark.parametrize("seed", range(3))
 def test_expansion_derivatives_equal_central_differences(seed):
-    """Central differences of 1e-5; multipliers and basis are held."""
+    """Central differences of 1e-5, at fixed multipliers and basis."""
     local, h = expansion(seed)
     model, x, step = local.placement.model, local.placement.x, 1e-5
     ahead, behind = place(model, x + step * h), place(model, x - step * h)

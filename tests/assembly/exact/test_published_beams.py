@@ -1,4 +1,4 @@
-"""Links in pieces against published large deflections of other programs.
+"""Links in pieces, compared with published large deflections of other programs.
 
 Sources:
     Dowell, Traybar (1975), the Princeton beam; values after Obrezkov et al., Nonlinear
@@ -55,7 +55,7 @@ BAUCHAU = [
 
 
 def cantilever(length, link):
-    """One beam along x, clamped at the base."""
+    """A single beam along x, clamped at the base."""
     tip = Frame("tip", translation=[length, 0, 0], link=link)
     return home_posture(Robot("cantilever", "tip", (tip,)))
 
@@ -66,7 +66,7 @@ def tip_moved(posture, load):
 
 
 def test_beam_in_pieces_equals_the_whole_beam_for_small_motions():
-    """The stiffness and the share of each link are equal."""
+    """The stiffness and the compliance share of each link are equal."""
     robot = load_robot("delta")
     links = {f.name: replace(f.link, pieces=3) for f in robot.frames if f.link}
     cut = place_robot(robot.with_links(links), {"tx": 0.1})
@@ -84,7 +84,7 @@ def test_beam_in_pieces_equals_the_whole_beam_for_small_motions():
 
 @pytest.mark.parametrize("force", PRINCETON)
 def test_princeton_beam_deflection_equals_published_ansys_beams(force):
-    """8 pieces: to 1.5 % along, 0.3 % across; a linear beam is off by 9 and 20 %.
+    """8 pieces agree to 1.5 % along and 0.3 % across; linear beams to 9 and 20 %.
 
     The published solids differ from the published beams by up to 2.7 % across and 4 %
     along the height, so that no beam can be within 1 % of both.
@@ -157,7 +157,7 @@ def test_curved_cantilever_out_of_plane_deflection_equals_literature():
 
 @pytest.mark.exudyn
 def test_curved_cantilever_deflection_equals_geometrically_exact_beams():
-    """The same chords in Exudyn, 4 elements each; our pieces extrapolated: to 1e-4."""
+    """Extrapolated pieces agree to 1e-4 with Exudyn, 4 elements per chord."""
     simulated = simulate_assembly(curved_cantilever(8, 1), load=ACROSS)
     tips = [tip_moved(curved_cantilever(8, n), ACROSS) for n in (2, 4)]
     tip = (4 * tips[1] - tips[0]) / 3
@@ -165,7 +165,7 @@ def test_curved_cantilever_deflection_equals_geometrically_exact_beams():
 
 
 def twisted_beam(count):
-    """10 m along x, its section turned by 90 degrees from root to tip, in pieces."""
+    """A 10 m beam along x in pieces, twisted by 90 degrees from root to tip."""
     E, nu = 200e9, 0.3
     G = E / (2 * (1 + nu))
     shear = 8.2604167e9 / (G * 0.125)
@@ -181,7 +181,7 @@ def twisted_beam(count):
 
 
 def test_twisted_beam_deflection_equals_literature():
-    """Six digits after extrapolation; the published solid is 0.2 to 0.6 % off."""
+    """Extrapolation gives six digits; the published solid is off by 0.2 to 0.6 %."""
     load = [0, 0, 0, 0, 0, -4e6]
     tips = [tip_moved(twisted_beam(n), load) for n in (8, 16, 32)]
     rate = np.linalg.norm(tips[0] - tips[1]) / np.linalg.norm(tips[1] - tips[2])
@@ -212,7 +212,7 @@ def composite_beam(count):
 
 
 def test_composite_beam_deflection_equals_literature():
-    """A force of 150 lb across; six digits after extrapolation."""
+    """A transverse force of 150 lb; six digits agree after extrapolation."""
     tips = [tip_moved(composite_beam(n), [0, 0, 0, 0, 0, 150.0]) for n in (16, 32)]
     published = [-9.02726627566e-2, -6.47488486259e-2, 1.22973648292]
     np.testing.assert_allclose((4 * tips[1] - tips[0]) / 3, published, rtol=1e-6)
@@ -221,8 +221,8 @@ def test_composite_beam_deflection_equals_literature():
 def test_plane_cantilever_deflection_equals_literature():
     """ux 0.15097, uy 0.71057 m; the error falls with the square of the pieces.
 
-    Stiff across its plane, as the published model has no other; left soft there, this
-    load is beyond that of lateral buckling.
+    The beam is stiff across its plane, like the published planar model; otherwise this
+    load would exceed the lateral buckling load.
     """
     width, height, nu = 0.1, 0.5, 0.3
     shear = 10 * (1 + nu) / (12 + 11 * nu)
@@ -241,7 +241,7 @@ def test_plane_cantilever_deflection_equals_literature():
 
 @pytest.mark.parametrize("angle", [1.0, 3.0])
 def test_beam_under_an_end_moment_bends_to_a_circular_arc(angle):
-    """Tip at (L sin a / a, L (1 - cos a) / a), a = M L / EI; half of a turn and less.
+    """The tip is at (L sin a / a, L (1 - cos a) / a), a = M L / EI, up to half a turn.
 
     The moment's work m . theta is its own in a plane, up to a turn of pi.
     """
@@ -260,7 +260,7 @@ def test_beam_under_an_end_moment_bends_to_a_circular_arc(angle):
 
 @pytest.mark.parametrize("pieces", [4, 8, 16])
 def test_column_in_pieces_buckles_at_the_euler_load(pieces):
-    """pi^2 EI / 4 L^2 of a clamped column; least eigenvalue of K through zero there.
+    """The smallest eigenvalue of K vanishes at pi^2 EI / 4 L^2 for a clamped column.
 
     Pieces buckle earlier by pi^2 / 24 n^2: half of it as rigid bars on springs do,
     whose load is (sin x / x)^2 of Euler's with x = pi / 4 n, half for the deflection of
@@ -315,7 +315,7 @@ def bauchau(pieces):
 def test_four_bar_with_a_tilted_hinge_has_the_published_deflections(
     pieces, in_plane, across
 ):
-    """16 pieces: 1e-4 in the plane, 0.1 % across; one spring per bar for comparison."""
+    """16 pieces agree to 1e-4 in the plane and 0.1 % across it, unlike one per bar."""
     robot = bauchau(pieces)
     for angle, *published in BAUCHAU:
         posture = place_robot(robot, joints={"crank": -angle})
@@ -328,8 +328,8 @@ def test_four_bar_with_a_tilted_hinge_has_the_published_deflections(
 
 @pytest.mark.exudyn
 @pytest.mark.parametrize("row", BAUCHAU)
-def test_multibody_simulation_of_that_four_bar_has_published_deflections(row):
-    """Our Exudyn model, 8 elements per bar: to 1e-4 in the plane, 0.1 % across."""
+def test_multibody_simulation_of_the_tilted_four_bar_has_published_deflections(row):
+    """The model has 8 elements per bar and agrees to 1e-4 in plane, 0.1 % across."""
     angle, *published = row
     posture = place_robot(bauchau(1), joints={"crank": -angle})
     model = SimulationModel(links="beam", elements=8)

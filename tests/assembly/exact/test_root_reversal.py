@@ -17,7 +17,7 @@ from forcefit.stiffness.screws import (
 
 @dataclass
 class Body:
-    """From one joint to the next: where to, its error and K at its end, and there."""
+    """Body from one joint to the next: its transform, and error and K at its end."""
 
     T: np.ndarray
     error: np.ndarray
@@ -25,7 +25,7 @@ class Body:
     joint: dict
 
     def reversed(self, joint):
-        """The same body seen from its end, with the joint at its start."""
+        """The same body described from its end, with the joint at its start."""
         back = screw_map(self.T[:3, 3], self.T[:3, :3])
         C = back @ np.linalg.inv(self.K) @ back.T
         C = (C + C.T) / 2
@@ -33,7 +33,7 @@ class Body:
 
 
 def random_legs(rng):
-    """Two legs of three bodies from the base to one platform, and the platform."""
+    """Two legs of three bodies from the base to a platform, and the platform."""
     legs, platform = [], transform([0.4, 0.1, 0.3], rotation_matrix([0.3, -0.2, 0.5]))
     for _ in range(2):
         leg, here = [], np.eye(4)
@@ -78,7 +78,7 @@ def robot_of(legs):
 
 
 def from_the_platform(legs):
-    """Every leg backwards: bodies inverted, each joint now at its body's other end."""
+    """Every leg reversed: bodies are inverted, and joints move to their other end."""
     turned = []
     for leg in legs:
         joints = [{}, *(one.joint for one in leg)]
@@ -113,7 +113,7 @@ def test_solution_does_not_depend_on_the_root_of_the_tree(seed):
 
 @pytest.mark.parametrize("seed", range(3))
 def test_exact_energy_depends_on_the_root_by_second_order_only(seed):
-    """Errors before and after a turn differ; the difference falls with their square."""
+    """Errors before and after a rotation differ by second-order terms only."""
     legs, _ = random_legs(np.random.default_rng(seed))
     off = []
     for s in (1.0, 0.5):

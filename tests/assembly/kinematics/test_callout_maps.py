@@ -1,4 +1,4 @@
-"""Datum frames and the errors of frames, against hand calculation and finite motion."""
+"""Datum frames and frame errors, compared with hand calculation and finite motions."""
 
 from dataclasses import replace
 
@@ -42,14 +42,14 @@ def hole(*datums):
 
 
 def with_bore(x, y):
-    """The plate with another bore along z at a point [m]."""
+    """The plate with an additional bore along z at a point [m]."""
     bore = Frame("bore", "plate", np.array([x, y, 0]))
     return replace(PLATE, frames=(*PLATE.frames, bore))
 
 
-def test_exchanging_two_datums_moves_a_hole_by_the_amount_computed_by_hand():
-    """B out of square to A by 0.05 over 60 mm (0.833 mrad): the hole 80 mm from B
-    moves by 66.7 um normal to A in B|A, not at all in A|B."""
+def test_exchanging_two_datums_moves_a_hole_as_computed_by_hand():
+    """B out of square to A by 0.05 over 60 mm (0.833 mrad): the hole 80 mm from B moves
+    by 66.7 um normal to A in B|A, and by zero in A|B."""
     row = PLATE.index("hole")
     largest = []
     for datums in ((A, B), (B, A)):
@@ -61,7 +61,7 @@ def test_exchanging_two_datums_moves_a_hole_by_the_amount_computed_by_hand():
 
 
 def _on_screw(placed_callout, row):
-    """(6,) direction whose product with the screw of u is row @ u."""
+    """(6,) vector whose product with the screw of u equals row @ u."""
     return row @ np.linalg.pinv(placed_callout.zone.columns)
 
 
@@ -73,8 +73,8 @@ def test_side_face_tilts_at_most_its_width_over_its_side():
     )
 
 
-def test_datum_restricted_by_an_earlier_datum_fixes_only_the_remaining_freedoms():
-    """A (plane) holds RX, RY, TZ.  A bore B along z then holds TX and TY, not RZ."""
+def test_secondary_datum_fixes_only_the_remaining_degrees_of_freedom():
+    """Plane A fixes RX, RY, TZ; a bore B along z then fixes TX, TY but not RZ."""
     robot = with_bore(0.0, 0.05)
     bore = Callout("bore", "bore", (A,), extent=(0.02,), widths={"position": 0.1e-3})
     first, _ = placed(robot, bore, hole(A, Datum("bore")))
@@ -86,7 +86,7 @@ def test_datum_restricted_by_an_earlier_datum_fixes_only_the_remaining_freedoms(
 
 
 def test_shift_of_a_datum_at_maximum_material_depends_on_the_size_of_its_hole():
-    """Bore 12 H7 after face A: 0 to 18 um larger than its least size, so the datum
+    """Bore 12 H7 after face A: 0 to 18 um larger than its minimum size, so the datum
     shifts by up to 9 um along x and y; uniform sizes and positions: 9 um / sqrt 12."""
     robot = with_bore(0.0, 0.05)
     shifting = Datum("bore", hole="12 H7", hole_of="bore")
@@ -106,7 +106,7 @@ def test_shift_of_a_datum_at_maximum_material_depends_on_the_size_of_its_hole():
 
 
 def test_shift_of_a_second_bore_rotates_the_features_measured_from_it():
-    """Bore A at the origin holds all but the turn.  Bore B, 50 mm from A, shifts by
+    """Bore A at the origin fixes all but the rotation.  Bore B, 50 mm from A, shifts by
     9 um: the hole, 80 mm from A, moves by 9 um x 80/50 = 14.4 um around A."""
     robot = with_bore(0.05, 0.0)
     shifting = Datum("bore", hole="12 H7", hole_of="bore")
@@ -183,10 +183,10 @@ def _platform(home, errors):
         ([replace(hole(B), widths={}, length=(0.09, 1e-4))],
          "found a length of 90 mm, expected the length at home, 80 mm"),
         ([replace(hole(Datum("hole")), feature="tip", after=True)],
-         "no frame that its joint"),
+         "no frame carried by its joint"),
     ],
 )  # fmt: skip
-def test_callout_that_does_not_apply_to_its_feature_is_refused_in_one_line(
+def test_callout_that_does_not_apply_to_its_feature_is_rejected_in_one_line(
     callouts, message
 ):
     with pytest.raises(BadInput, match=message) as error:

@@ -1,4 +1,4 @@
-"""Closures that do not hold: rounding, an error of one frame, or preloaded drives."""
+"""Closures that do not hold: rounded files, an error of one frame, preloaded drives."""
 
 import math
 from dataclasses import replace
@@ -15,7 +15,7 @@ OFF = 1e-4  # [m] out of the plane of a four-bar: no motion takes it up
 
 
 def bent_four_bar():
-    """The four-bar with one link's end out of its plane."""
+    """A four-bar with the end of one link out of its plane."""
     robot = load_robot("four_bar")
     frames = tuple(
         replace(f, translation=f.translation + [0, 0, OFF]) if f.name == "rocker" else f
@@ -30,7 +30,7 @@ def test_open_closure_message_offers_the_rest_option():
 
 
 def test_closure_residual_becomes_the_error_of_the_named_frame():
-    """A shift across the plane of motion is equal in every frame; so is the energy."""
+    """An out-of-plane shift and its energy are the same for every frame."""
     energies = []
     for name in ("end_coupler", "rocker"):
         robot = rest_in(bent_four_bar(), name)
@@ -46,14 +46,16 @@ def test_closure_residual_becomes_the_error_of_the_named_frame():
     ("name", "message"),
     [("ankle", 'no frame "ankle"'), ("crank", "found no open loop through it")],
 )
-def test_closure_residual_in_an_unsuitable_frame_is_refused(name, message):
+def test_assigning_the_closure_residual_to_an_unsuitable_frame_is_rejected(
+    name, message
+):
     robot = bent_four_bar() if name == "ankle" else load_robot("four_bar")
     with pytest.raises(BadInput, match=message):
         rest_in(robot, name)
 
 
 def two_slides(first=2e6, second=3e6):
-    """One platform on two slides along x, one behind the other, both driven."""
+    """A platform on two driven slides along x, one behind the other."""
     turn = [0, np.pi / 2, 0]
 
     def drive(name, stiffness):
@@ -71,7 +73,7 @@ def two_slides(first=2e6, second=3e6):
 
 @pytest.mark.parametrize("apart", [1e-5, -3e-3])
 def test_redundant_drives_are_preloaded_by_their_mismatch(apart):
-    """Two springs in series: E = d^2 / 2 k1 k2 / (k1 + k2), at the weighted mean."""
+    """Springs in series settle at the weighted mean: E = d^2 / 2 k1 k2 / (k1 + k2)."""
     k = 2e6, 3e6
     robot = preloaded(two_slides(*k), {"one": 0.35, "two": 0.35 + apart})
     assembly = solve_assembly(home_posture(robot))
@@ -81,12 +83,12 @@ def test_redundant_drives_are_preloaded_by_their_mismatch(apart):
     assert robot.remarks[-1].startswith("1 of 2 drives redundant")
 
 
-def test_mismatched_redundant_drives_are_refused_with_the_option():
+def test_mismatched_redundant_drives_are_rejected_with_a_hint_at_the_option():
     with pytest.raises(BadInput, match="1 of 2 drives are redundant: with --mismatch"):
         place_robot(two_slides(), joints={"one": 0.3, "two": 0.32})
 
 
-def test_mismatched_rigid_drive_is_refused_by_name():
+def test_mismatched_rigid_drive_is_rejected_by_name():
     robot = two_slides()
     frames = tuple(
         replace(f, joint_stiffness=None) if f.name == "two" else f for f in robot.frames
@@ -97,7 +99,7 @@ def test_mismatched_rigid_drive_is_refused_by_name():
 
 @pytest.mark.parametrize("scale", [1e-6, 1e-3, 0.05, 1.0])
 def test_closure_tolerance_is_proportional_to_the_size_of_a_small_robot(scale):
-    """A gap of 1e-4 of the robot's size exceeds rounding, at any size."""
+    """A gap of 1e-4 of the robot's size exceeds the tolerance at any size."""
     frames = (
         Frame("tip", translation=[scale, 0, 0]),
         Frame("post", translation=[scale, 1e-4 * scale, 0]),
@@ -113,7 +115,7 @@ def frame(name, parent="base", at=(0, 0, 0), **more):
 
 
 def parallelograms(digits, error=0.0):
-    """Three equal cranks on one coupler: overconstrained, numbers rounded."""
+    """Three equal cranks on one coupler: overconstrained, with rounded numbers."""
     q = 0.7
     height = round(math.sqrt(0.05), digits) + error
     shifts = [(0.0, 0.0), (0.5, 0.0), (round(1 / 3, digits), height)]
@@ -132,7 +134,7 @@ def parallelograms(digits, error=0.0):
 
 
 def test_closure_gap_from_six_digit_rounding_is_accepted_and_reported():
-    """Rounding leaves up to 5e-7 m per number; a gap below 1e-6 m is accepted."""
+    """Rounded numbers are off by up to 5e-7 m; gaps below 1e-6 m are accepted."""
     posture = home_posture(parallelograms(digits=6))
     assert 1e-9 < posture.mismatch < 1e-6
     assert home_posture(parallelograms(digits=15)).mismatch < 1e-12
@@ -140,7 +142,7 @@ def test_closure_gap_from_six_digit_rounding_is_accepted_and_reported():
     assert moved.mismatch < 1e-6
 
 
-def test_closure_gap_above_one_micrometre_is_refused_by_name():
+def test_closure_gap_above_one_micrometre_is_rejected_by_name():
     with pytest.raises(BadInput, match=r'closure\[2\] \("tip2", "tip0"\)') as caught:
         home_posture(parallelograms(digits=15, error=1e-4))
     assert "expected < 1e-06" in str(caught.value)

@@ -1,4 +1,4 @@
-"""Robots placed by pose and by joints, against closed forms."""
+"""Robots placed by pose and by joint coordinates, compared with closed forms."""
 
 import math
 import re
@@ -26,7 +26,7 @@ EXACT = 1e-9  # closures are solved to 1e-10 of the longest body, all near 1 m h
 @pytest.mark.parametrize("mode", [1.0, -1.0])
 @pytest.mark.parametrize("q", [-2.0, 0.1, 1.5, 3.0, 5.0])
 def test_four_bar_follows_the_law_of_cosines_in_its_assembly_mode(q, mode):
-    """The crank turns fully, and neither assembly mode is left."""
+    """The crank makes a full turn without leaving either assembly mode."""
     posture = place_robot(four_bar(mode=mode), joints={"crank": q})
     coupler, _, end = four_bar_angles(q, mode)
     np.testing.assert_allclose(posture.platform[:2, 3], end, rtol=0, atol=EXACT)
@@ -36,7 +36,7 @@ def test_four_bar_follows_the_law_of_cosines_in_its_assembly_mode(q, mode):
 
 
 def test_rough_home_coordinates_are_corrected_to_close():
-    """Passive coordinates 0.05 rad off are solved; the driven one is kept."""
+    """Passive coordinates off by 0.05 rad are corrected, the driven one is not."""
     posture = home_posture(four_bar(0.5))
     assert posture.coordinates[0] == 0.5
     np.testing.assert_allclose(
@@ -45,7 +45,7 @@ def test_rough_home_coordinates_are_corrected_to_close():
 
 
 def test_message_states_the_angle_at_which_a_limited_crank_stops():
-    """Coupler and rocker of 0.3 m are in line when the crank's end is 0.6 m away."""
+    """Coupler and rocker of 0.3 m are collinear when the crank end is 0.6 m away."""
     short = 0.3
     robot = Robot(
         "short", "end",
@@ -65,12 +65,12 @@ def test_message_states_the_angle_at_which_a_limited_crank_stops():
     left = (1 - flat / 2.0) * 100
     with pytest.raises(BadInput, match="short: these joint coordinates") as caught:
         place_robot(robot, joints={"crank": 2.0})
-    found = float(str(caught.value).split("to hold ")[1].split(" %")[0])
+    found = float(str(caught.value).split("closures fail ")[1].split(" %")[0])
     assert found == pytest.approx(left, abs=0.1)
 
 
 def arm(lengths=(0.5, 0.4), angles=(0.3, 0.9)):
-    """Planar serial arm, both joints driven."""
+    """Planar serial arm with two driven joints."""
     first, second = lengths
     return Robot("arm", "hand", (
         frame("a", **driven(angles[0])),
@@ -107,7 +107,7 @@ def test_missing_rotation_in_the_message_equals_the_angle_between_the_two_rotati
 
 
 def test_unspecified_pose_components_are_chosen_nearest_to_home():
-    """Of all elbow angles with the hand at x, the nearest to home."""
+    """Of all elbow angles with the hand at x, the one nearest to home is found."""
     robot = arm()
     home = home_posture(robot)
     x = home.platform[0, 3]
@@ -126,7 +126,7 @@ def test_unspecified_pose_components_are_chosen_nearest_to_home():
 
 
 def test_slider_crank_position_equals_its_closed_form():
-    """Passive prismatic joint: x = r cos q + sqrt(l^2 - r^2 sin^2 q)."""
+    """The passive prismatic joint is at x = r cos q + sqrt(l^2 - r^2 sin^2 q)."""
     half = math.pi / 2
     r, l, q = 0.2, 0.5, 1.1
     robot = Robot("slider_crank", "pin", (
@@ -155,7 +155,7 @@ def test_slider_crank_position_equals_its_closed_form():
         ({"joints": {"a": math.inf}}, "joint a: found inf, expected a finite number"),
     ],
 )
-def test_invalid_pose_or_joint_request_is_refused(given, message):
+def test_invalid_pose_or_joint_request_is_rejected(given, message):
     with pytest.raises(BadInput) as caught:
         place_robot(arm(), **given)
     assert str(caught.value).startswith(message)

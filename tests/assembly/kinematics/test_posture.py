@@ -1,4 +1,4 @@
-"""Postures, one or many: their text, their screw maps, their cached arrays."""
+"""One or many postures: text, screw maps, and cached arrays."""
 
 from dataclasses import replace
 
@@ -17,7 +17,7 @@ def turned(*angles):
 
 
 def test_paths_transform_screws_from_each_frame_to_the_platform():
-    """[R 0; [p_j - p]x R, R], of one posture and of each of many."""
+    """The map is [R 0; [p_j - p]x R, R] for one posture and for each of many."""
     postures = turned(0.4, 0.9)
     many = together(postures)
     last = postures[0].robot.index(postures[0].robot.platform)
@@ -32,7 +32,7 @@ def test_paths_transform_screws_from_each_frame_to_the_platform():
         many.paths[0, 0, 0, 0] = 1.0
 
 
-def test_coordinates_above_1e6_are_refused():
+def test_coordinates_above_1e6_are_rejected():
     with pytest.raises(BadInput, match=r"pose.tx: found 2e\+06, expected a number of"):
         place_robot(four_bar(), pose={"tx": 2e6})
     with pytest.raises(
@@ -51,8 +51,8 @@ def test_posture_reports_its_largest_closure_gap():
     assert home_posture(robot).mismatch == pytest.approx(5e-7, rel=1e-6)
 
 
-def test_joints_after_a_closure_or_the_platform_keep_their_position():
-    """Their motion changes neither the closing frame nor the platform."""
+def test_joints_beyond_a_closure_or_the_platform_stay_in_position():
+    """Their motion affects neither the closing frame nor the platform."""
     robot = four_bar()
     closed = {"end", "seat"}
     frames = tuple(
@@ -96,7 +96,7 @@ def test_missing_distance_in_the_message_has_the_unit_of_the_requested_component
 
 
 @pytest.mark.parametrize("function", [solve_assembly, zone_margin, platform_stiffness])
-def test_a_robot_in_place_of_a_posture_is_refused_with_a_way_out(function):
+def test_passing_a_robot_instead_of_a_posture_is_rejected_with_a_hint(function):
     with pytest.raises(TypeError, match=r'robot "bars".*forcefit.place_robot\(robot\)'):
         function(four_bar())
 
@@ -105,7 +105,7 @@ BEAM = BeamLink({"radius": 0.01}, 7e10, 0.3)
 
 
 def arm(pieces):
-    """Hinge, a beam askew with a hinge at its end, a second beam, and a tip."""
+    """A hinge, an oblique beam with a hinge at its end, a second beam, and a tip."""
     beam = replace(BEAM, pieces=pieces)
     return Robot("arm", "tip", (
         Frame("hinge", joint="revolute", actuated=True, position=0.4),
@@ -118,7 +118,7 @@ def arm(pieces):
 
 
 def test_cutting_a_posture_equals_placing_the_cut_robot():
-    """For any drive positions, and for several postures together."""
+    """Both agree for any drive positions, and for several postures together."""
     robot = arm(3)
     cut = cut_beams(robot)
     joints = {"hinge": 1.1, "elbow": 0.3}

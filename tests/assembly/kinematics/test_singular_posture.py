@@ -1,4 +1,4 @@
-"""Singular postures, modes that meet there, and poses beyond a singularity."""
+"""Singular postures, intersecting operation modes, and poses beyond a singularity."""
 
 import math
 from dataclasses import replace
@@ -23,13 +23,13 @@ def singular(posture):
 
 
 def flat(x=0.0, y=0.0, z=HEIGHT):
-    """A pose of pure translation."""
+    """A pose reached by pure translation."""
     return {"tx": x, "ty": y, "tz": z, "rx": 0.0, "ry": 0.0, "rz": 0.0}
 
 
 @pytest.mark.parametrize("z", [0.3, HEIGHT, 0.6])
 def test_three_upu_is_singular_above_its_centre_and_regular_2_mm_away(z):
-    """At the centre its three couples are parallel; 2 mm away they are not."""
+    """Its three constraint couples are parallel at the centre, but not 2 mm away."""
     robot = three_upu()
     assert singular(place_robot(robot, pose=flat(z=z)))
     assert not singular(place_robot(robot, pose=flat(x=0.002, z=z)))
@@ -47,7 +47,7 @@ def test_robot_without_drives_is_regular():
 
 
 def test_slider_driven_at_its_dead_centre_is_singular():
-    """With crank and rod in line, the locked slide lets the crank begin to turn."""
+    """With crank and rod collinear, the locked slide does not hold the crank."""
     assert singular(home_posture(slider_crank(0.0)))
     assert not singular(home_posture(slider_crank(0.4)))
 
@@ -56,7 +56,7 @@ GIVEN = [{"tz": HEIGHT}, {"tx": 0.0, "ty": 0.0, "tz": HEIGHT}, flat()]
 
 
 @pytest.mark.parametrize("pose", GIVEN)
-def test_singularity_distances_are_zero_in_every_way_to_give_the_singular_pose(pose):
+def test_singularity_distances_vanish_however_the_singular_pose_is_specified(pose):
     robot = three_upu()
     found = find_singularities(robot, place_robot(robot, pose=pose).transforms[None])
     assert found.parallel[0] == 0.0
@@ -74,7 +74,7 @@ def test_pose_from_a_singular_home_is_reached_by_pure_translation():
     assert posture.pose() == pytest.approx(flat(0.002, 0.001), abs=1e-9)
 
 
-def test_drive_coordinates_from_a_singular_home_keep_the_translational_mode():
+def test_drive_coordinates_from_a_singular_home_stay_in_the_translational_mode():
     """Three spheres meet at x = (L^2 - l^2) / (3 (b - p)), y = 0."""
     robot = three_upu()
     posture = place_robot(robot, joints={"leg1.slide": 0.5})
@@ -94,12 +94,12 @@ def test_pose_reached_only_by_rotating_the_platform_is_reported_as_another_mode(
 
 
 def test_unreachable_pose_message_states_that_home_is_singular():
-    with pytest.raises(BadInput, match=r"home is a singular posture: name all six"):
+    with pytest.raises(BadInput, match=r"home is a singular posture: specify all six"):
         place_robot(three_upu(), pose={"tz": HEIGHT, "rz": 3.0})
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
-def test_hexapod_turned_beyond_90_degrees_is_beyond_its_singularity(side):
+def test_hexapod_rotated_beyond_90_degrees_is_beyond_its_singularity(side):
     """A regular hexapod is singular at 90 degrees about z (Fichter 1986)."""
     robot = load_robot("hexapod")
     height = home_posture(robot).pose()["tz"]

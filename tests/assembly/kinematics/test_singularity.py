@@ -1,4 +1,4 @@
-"""Distances to singularities, against closed forms of linkages."""
+"""Distances to singularities, compared with closed forms of linkages."""
 
 import math
 from dataclasses import replace
@@ -21,14 +21,14 @@ from tests.linkages_for_tests import five_bar, four_bar
 
 
 def at(robot, **options):
-    """Distances at one posture."""
+    """Singularity distances at one posture."""
     return find_singularities(robot, place_robot(robot, **options).transforms[None])
 
 
 def five_bar_jacobian(T, robot):
     """(2, 2) [m/rad] drives to tip: A v = B q', Gosselin and Angeles' two matrices.
 
-    The second arm keeps its length: d.v = d.(k x a) q', a the first arm, d the second.
+    The length of the second arm d is constant: d.v = d.(k x a) q' for the first arm a.
     """
     A, B = np.zeros((2, 2)), np.zeros((2, 2))
     tip = T[robot.index("left.tip"), :2, 3]
@@ -42,7 +42,7 @@ def five_bar_jacobian(T, robot):
 
 @pytest.fixture(scope="module")
 def five_bars():
-    """The built-in robot and its transforms at poses drawn at random."""
+    """The built-in robot and its transforms at random poses."""
     robot = load_robot("five_bar")
     rng = np.random.default_rng(1)
     poses = np.full((40, 6), np.nan)
@@ -53,7 +53,7 @@ def five_bars():
 
 
 def test_singularity_distances_of_a_five_bar_equal_its_closed_form_jacobian(five_bars):
-    """J = A^-1 B with the tip's rotation and translation: tangents of the angles."""
+    """J = A^-1 B of tip rotation and translation gives the tangents of the angles."""
     robot, T = five_bars
     found = find_singularities(robot, T)
     assert len(T) >= 30
@@ -76,7 +76,7 @@ def test_singularity_distances_of_a_five_bar_equal_its_closed_form_jacobian(five
 
 
 def test_serial_singularity_of_aligned_arms_is_reported_with_the_name_of_the_drive():
-    """B_11 = d.(k x a) = 0 where the left arms are one line, 180 mm long.
+    """B_11 = d.(k x a) = 0 where the left arms are collinear, 180 mm long.
 
     If they are shorter by e, they are bent by an angle proportional to sqrt(e).
     """
@@ -92,8 +92,8 @@ def test_serial_singularity_of_aligned_arms_is_reported_with_the_name_of_the_dri
 
 
 @pytest.mark.parametrize("angle", [0.3, 1.1, 2.5, 4.0])
-def test_singularity_distances_of_a_four_bar_equal_the_speed_of_its_closed_form(angle):
-    """Speed and turn of Hoeken's coupler by differences of its closed form."""
+def test_singularity_distances_of_a_four_bar_follow_from_its_closed_form_speed(angle):
+    """Velocity of Hoeken's coupler, by differences of its closed form."""
     robot = load_robot("four_bar")
     found = at(robot, joints={"crank": angle})
 
@@ -115,7 +115,7 @@ def test_singularity_distances_of_a_four_bar_equal_the_speed_of_its_closed_form(
 
 
 def test_orthoglide_is_isotropic_at_home():
-    """Chablat, Wenger (2003): its Jacobian is the identity there, tan = 1."""
+    """Chablat, Wenger (2003): the Jacobian is the identity at home, so tan = 1."""
     robot = load_robot("orthoglide")
     found = find_singularities(robot, home_posture(robot).transforms[None])
     assert found.condition[0] == pytest.approx(1.0, abs=1e-9)
@@ -123,7 +123,7 @@ def test_orthoglide_is_isotropic_at_home():
 
 
 def test_arm_with_aligned_wrist_axes_is_serially_singular():
-    """An arm's wrist with its fourth and sixth axes in line loses a freedom."""
+    """A wrist with aligned fourth and sixth axes loses a degree of freedom."""
     robot = load_robot("arm6")
     driven = [f.name for f in robot.frames if f.actuated]
     goals = np.full((2, len(robot.frames)), np.nan)
@@ -141,7 +141,7 @@ def test_arm_with_aligned_wrist_axes_is_serially_singular():
 
 
 def test_singularity_distances_do_not_depend_on_the_unit_of_length(five_bars):
-    """Every length times 1000 changes no angle: lengths are relative to a body's."""
+    """Lengths are relative to a body length, so a factor of 1000 changes no angle."""
     robot, T = five_bars
     frames = [replace(f, translation=1000 * f.translation) for f in robot.frames]
     large = T.copy()
@@ -171,7 +171,7 @@ def parallelogram(angle):
 
 
 def test_closure_singularity_of_a_flat_parallelogram_is_reported_with_its_joint():
-    """All four axes meet one line: the distance is proportional to the angle."""
+    """All four axes meet one line; the distance is proportional to the angle."""
     found = []
     for angle in (0.1, 0.01):
         robot = parallelogram(angle)
@@ -184,8 +184,8 @@ def test_closure_singularity_of_a_flat_parallelogram_is_reported_with_its_joint(
 
 
 def screws_by_hand(robot, T):
-    """(n, 6) what a unit of each joint does to the platform's origin if it is on the
-    way there; lengths, and slides, in the robot's size."""
+    """(n, 6) platform motion per unit of each joint on the path to the platform, with
+    lengths and slides in units of the robot's size."""
     size, screws = size_of(robot), np.zeros((len(robot.frames), 6))
     last = robot.index(robot.platform)
     for k, frame in enumerate(robot.frames):
@@ -199,7 +199,7 @@ def screws_by_hand(robot, T):
 
 
 def way_to(robot, name):
-    """Places of frames from the base to one."""
+    """Indices of the frames from the base to a given frame."""
     way = []
     while name != "base":
         way.append(robot.index(name))
@@ -209,8 +209,8 @@ def way_to(robot, name):
 
 @pytest.mark.parametrize("name", ["five_bar", "3rrr", "orthoglide", "arm6", "delta"])
 def test_singular_motions_satisfy_the_closures_and_have_unit_size(name):
-    """Motions have size one; the platform's, or the drives', share is the least.
-    Passive joints move with them, and closures stay closed."""
+    """The motions have unit size with the smallest possible platform or drive part.
+    Passive joints follow, and the closures hold."""
     robot = load_robot(name)
     driven = [k for k, f in enumerate(robot.frames) if f.actuated]
     home = home_posture(robot)
@@ -243,7 +243,7 @@ def test_singular_motions_satisfy_the_closures_and_have_unit_size(name):
 
 
 def test_platform_that_no_joint_moves_has_no_serial_singularity():
-    """Its drive moves, but nothing of the platform."""
+    """The drive moves, but the platform does not."""
     turning = {"joint": "revolute", "actuated": True}
     robot = Robot("still", "tip", (
         Frame("tip"), Frame("one", **turning),
@@ -260,7 +260,7 @@ TURNING = {"joint": "revolute", "actuated": True}
 
 
 def side_by_side(*joints):
-    """Joints at one place about or along z, of which the first is driven."""
+    """Coincident joints about or along z, the first of which is driven."""
     frames, closures = [], []
     for k, joint in enumerate(joints):
         frames += [Frame(f"j{k}", joint=joint, actuated=k == 0),
@@ -270,12 +270,12 @@ def side_by_side(*joints):
 
 
 @pytest.mark.parametrize(("robot", "counts"), [
-    # an arm closes nothing: its joints are its freedoms
+    # an open arm has as many degrees of freedom as joints
     (Robot("arm", "tip", (Frame("a", **TURNING), Frame("b", "a", [1, 0, 0], **TURNING),
                           Frame("tip", "b"))), (2, 0, 0)),
-    # in a plane: three equations of a closure of six
+    # planar loop: three of the six closure equations are independent
     (four_bar(), (1, 0, 3)), (four_bar(mode=-1.0), (1, 0, 3)),
-    # its tip turns by itself about the two pins it hangs from
+    # the tip can rotate by itself about its two pins
     (five_bar(), (3, 1, 3)),
     # one motion in common, of twelve equations two
     (side_by_side("prismatic", "prismatic", "prismatic"), (1, 0, 10)),
@@ -283,7 +283,7 @@ def side_by_side(*joints):
     (side_by_side("revolute", "prismatic"), (0, 0, 4)),
     (side_by_side("revolute", "fixed"), (0, 0, 5)),
 ])  # fmt: skip
-def test_freedoms_and_overconstraint_equal_hand_counts(robot, counts):
-    """All freedoms, freedoms with locked drives, and redundant equations."""
+def test_degrees_of_freedom_and_overconstraint_equal_hand_counts(robot, counts):
+    """Degrees of freedom with free and locked drives, and redundant equations."""
     found = mobility(home_posture(robot))
     assert (found.freedoms, found.locked_freedoms, found.overconstraint) == counts

@@ -1,4 +1,4 @@
-"""Tracks to one target and to many: where they end, and in which assembly mode."""
+"""Tracks to one or many targets: end points and assembly modes."""
 
 import math
 
@@ -39,7 +39,7 @@ def test_poses_of_many_targets_equal_those_placed_one_by_one():
 
 @pytest.mark.parametrize("name", ["irsbot2", "orthoglide"])
 def test_direct_track_ends_in_the_same_posture_as_many_short_steps(name):
-    """Home's assembly mode: through 40 targets on the line, each from the previous."""
+    """The assembly mode is that of home, as for 40 successive targets on the line."""
     robot = load_robot(name)
     home = home_posture(robot)
     given = (0, 2) if name == "irsbot2" else (0, 1, 2)
@@ -61,7 +61,7 @@ def test_direct_track_ends_in_the_same_posture_as_many_short_steps(name):
 
 
 def test_ball_joint_near_gimbal_lock_stays_on_the_same_branch_of_angles():
-    """Near the lock a long step could end half a turn away about two of its axes."""
+    """Near gimbal lock, a long step could end half a turn away about two axes."""
     robot = load_robot("hexapod")
     home = home_posture(robot)
     goal = np.array([[0.475133, 0.004732, 0.078543, 0.384865, -0.20706, -0.37498]])
@@ -97,7 +97,7 @@ def test_many_joint_targets_reach_the_poses_of_the_inverse_kinematics():
 
 @pytest.mark.parametrize("name", ["arm6", "five_bar", "3rrr", "irsbot2"])
 def test_unspecified_pose_components_do_not_depend_on_rounding(name):
-    """A target changed in its last digit, as on another processor."""
+    """The target differs in the last digit, as it might on another processor."""
     robot = load_robot(name)
     tx = place_robot(robot).pose()["tx"] + 0.06
     first, *others = (
@@ -124,7 +124,7 @@ BALL = Robot("ball", "body", (
 
 @pytest.mark.parametrize("given", ["all", "turns", "place"])
 def test_free_body_reaches_the_requested_pose(given, rng):
-    """Rotation vectors by SciPy, up to nearly half a turn about any axis."""
+    """Rotation vectors from SciPy, up to nearly half a turn about any axis."""
     robot = BALL
     axes = rng.normal(size=(60, 3))
     axes /= np.linalg.norm(axes, axis=1)[:, None]
@@ -147,7 +147,7 @@ def test_free_body_reaches_the_requested_pose(given, rng):
 
 
 def targets_of(home, rng, count=40):
-    """Drives, the poses to which they lead, parts of these, and poses of any kind."""
+    """Drive coordinates, the resulting poses, partial poses, and arbitrary poses."""
     robot, n = home.robot, len(home.robot.frames)
     moving = [j for j, frame in enumerate(robot.frames) if frame.joint != "fixed"]
     driven = [j for j in moving if robot.frames[j].actuated] or moving[:2]
@@ -168,7 +168,7 @@ def targets_of(home, rng, count=40):
 
 @pytest.mark.parametrize("name", BUILT_IN)
 def test_reached_targets_have_the_requested_pose_and_closed_loops(name, rng):
-    """A new track from the reached posture needs one step."""
+    """A new track that starts at the reached posture requires a single step."""
     home = home_posture(BUILT_IN[name]())
     reached = 0
     for target in targets_of(home, rng):
@@ -186,7 +186,7 @@ def test_reached_targets_have_the_requested_pose_and_closed_loops(name, rng):
 
 
 def assert_sent_there(robot, target, track):
-    """Coordinates and places of the platform that are held are attained."""
+    """Check that all prescribed coordinates and pose components are attained."""
     platform = track.transforms[:, robot.index(robot.platform), :3, 3]
     held = [] if target.pose is None else [target.pose[:, :3] - platform]
     if target.coordinates is not None:
@@ -196,7 +196,7 @@ def assert_sent_there(robot, target, track):
 
 
 def test_track_does_not_depend_on_other_targets(rng):
-    """Bit-identical: alone, in another order, among longer tracks."""
+    """Bit-identical alone, in another order, and among longer tracks."""
     home = home_posture(BUILT_IN["irsbot2"]())
     # which parts are free differs from row to row
     poses = targets_of(home, rng)[2].pose

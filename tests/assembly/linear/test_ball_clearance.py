@@ -1,4 +1,4 @@
-"""The ball |(TX, TY, TZ)| <= c: closed forms, cvxpy, and the reference method."""
+"""Ball clearance |(TX, TY, TZ)| <= c: closed forms, cvxpy, and the reference method."""
 
 from dataclasses import replace
 
@@ -21,7 +21,7 @@ C = 10e-6  # [m]
 
 
 def with_balls(robot):
-    """The robot, each radial clearance made a ball, except of slides."""
+    """The robot with every radial clearance replaced by a ball, except for slides."""
 
     def changed(frame):
         given = frame.clearance
@@ -34,16 +34,16 @@ def with_balls(robot):
 
 
 def pointed(clearance, at=(0.0, 0.0, 0.0)):
-    """The assembly of a tip that one joint with this clearance carries."""
+    """The assembly of a tip carried by a single joint with this clearance."""
     frames = (Frame("joint", clearance=clearance), Frame("tip", "joint", list(at)))
     return solve_assembly(home_posture(Robot("tip", "tip", frames)))
 
 
 @pytest.mark.parametrize(("method", "width"), [("compiled", 1e-9), ("reference", 5e-7)])
-def test_a_ball_reaches_its_radius_in_every_direction(method, width):
-    """The cylinder about it, radial = axial = c, reaches sqrt(2) c.
+def test_ball_clearance_allows_its_radius_in_every_direction(method, width):
+    """The circumscribed cylinder, with radial = axial = c, reaches sqrt(2) c.
 
-    The reference cuts a round set by 400 planes at most, the compiled method bounds it.
+    The reference method cuts a round set by at most 400 planes.
     """
     for clearance, expected in (
         (Clearance(ball=C), C),
@@ -61,8 +61,8 @@ def test_a_ball_reaches_its_radius_in_every_direction(method, width):
 
 
 @pytest.mark.parametrize("gap", [0.5 * C, 1.7 * C, 40 * C])
-def test_energy_outside_a_ball_equals_that_of_the_distance_to_it(gap):
-    """Equal springs of 1e6 N/m each, in series, over the gap less the radius."""
+def test_energy_outside_a_ball_clearance_depends_on_the_distance_beyond_it(gap):
+    """Two equal springs of 1e6 N/m in series deform by the gap minus the radius."""
     direction = np.array([1.0, -2.0, 2.0]) / 3
     screw = [0, 0, 0, *(gap * direction)]
     robot = coaxial_beams(screw, clearance=Clearance(ball=C))
@@ -79,8 +79,8 @@ def test_energy_outside_a_ball_equals_that_of_the_distance_to_it(gap):
 
 
 @pytest.mark.parametrize("seed", range(24))
-def test_energy_and_margin_with_balls_equal_the_printed_problems(seed):
-    """Tolerances as for robots without balls."""
+def test_energy_and_margin_with_ball_clearances_match_the_paper_in_cvxpy(seed):
+    """The tolerances are those used for robots without ball clearances."""
     rng = np.random.default_rng(seed)
     posture = home_posture(with_balls(random_robot(rng, 2 + seed % 2, 1 + seed % 3)))
     zone = zone_margin(posture)
@@ -107,7 +107,9 @@ def test_energy_and_margin_with_balls_equal_the_printed_problems(seed):
 
 
 @pytest.mark.parametrize("assumption", ["frozen", "free"])
-def test_compiled_pose_errors_with_balls_overlap_the_reference_method(assumption):
+def test_compiled_pose_error_bounds_with_ball_clearances_overlap_the_reference(
+    assumption,
+):
     compiled = 0
     for seed in range(24):
         draw = np.random.default_rng(seed)
@@ -139,8 +141,8 @@ def pressed(force, clearance):
 
 
 @pytest.mark.parametrize("method", ["contact", "exact"])
-def test_a_pressed_ball_rolls_in_both_directions_along_its_boundary(method):
-    """Across the force F the point of contact is a spring of F / c, in series."""
+def test_closed_ball_clearance_is_compliant_along_its_boundary(method):
+    """Perpendicular to the force F, the contact acts as a spring F / c in series."""
     direction = np.array([2.0, -1.0, 2.0]) / 3
     posture, load = pressed(300.0 * direction, Clearance(ball=50e-6))
     C = platform_stiffness(posture, method, load).compliance[3:, 3:]
@@ -149,7 +151,7 @@ def test_a_pressed_ball_rolls_in_both_directions_along_its_boundary(method):
     np.testing.assert_allclose(C, expected, atol=1e-3 * 50e-6 / 300.0)
 
 
-def test_clearance_of_a_ball_has_its_own_name_in_results():
+def test_ball_clearance_has_a_distinct_name_in_results():
     posture, load = pressed([0, 0, 300.0], Clearance(ball=C, tilt=1e-3))
     joints = solve_assembly(posture, load).joints
     marked = np.ones(2, dtype=bool)
@@ -157,7 +159,7 @@ def test_clearance_of_a_ball_has_its_own_name_in_results():
 
 
 @pytest.mark.parametrize("key", ["radial", "axial"])
-def test_clearance_of_a_ball_replaces_the_other_translational_bounds(key):
+def test_ball_clearance_replaces_the_other_translational_bounds(key):
     with pytest.raises(BadInput, match=f'clearance.{key}: found together with "ball"'):
         Clearance(ball=C, **{key: C})
     with pytest.raises(BadInput, match=r"clearance\.ball: found a bound on a sliding"):

@@ -1,4 +1,4 @@
-"""Certificates of a least energy and of its screw, and their loss by rounding."""
+"""Certificates of minimum energy and platform screw, and their loss by round-off."""
 
 from dataclasses import replace
 
@@ -31,14 +31,14 @@ def test_solutions_with_nan_or_wrong_values_are_not_certified():
     ):
         assert unproved(spoilt_answer)
     weaker = replace(answer, multipliers=0.9 * answer.multipliers)
-    assert "the minimum of the energy is certified to" in unproved(weaker)
+    assert "the minimum energy is certified to within" in unproved(weaker)
     assert "stays open" in unproved(replace(answer, elastic=1.1 * answer.elastic))
     assert "exceeded by" in unproved(replace(answer, clearances=2 * answer.clearances))
 
 
 def arm_against_wall(young, soft=50.0):
     """A bar of modulus ``young`` between a soft hinge and a wall that is off by 0.1 mm
-    along it and 0.2 mm across; asked for is how far the hinge turns.
+    along the bar and 0.2 mm across; the hinge rotation is computed.
     """
     K = np.diag([np.inf, np.inf, soft, np.inf, np.inf, np.inf])
     bar = BeamLink({"radius": 0.01}, young, 0.3, theory="euler")
@@ -54,11 +54,11 @@ def arm_against_wall(young, soft=50.0):
 
 
 @pytest.mark.parametrize("young", [7e10, 1e16, 1e20, 1e22, 1e30, 1e38])
-def test_error_of_a_hinge_rotation_is_within_its_bound_or_refused_as_ill_conditioned(
+def test_hinge_rotation_error_is_within_its_bound_or_rejected_as_ill_conditioned(
     young,
 ):
-    """By hand: a force F across turns the hinge by F L / K = t and bends the bar by
-    F L^3 / (3 E I); together t L + F L^3 / (3 E I) = 0.2 mm.
+    """A transverse force F rotates the hinge by t = F L / K and bends the bar by F L^3
+    / (3 E I); together t L + F L^3 / (3 E I) = 0.2 mm.
     """
     if young >= 1e30:
         with pytest.raises(CannotAssemble, match="the stiffest spring is 3e"):
@@ -75,8 +75,8 @@ def test_error_of_a_hinge_rotation_is_within_its_bound_or_refused_as_ill_conditi
 
 
 def test_platform_screw_computed_by_cvxpy_is_within_the_certified_bound():
-    """cvxpy's energies are above the least by 1e-8 J, its screws off by the root of it:
-    that excess is added to the uncertainty.
+    """Energies from cvxpy exceed the minimum by 1e-8 J, which is added to the
+    uncertainty.
     """
     compared = 0
     for seed in range(16):
@@ -87,7 +87,8 @@ def test_platform_screw_computed_by_cvxpy_is_within_the_certified_bound():
         except CannotAssemble:
             continue
         energy, screw = energy_as_printed(posture)
-        # any assembly this much above the least, not only the least: the same bound
+        # the bound also holds for any assembly whose energy is this much above the
+        # minimum
         worse = replace(answer, multipliers=answer.multipliers)
         worse.__dict__["uncertainty"] = answer.uncertainty + max(
             energy - answer.bound, 1e-9 * answer.energy_without_clearance
@@ -100,8 +101,8 @@ def test_platform_screw_computed_by_cvxpy_is_within_the_certified_bound():
     assert compared > 10
 
 
-def test_errors_that_cancel_up_to_rounding_store_no_energy():
-    """Errors of a loop whose sum is zero, but not in floating point: 0.1 + 0.2."""
+def test_errors_that_cancel_to_machine_precision_store_no_energy():
+    """The errors of a loop add up to zero, but not in floating point: 0.1 + 0.2."""
     parts = [1e-4, 2e-4, -3e-4]
     frames = [Frame("f0", translation=[0.1, 0, 0], link=MatrixLink(1e6 * np.eye(6)))]
     for i, error in enumerate(parts):
@@ -117,7 +118,8 @@ def test_errors_that_cancel_up_to_rounding_store_no_energy():
     assert assemble_at(robot, posture.transforms[None]).energy[0] == 0.0
     drawn = linear_response(posture).solve(robot.errors[None])
     assert drawn.energy[0] == 0.0
-    # what is small and not rounding stays: k g^2 / 2 of one spring, by hand
+    # a small energy that is not round-off is preserved: k g^2 / 2 of one spring, by
+    # hand
     for gap in (1e-6, 1e-12, 1e-17):
         frames[1] = replace(frames[1], geometric_error=[0, 0, 0, gap, 0, 0])
         small = replace(robot, frames=(*frames[:2], Frame("f3", "f1", [0.2, 0, 0]),
@@ -131,8 +133,8 @@ def test_errors_that_cancel_up_to_rounding_store_no_energy():
             assert found == pytest.approx(1e6 * gap**2 / 2, rel=1e-9)
 
 
-def test_wrong_multipliers_have_the_duality_gap_computed_by_hand():
-    """Wrong multipliers and springs open a gap of the size worked out by hand."""
+def test_duality_gap_of_wrong_multipliers_equals_hand_calculation():
+    """Wrong multipliers and springs cause a duality gap that is known by hand."""
     robot = coaxial_beams(np.array([0, 0, 0, 2e-4, 0, 0]), (1e6, 3e6))
     answer = solve_assembly(home_posture(robot))
     assert answer.duality_gap() < 1e-12 * answer.energy
@@ -146,21 +148,27 @@ def test_wrong_multipliers_have_the_duality_gap_computed_by_hand():
     assert stiffer.closure_residual() > 1e-7
 
 
-def test_rotation_and_translation_are_certified_to_their_own_tolerances():
-    """1e-5 and a thousandth: a rotation of 0.1 rad to 1.1e-4, a zero shift to 1e-5."""
+def test_rotation_and_translation_are_certified_to_separate_tolerances():
+    """The tolerance is 1e-5 + 1e-3 of the value: 1.1e-4 rad, and 1e-5 m."""
     gap = np.array([0.2, 0, 0, 0, 0, 0])
     assembly = solve_assembly(home_posture(coaxial_beams(gap)))
     assert np.abs(assembly.platform_screw[0]) == pytest.approx(0.1)
     open_ = replace(bound_screw(assembly), rotation_error=9e-5, translation_error=2e-5)
     (sentence,) = unproved_screw(assembly, open_)
-    assert "translation is certified to 2.0e-05 m only, expected 1.0e-05 m" in sentence
+    assert (
+        "translation is certified to within 2.0e-05 m only, expected 1.0e-05 m"
+        in sentence
+    )
     open_ = replace(open_, rotation_error=2e-4, translation_error=9e-6)
     (sentence,) = unproved_screw(assembly, open_)
-    assert "rotation is certified to 2.0e-04 rad only, expected 1.1e-04 rad" in sentence
+    assert (
+        "rotation is certified to within 2.0e-04 rad only, expected 1.1e-04 rad"
+        in sentence
+    )
 
 
 def disturbed(rng, seed):
-    """A random robot's assembly, and the same with a disturbed solution."""
+    """The assembly of a random robot, and the same with a perturbed solution."""
     robot = random_robot(np.random.default_rng(seed), 2, link_share=0.8)
     load = rng.normal(size=6) * [1, 1, 1, 10, 10, 10]
     best = solve_assembly(home_posture(robot), load)
@@ -175,7 +183,7 @@ def disturbed(rng, seed):
 
 
 def bound_by_hand(assembly):
-    """-w.dl - w C w / 2 - what clearances gain - |w q|, frame by frame."""
+    """-w.dl - w C w / 2 - work on the clearances - |w q|, summed frame by frame."""
     robot, total = assembly.posture.robot, 0.0
     C_link, C_joint = link_compliances(robot), joint_compliances(robot)
     bounds = clearance_bounds(robot)
@@ -194,7 +202,7 @@ SEEDS = (1, 3, 4, 6, 9, 12)
 
 
 def solvable(rng):
-    """Assemblies of the random robots that have one."""
+    """Assemblies of all random robots that can be assembled."""
     for seed in SEEDS:
         try:
             yield disturbed(rng, seed)
@@ -202,8 +210,8 @@ def solvable(rng):
             continue
 
 
-def test_any_wrenches_imply_a_lower_bound_of_the_energy(rng):
-    """Weak duality; the bound is the sum that its docstring defines."""
+def test_any_wrenches_imply_a_lower_bound_on_the_energy(rng):
+    """Weak duality; the bound equals the sum defined in its docstring."""
     some = list(solvable(rng))
     assert len(some) >= 3
     assert any(len(other.motions) for _, other in some)
@@ -215,8 +223,8 @@ def test_any_wrenches_imply_a_lower_bound_of_the_energy(rng):
         assert other.bound == pytest.approx(by_hand, rel=1e-9, abs=1e-9 * scale)
 
 
-def test_joining_solutions_keeps_the_certificate_of_each_point():
-    """The bound is the energy less the gap, also above the least energy."""
+def test_combining_solutions_preserves_the_certificate_of_each_point():
+    """The bound is the energy minus the gap, also above the minimum."""
     robot = coaxial_beams([0, 0, 0, 1e-4, 0, 0])
     best = solve_assembly(home_posture(robot))
     worse = replace(best, elastic=1.001 * best.elastic)

@@ -1,4 +1,4 @@
-"""Bounds of (27) at many points: against the reference method, and each other."""
+"""Bounds of (27) at many points, compared with the reference method and each other."""
 
 import numpy as np
 import pytest
@@ -15,8 +15,8 @@ ASSUMPTIONS = ("frozen", "free")
 
 
 def assert_overlap(batch, i, one, uncertain=2e-7, width=1e-6):
-    """Both brackets hold the truth; the two solutions of (22) differ by the root of
-    their gaps, 1e-8 and less of the energy.
+    """Both intervals contain the true value; the solutions of (22) differ by the square
+    root of their gaps, at most 1e-8 of the energy.
     """
     for name in PARTS:
         low, high = getattr(batch, name)[i]
@@ -30,10 +30,8 @@ def assert_overlap(batch, i, one, uncertain=2e-7, width=1e-6):
 
 
 @pytest.mark.parametrize("assumption", ASSUMPTIONS)
-def test_compiled_bounds_of_the_pose_error_overlap_those_of_the_reference_method(
-    assumption, rng
-):
-    """At a platform offset, with and without motion limits of passive joints."""
+def test_compiled_pose_error_bounds_overlap_the_reference_method(assumption, rng):
+    """Evaluated at a platform offset, with and without passive joint limits."""
     homes = [home_posture(make()) for make in BUILT_IN.values()]
     for seed in range(12):
         draw = np.random.default_rng(seed)
@@ -57,7 +55,7 @@ def test_compiled_bounds_of_the_pose_error_overlap_those_of_the_reference_method
     assert compiled
 
 
-def test_pose_error_bounds_have_the_requested_difference(grid):
+def test_pose_error_bounds_are_as_tight_as_requested(grid):
     robot, postures = grid
     errors = np.array([-0.3, 0.1, 0.2])[:, None, None] * robot.errors
     options = {
@@ -74,7 +72,7 @@ def test_pose_error_bounds_have_the_requested_difference(grid):
 
 @pytest.mark.parametrize("assumption", ASSUMPTIONS)
 def test_pose_error_bound_does_not_depend_on_other_points(grid, rng, assumption):
-    """In another order, among other points, alone: bit-identical."""
+    """Bit-identical in another order, among other points, and alone."""
     robot, postures = grid
     at, count = together(postures), len(postures)
     errors = robot.errors * rng.uniform(0, 1, (count, 1, 1))
@@ -92,7 +90,7 @@ def test_pose_error_bound_does_not_depend_on_other_points(grid, rng, assumption)
 @pytest.mark.parametrize("spin", [10.0, 1e-2, 3e-4, 1e-5, 0.0])
 @pytest.mark.parametrize("assumption", ["frozen", "free"])
 def test_motion_limits_of_passive_joints_apply_to_many_points(spin, assumption):
-    """Compiled where no clearance reaches the limit, else by the reference method."""
+    """Points where a clearance reaches the limit are solved by the reference method."""
     posture = home_posture(hinged_frame(spin))
     one = bound_pose_error(
         solve_assembly(posture, method="reference"), assumption, method="reference"
@@ -116,8 +114,8 @@ def test_robot_that_cannot_be_assembled_has_no_pose_error_bounds():
     assert batch[0].unproved == batch.unproved[0] == batch.reason[0]
 
 
-def test_load_on_a_motion_freed_by_the_assumption_is_reported():
-    """A hinge held by a soft spring turns freely under the assumption free."""
+def test_load_along_a_motion_released_by_the_assumption_is_reported():
+    """A hinge held by a soft spring rotates freely under the assumption free."""
     spring = np.diag([np.inf, np.inf, 1e2, *[np.inf] * 3])
     robot = Robot("sprung door", "tip", (
         Frame("hinge", joint="revolute", joint_stiffness=spring),

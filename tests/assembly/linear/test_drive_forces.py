@@ -1,4 +1,4 @@
-"""Drives that apply a force: statics of redundantly actuated robots, by hand."""
+"""Drives that apply a prescribed force: statics of redundantly actuated robots."""
 
 from dataclasses import replace
 
@@ -17,9 +17,9 @@ METHODS = ("compiled", "reference")
 
 
 def opposing_slides(k_rod, k_first=np.inf, k_second=np.inf):
-    """Two slides on one line, from both sides, with a spring between them along x.
+    """Two opposing slides on one line, with a spring between them along x.
 
-    The slide's coordinates grow along +x, both; the rod's tip is at the second slide.
+    Both slide coordinates increase along +x, and the rod tip is at the second slide.
     """
     stiff = np.diag([1e9, 1e9, 1e9, k_rod, 1e9, 1e9])
     frames = (
@@ -55,8 +55,8 @@ def test_force_of_one_of_two_opposing_slides_equals_the_force_in_the_rod(solve, 
     assert assembly.posture.platform[0, 3] == 1.0  # no nominal motion
 
 
-def test_energy_of_linear_answer_balances_the_work_of_the_drive():
-    """Constant force from rest: work = 2 energy; the certificate closes."""
+def test_energy_of_the_linear_solution_balances_the_work_of_the_drive():
+    """A constant force does twice the work of the elastic energy."""
     robot = with_drive_forces(opposing_slides(4e6), {"second": 120.0})
     assembly = solve_assembly(home_posture(robot))
     assert assembly.work == pytest.approx(2 * assembly.energy, rel=1e-12)
@@ -65,7 +65,7 @@ def test_energy_of_linear_answer_balances_the_work_of_the_drive():
 
 
 def test_force_control_removes_the_stiffness_of_the_drive():
-    """Held, the two drives are in parallel: k_2 + 1/(1/k_1 + 1/k_rod)."""
+    """With position control, the drives act in parallel: k_2 + 1/(1/k_1 + 1/k_rod)."""
     k_rod, k_1, k_2 = 4e6, 1e7, 3e7
     robot = opposing_slides(k_rod, k_1, k_2)
     series = 1 / (1 / k_rod + 1 / k_1)
@@ -81,7 +81,7 @@ def test_force_control_removes_the_stiffness_of_the_drive():
 def crossed_cranks(radius=0.004):
     """A four-bar with both cranks driven: crank 0.3 m, coupler 0.5 m, ground 0.5 m.
 
-    A parallelogram with cranks at 60 deg, the coupler a beam along x without shear.
+    The cranks of the parallelogram are at 60 deg; the coupler is a beam along x.
     """
     beam = BeamLink({"radius": radius}, 7e10, 0.3, None, "euler")
     up = np.pi / 3
@@ -101,8 +101,8 @@ def crossed_cranks(radius=0.004):
 def test_torque_of_a_redundant_crank_loads_the_coupler_by_its_lever_arm(torque):
     """Moments about the rocker's pivot: the coupler's force N r sin 60 = -torque.
 
-    A positive torque turns the rocker towards the crank and presses the coupler.  The
-    crank's drive holds the same moment; the rocker turns by N L / (EA r sin 60).
+    A positive torque rotates the rocker towards the crank and compresses the coupler.
+    The crank drive supports the same moment; the rocker rotates by N L / (EA r sin 60).
     """
     robot = with_drive_forces(crossed_cranks(), {"rocker": torque})
     posture = home_posture(robot)
@@ -121,7 +121,7 @@ def test_torque_of_a_redundant_crank_loads_the_coupler_by_its_lever_arm(torque):
     assert solve_exact(posture).platform_screw[3] == pytest.approx(-shorter, rel=1e-3)
 
 
-def test_drive_that_is_the_only_support_of_a_motion_cannot_apply_a_given_force():
+def test_drive_that_alone_supports_a_motion_cannot_apply_a_prescribed_force():
     robot = crossed_cranks()
     crank = replace(robot.frames[3], actuated=False)
     robot = replace(robot, frames=(*robot.frames[:3], crank, *robot.frames[4:]))
@@ -131,8 +131,8 @@ def test_drive_that_is_the_only_support_of_a_motion_cannot_apply_a_given_force()
 
 
 @pytest.mark.parametrize("torque", [1e-3, 40.0])
-def test_torque_on_a_hinge_spring_turns_it_by_torque_over_stiffness(torque):
-    """Also far: 40 N m on 50 N m/rad is 0.8 rad, since the torque follows the hinge."""
+def test_hinge_spring_rotates_by_torque_over_stiffness(torque):
+    """Also for large rotations, 0.8 rad = 40 N m / 50 N m/rad: the torque follows."""
     hinge = Frame("hinge", joint="revolute", joint_stiffness=only(2, 50.0),
                   drive_force=torque)  # fmt: skip
     robot = Robot("arm", "arm", (hinge, Frame("arm", "hinge", [0.4, 0, 0])))
@@ -147,7 +147,7 @@ def test_torque_on_a_hinge_spring_turns_it_by_torque_over_stiffness(torque):
 
 @pytest.mark.parametrize("solve", [solve_assembly, solve_exact])
 def test_force_of_a_drive_can_balance_a_weight(solve):
-    """m g l on the hinge: nothing moves, and its spring is free of load."""
+    """A torque m g l on the hinge leaves its spring unloaded and the arm at rest."""
     hinge = Frame("hinge", joint="revolute", joint_stiffness=only(2, 50.0),
                   drive_force=2.0 * 9.81 * 0.4)  # fmt: skip
     arm = Frame("arm", "hinge", [0.4, 0, 0], mass=2.0)
@@ -156,8 +156,8 @@ def test_force_of_a_drive_can_balance_a_weight(solve):
     np.testing.assert_allclose(assembly.platform_screw, np.zeros(6), atol=1e-15)
 
 
-def test_drive_force_presses_clearances_of_other_joints_to_one_side():
-    """Axial play of the rod's end +-20 um: the pull takes all of it up."""
+def test_drive_force_closes_clearances_of_other_joints():
+    """Tension takes up the whole axial clearance of +-20 um at the rod end."""
     robot = opposing_slides(4e6)
     first = replace(robot.frames[0], clearance=Clearance(axial=2e-5))
     robot = replace(robot, frames=(first, *robot.frames[1:]))
@@ -167,7 +167,7 @@ def test_drive_force_presses_clearances_of_other_joints_to_one_side():
         assert screw[3] == pytest.approx(np.sign(F) * 2e-5 + F / 4e6, rel=1e-9)
 
 
-def test_forces_for_many_postures_and_errors_equal_those_computed_one_by_one():
+def test_drive_forces_at_many_postures_equal_those_at_single_postures():
     robot = with_drive_forces(crossed_cranks(), {"rocker": 5.0})
     postures = [place_robot(robot, joints={"crank": q}) for q in (0.7, 1.0, 1.2)]
     together = solve_assembly(postures)
@@ -177,7 +177,7 @@ def test_forces_for_many_postures_and_errors_equal_those_computed_one_by_one():
         assert together[k].energy == pytest.approx(one.energy, rel=1e-9)
 
 
-def test_unknown_and_coupled_drives_are_refused():
+def test_unknown_and_coupled_drives_are_rejected():
     robot = crossed_cranks()
     with pytest.raises(BadInput, match=r'no drive "rockr"; did you mean "rocker"'):
         with_drive_forces(robot, {"rockr": 1.0})
@@ -194,8 +194,8 @@ def test_unknown_and_coupled_drives_are_refused():
 
 
 @pytest.mark.parametrize("solve", [solve_assembly, solve_exact])
-def test_torque_of_a_screw_drive_presses_by_the_torque_over_the_lead(solve):
-    """2 pi M x = F P per turn: a nut that cannot turn presses a spring with M / h."""
+def test_screw_drive_exerts_a_force_of_torque_over_lead(solve):
+    """2 pi M = F P per turn: a nut that cannot rotate loads a spring by M / h."""
     pitch, k, M = 0.005, 2e6, 3.0
     screw = Frame("screw", joint="helical", pitch=pitch, actuated=True)
     nut = Frame("nut", "screw", joint="revolute")

@@ -1,4 +1,4 @@
-"""Properties and closed forms of problem (22), and cvxpy for random robots."""
+"""Problem (22): properties, closed forms, and cvxpy solutions for random robots."""
 
 from dataclasses import replace
 
@@ -32,8 +32,8 @@ seeds = st.integers(0, 2**32 - 1)
 
 
 @pytest.mark.parametrize("axis", range(6))
-def test_two_springs_in_series_share_the_gap_as_in_closed_form(axis):
-    """Energy g^2/2 k1 k2/(k1 + k2) for a gap along one axis, by hand."""
+def test_two_springs_in_series_take_up_a_gap_as_in_closed_form(axis):
+    """The energy is g^2/2 k1 k2/(k1 + k2) for a gap g along one axis."""
     gap = np.zeros(6)
     gap[axis] = 2e-4
     k1, k2 = 1e6, 3e6
@@ -55,7 +55,7 @@ def test_two_springs_in_series_share_the_gap_as_in_closed_form(axis):
     [(5e-5, 0.0), (1e-4, 0.0), (1e-4 * (1 + 1e-16), 0.0), (1.5e-4, 5e-5)],
 )
 def test_springs_deform_only_by_the_gap_beyond_the_clearance(gap, left):
-    """A radial clearance of 1e-4 m takes up its part of the gap first."""
+    """A radial clearance of 1e-4 m takes up the first part of the gap."""
     clearance = Clearance(radial=1e-4)
     direction = np.array([0, 0, 0, 0.6, 0.8, 0.0])
     robot = coaxial_beams(gap * direction, (1e6, 1e6), clearance=clearance)
@@ -90,7 +90,7 @@ def test_wrench_equals_stiffness_times_deformation_of_every_spring(method):
 
 @pytest.mark.parametrize("name", ["irsbot2", "3rrr", "delta"])
 def test_energy_without_clearance_equals_the_energy_of_a_tight_robot(name, rng):
-    """Also under a load: the energy without clearance then includes the load's part."""
+    """Under a load, the energy without clearance includes the work of the load."""
     home = home_posture(load_robot(name))
     errors = 1e-4 * rng.normal(size=home.robot.errors.shape)
     if name == "irsbot2":  # its proximal loops are rigid and perfect
@@ -106,7 +106,7 @@ def test_energy_without_clearance_equals_the_energy_of_a_tight_robot(name, rng):
 
 
 def test_platform_frame_changes_the_screw_and_not_the_energy():
-    """Another reference point of the same body: its small rigid-body motion."""
+    """The screw changes by the small rigid-body motion to another reference point."""
     robot = irsbot2_with(NUMBERS["cases"][0])
     arm = np.array([0.03, -0.2, 0.11])
     tool = Frame("tool", "leg1.tip", arm)
@@ -129,8 +129,8 @@ def test_rigid_open_closure_cannot_be_assembled():
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_passive_joint_stops_at_its_motion_limit(method):
-    """A passive slide limited to +-1e-4 m: the spring takes the remaining gap."""
+def test_passive_joint_is_stopped_by_its_motion_limit(method):
+    """The slide is limited to +-1e-4 m; the spring closes the remaining gap."""
     frames = (
         Frame("link", translation=[0, 0, 0.5], link=MatrixLink(1e6 * np.eye(6))),
         Frame("slide", "link", joint="prismatic", clearance=Clearance(axial=1e-4)),
@@ -154,8 +154,8 @@ def test_passive_joint_stops_at_its_motion_limit(method):
 
 
 def as_bearings(robot):
-    """The robot with compliant joints free along their own motion; the same with each
-    of them as two frames: the springs, rigid along it, then a bare free joint.
+    """The robot with compliant joints that move freely along their axes, and the same
+    robot with each of them replaced by springs in series with a free joint.
     """
     bearings, split, after = [], [], {}
     for f in robot.frames:
@@ -180,7 +180,7 @@ def as_bearings(robot):
 
 
 def test_bearing_equals_springs_in_series_with_a_free_joint():
-    """In every solver, to 1e-8 of the energy without clearance."""
+    """Both agree to 1e-8 of the energy without clearance, in every solver."""
     compared = 0
     for seed in range(40):
         rng = np.random.default_rng(seed)
@@ -224,10 +224,8 @@ def test_bearing_equals_springs_in_series_with_a_free_joint():
 @example(seed=0, legs=2, joints=1)
 @example(seed=17, legs=3, joints=1)
 @example(seed=58, legs=2, joints=2)
-def test_energy_of_random_robots_equals_the_printed_problem_in_cvxpy(
-    seed, legs, joints
-):
-    """Tolerance 1e-6 of the energy without clearance: what cvxpy's solver reaches."""
+def test_energy_of_random_robots_matches_the_paper_in_cvxpy(seed, legs, joints):
+    """The tolerance, 1e-6 of the energy without clearance, is the accuracy of cvxpy."""
     rng = np.random.default_rng(seed)
     robot = random_robot(rng, legs, joints)
     load = rng.normal(size=6) * [1, 1, 1, 10, 10, 10] if rng.random() < 0.5 else None
@@ -249,7 +247,7 @@ def test_energy_of_random_robots_equals_the_printed_problem_in_cvxpy(
 
 @pytest.mark.parametrize("turned", [1, -1])
 def test_closure_out_of_reach_is_infeasible(turned):
-    """H u reaches 5 over the disc and 2 over the interval, together at most 7."""
+    """H u is at most 5 over the disc plus 2 over the interval, which is 7."""
     H = np.array([[3.0, 4.0, 2.0]])
     problem = np.zeros((1, 3)), np.ones(1), np.zeros(3), H
     group = np.array([0, 0, 1])

@@ -1,4 +1,4 @@
-"""Invariance of the model: units, frames, where a loop is cut, reciprocity."""
+"""Invariance to units, frames and the location of loop cuts, and reciprocity."""
 
 from dataclasses import replace
 
@@ -18,7 +18,7 @@ REFUSALS = (CannotAssemble, FreeMotion, SolverFailed)
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_change_of_the_unit_of_length_scales_energies_and_not_margins(seed):
+def test_changing_the_length_unit_scales_energies_but_not_margins(seed):
     """Energy in N mm is 1000 times that in N m; margins and angles are the same."""
     robot = random_robot(np.random.default_rng(seed), legs=2)
     small = replace(robot, frames=tuple(
@@ -41,7 +41,7 @@ def test_change_of_the_unit_of_length_scales_energies_and_not_margins(seed):
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_moving_the_whole_robot_does_not_change_energy_and_pose_errors(seed):
+def test_rigid_motion_of_the_robot_preserves_energy_and_pose_errors(seed):
     rng = np.random.default_rng(seed)
     robot = random_robot(rng, legs=2)
     turn, shift = rng.uniform(-2, 2, 3), rng.uniform(-1, 1, 3)
@@ -88,7 +88,7 @@ def cut_at_the_crank(robot):
 
 
 def test_energy_does_not_depend_on_where_a_loop_is_cut():
-    """Out-of-plane errors of crank and rocker bend the coupler, at both cuts."""
+    """Out-of-plane errors of crank and rocker bend the coupler for either cut."""
     errors = np.zeros((6, 6))
     errors[1] = [1e-3, -2e-3, 0, 0, 0, 3e-4]
     errors[5] = [-2e-3, 1e-3, 0, 0, 0, -1e-4]
@@ -101,7 +101,7 @@ def test_energy_does_not_depend_on_where_a_loop_is_cut():
     assert other.energy == pytest.approx(one.energy, rel=1e-9)
 
 
-def test_two_loads_do_equal_work_on_each_others_displacements(rng):
+def test_displacements_under_two_loads_satisfy_betti_reciprocity(rng):
     """Maxwell-Betti on closed loops without clearance: w1 . x2 = w2 . x1."""
     robot = irsbot2()
     tight = replace(robot, frames=tuple(
@@ -116,7 +116,7 @@ def test_two_loads_do_equal_work_on_each_others_displacements(rng):
 
 
 def test_rigid_serial_robot_pose_is_the_product_of_its_erroneous_transforms():
-    """Nothing can deform: the product of the transforms by hand."""
+    """The pose of a rigid robot equals the product of the transforms."""
     error = np.array([0.02, -0.01, 0.03, 1e-3, 2e-3, -3e-3])
     frames = (
         Frame("a", translation=[0.1, 0.2, 0.3], rotation=[0.3, 0.1, -0.2],

@@ -1,4 +1,4 @@
-"""Loads on bodies and weight, against beams worked by hand."""
+"""Loads on bodies and self-weight, compared with beam theory."""
 
 from dataclasses import replace
 
@@ -22,7 +22,7 @@ Q = RHO * AREA * G  # [N/m]
 
 
 def cantilever(cuts=1, theory="euler"):
-    """A beam along x in ``cuts`` pieces."""
+    """A beam along x, cut into ``cuts`` pieces."""
     link = BeamLink({"radius": RADIUS}, E, 0.3, density=RHO, theory=theory)
     frames = tuple(
         Frame(f"p{i}", f"p{i - 1}" if i else "base", [L / cuts, 0, 0], link=link)
@@ -33,7 +33,7 @@ def cantilever(cuts=1, theory="euler"):
 
 @pytest.mark.parametrize("cuts", [1, 2, 5])
 def test_self_weight_deflection_equals_the_textbook(cuts):
-    """Tip: q L^4 / 8 EI down, slope q L^3 / 6 EI, in any number of pieces."""
+    """The tip deflects by q L^4 / 8 EI with slope q L^3 / 6 EI, for any cuts."""
     answer = solve_assembly(home_posture(cantilever(cuts)), gravity=[0, 0, -G])
     expected = [0, Q * L**3 / (6 * EI), 0, 0, 0, -Q * L**4 / (8 * EI)]
     assert np.allclose(answer.platform_screw, expected, rtol=1e-9, atol=1e-15)
@@ -69,7 +69,7 @@ def test_eccentric_mass_acts_with_its_lever_arm():
 
 
 def test_load_on_a_body_deforms_its_link_and_not_its_distal_joint():
-    """The body's link carries it; the soft joint at its far end does not."""
+    """The load passes through the link, but not through its soft distal joint."""
     K = 1e5 * np.eye(6)
     frames = (
         Frame("body", link=MatrixLink(K), joint="revolute", joint_stiffness=K),
@@ -106,7 +106,7 @@ def test_base_reactions_of_a_closed_loop_sum_to_its_weight():
 
 @pytest.mark.parametrize("size", [1e6, 1e8])
 def test_large_loads_cause_deflections_by_the_compliance(size):
-    """Doubling a load of 1e8 N adds the compliance times the load."""
+    """Doubling a load of 1e8 N increases the deflection by compliance times load."""
     posture = home_posture(load_robot("irsbot2"))
     once, twice = (
         solve_assembly(posture, [0, 0, 0, 0, 0, k * size]).platform_screw[5]
@@ -117,10 +117,10 @@ def test_large_loads_cause_deflections_by_the_compliance(size):
 
 
 @pytest.mark.parametrize(("shift", "hangs"), [(0.0, True), (1e-9, False)])
-def test_pendulum_is_in_equilibrium_only_where_it_hangs(shift, hangs):
-    """Its hinge, turned and off the origin, carries 2 kg; its moment is rounding.
+def test_pendulum_is_in_equilibrium_only_when_hanging(shift, hangs):
+    """The rotated hinge, off the origin, carries 2 kg; its moment is only round-off.
 
-    A mass centre that is 1 nm off turns it.
+    A centre of mass that is off by 1 nm rotates it.
     """
     at, turn = np.array([0.1, 0.2, 0.7]), np.array([-0.3, 0.2, 0.9])
     inside = rotation_matrix(turn).T @ [shift, 0.0, -0.3]
@@ -137,7 +137,7 @@ def test_pendulum_is_in_equilibrium_only_where_it_hangs(shift, hangs):
             solve_assembly(posture, gravity=[0, 0, -G])
 
 
-def test_load_about_a_free_hinge_is_refused_with_its_unit_motion():
+def test_load_about_a_free_hinge_is_rejected_with_its_unit_motion():
     """About z at the origin a platform at (0.5, 0.25) moves by (-0.25, 0.5) per rad."""
     link = MatrixLink(1e6 * np.eye(6))
     frames = (
@@ -151,9 +151,10 @@ def test_load_about_a_free_hinge_is_refused_with_its_unit_motion():
         solve_assembly(home_posture(Robot("r", "tip", frames)), [0, 0, 1, 0, 0, 0])
 
 
-def test_link_wrenches_of_a_chain_balance_all_loads_beyond(rng):
-    """Three beams in any directions: at each start the weights and moments of all that
-    lies beyond, the tip's load among them; at each tip the next one's start."""
+def test_link_wrenches_of_a_chain_balance_all_distal_loads(rng):
+    """Three beams in arbitrary directions: the wrench at each start balances all loads
+    beyond it, including the tip load; the wrench at each tip is that of the next
+    start."""
     link = BeamLink({"width": 0.02, "height": 0.03}, E, 0.3, density=RHO)
     frames = tuple(
         Frame(f"p{k}", f"p{k - 1}" if k else "base", rng.normal(size=3),
@@ -199,7 +200,7 @@ def beam_on_two_pins():
 def test_beam_on_two_pins_has_zero_end_moments_under_its_weight():
     """q L / 2 and no moment at both ends; the deformation corresponds to q L^2 / 12.
 
-    Finite motions leave no moment there either.
+    The end moments vanish for finite motions as well.
     """
     posture = home_posture(beam_on_two_pins())
     answer = solve_assembly(posture, gravity=[0, 0, -G])
@@ -229,8 +230,8 @@ def test_beam_on_two_pins_has_zero_end_moments_under_its_weight():
         ({"gravity": 9.81}, r"gravity: found an array of shape \(\), expected \(3,\)"),
     ],
 )
-def test_loads_of_a_wrong_shape_are_refused(given, message):
-    """Two postures of a robot of eight frames."""
+def test_loads_of_wrong_shape_are_rejected(given, message):
+    """Loads are applied to two postures of a robot of eight frames."""
     posture = home_posture(load_robot("four_bar"))
     with pytest.raises(BadInput, match=message):
         solve_assembly([posture, posture], **given)
@@ -254,7 +255,7 @@ def turn_and_slide():
 
 @pytest.mark.parametrize("load", [1e-9, 1.0, 1e9])
 def test_free_motion_message_does_not_depend_on_the_size_of_the_load(load):
-    """0.3 N m and 2 N: 0.3 rad against 2 m / 10 m; a unit turn shifts by 10 m."""
+    """The loads are 0.3 N m and 2 N; a unit rotation translates the tip by 10 m."""
     with pytest.raises(FreeMotion) as told:
         reduced(turn_and_slide(), load * np.array([0, 0, 2.0, 0, 0, 0.3]))
     assert "it moves turn rz, slide tz; " in str(told.value)

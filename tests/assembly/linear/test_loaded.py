@@ -1,4 +1,4 @@
-"""Problem (22), compiled, with and without loads: closed forms and certificates."""
+"""Compiled solution of (22) with and without loads: closed forms and certificates."""
 
 from dataclasses import replace
 
@@ -30,10 +30,10 @@ def compiled(posture, *loads, **others):
 
 @pytest.mark.parametrize("force", [0.5, 50.0, 300.0])
 def test_second_spring_deforms_only_after_the_pin_touches_its_rim(force):
-    """Radial clearance c: only the platform's spring deforms until the rim is reached.
+    """Only the platform spring deforms until the pin reaches its radial clearance c.
 
-    From there on k1 x + k2 (x - c) = w.  Rim and force by hand: k1 = 1e6 N/m,
-    c = 1e-4 m, so up to w = 100 N the other spring is at rest.
+    From there on k1 x + k2 (x - c) = w.  With k1 = 1e6 N/m and c = 1e-4 m, the second
+    spring is unloaded up to w = 100 N.
     """
     k1, k2, c = 1e6, 3e6, 1e-4
     robot = coaxial_beams([0.0] * 6, (k1, k2), clearance=Clearance(radial=c))
@@ -46,7 +46,7 @@ def test_second_spring_deforms_only_after_the_pin_touches_its_rim(force):
 
 
 def test_load_moves_an_open_chain_to_the_boundary_of_its_clearance():
-    """A spring and a pin in series, in no closure: c + w / k, energy w^2 / 2k."""
+    """Spring and pin in series, without closure: c + w / k, and energy w^2 / 2k."""
     k, c, force = 1e5, 2e-4, 7.0
     frames = (
         Frame("arm", link=MatrixLink(k * np.eye(6))),
@@ -61,7 +61,7 @@ def test_load_moves_an_open_chain_to_the_boundary_of_its_clearance():
 
 @pytest.mark.parametrize("name", ["irsbot2", "3rrr", "five_bar", "four_bar"])
 def test_displacements_by_loads_and_errors_add_without_clearance(name, rng):
-    """Superposition, and the reciprocity of the platform's compliance."""
+    """Superposition holds, and the platform compliance is reciprocal."""
     posture = home_posture(without_joint_clearances(load_robot(name)))
     robot = posture.robot
     errors = 1e-4 * rng.normal(size=robot.errors.shape)
@@ -79,7 +79,7 @@ def test_displacements_by_loads_and_errors_add_without_clearance(name, rng):
 
 @pytest.mark.parametrize("kappa", [0.0, 0.2, 1.0])
 @pytest.mark.parametrize("size", [1e-3, 1.0, 10.0])
-def test_all_points_of_the_papers_robot_are_certified(grid, kappa, size):
+def test_all_points_of_the_paper_robot_are_certified(grid, kappa, size):
     robot, postures = grid
     erring = robot.with_errors(kappa * robot.errors)
     postures = [replace(posture, robot=erring) for posture in postures]
@@ -92,7 +92,7 @@ def test_all_points_of_the_papers_robot_are_certified(grid, kappa, size):
 
 
 def cases_at_random():
-    """Robots of all kinds at random, some of which no kernel covers."""
+    """Random robots of all kinds, some of which no kernel covers."""
     for name in sorted(BUILT_IN):
         yield home_posture(BUILT_IN[name]())
     for seed in range(60):
@@ -101,10 +101,10 @@ def cases_at_random():
 
 
 @pytest.mark.parametrize("loaded", [False, True])
-def test_results_for_random_robots_equal_the_reference_method_or_are_refused_by_both(
+def test_compiled_and_reference_methods_agree_on_random_robots_or_both_fail(
     loaded,
 ):
-    """Loads on every body, errors over decades; potentials agree within the gaps."""
+    """Loads act on every body, errors vary over decades, and potentials agree."""
     solved = 0
     for number, home in enumerate(cases_at_random()):
         rng = np.random.default_rng(number)
@@ -152,7 +152,9 @@ def test_results_for_random_robots_equal_the_reference_method_or_are_refused_by_
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_load_moves_a_pin_to_its_limit_or_has_no_equilibrium(method):
+def test_load_moves_a_limited_pin_to_its_limit_and_a_free_pin_has_no_equilibrium(
+    method,
+):
     """An open chain: a pin limited to 1e-3 rad, or without limit, turned about z."""
     pin = Frame("pin", joint="revolute", clearance=Clearance(spin=1e-3))
     load = [0, 0, 2.0, 0, 0, 0]

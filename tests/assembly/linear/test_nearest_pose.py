@@ -1,4 +1,4 @@
-"""Poses that clearance leaves free: the nearest to nominal is predicted and marked."""
+"""If clearances leave the pose undetermined, the pose nearest to nominal is used."""
 
 import json
 import warnings
@@ -26,7 +26,7 @@ UNIT = 1e-4  # [rad, m] of screws in cvxpy
 
 
 def erring(name, seed, turn=2e-4, shift=2e-5, pose=None):
-    """A built-in robot with small errors everywhere, placed."""
+    """A built-in robot with small errors at all frames, at a posture."""
     robot, rng = load_robot(name), np.random.default_rng(seed)
     size = np.array([turn] * 3 + [shift] * 3)
     errors = rng.uniform(-1, 1, (len(robot.frames), 6)) * size
@@ -39,16 +39,16 @@ def arm_of(posture):
 
 
 def at_point(answer, posture):
-    """(6,) [rad, m] the platform's screw read at the reference point."""
+    """(6,) [rad, m] platform screw at the reference point."""
     turn, move = np.split(answer.platform_screw, 2)
     return np.concatenate([turn, move + np.cross(turn, arm_of(posture))])
 
 
 def nearest_by_cvxpy(posture, point, load=None):
-    """(6,) [rad, m] the nearest pose: all screws variables, nothing eliminated.
+    """(6,) [rad, m] nearest pose, with all screws as variables of the program.
 
-    Without a load springs give nothing; under one the energy minus its work is the
-    least, by the problem as printed, to 1e-9.
+    Without a load the springs are undeformed; under a load the energy minus its work is
+    minimal, to 1e-9, for the problem as printed.
     """
     robot, count = posture.robot, len(posture.robot.frames)
     c, e, b = (cp.Variable((count, 6)) for _ in range(3))
@@ -106,8 +106,8 @@ def nearest_by_cvxpy(posture, point, load=None):
 
 @pytest.mark.parametrize("name", ["five_bar", "delta", "hexapod", "four_bar"])
 @pytest.mark.parametrize("seed", [0, 1])
-def test_reported_pose_inside_the_zone_is_the_nearest_to_the_nominal_pose(name, seed):
-    """Without load the springs are unloaded: a cone programme solved by cvxpy."""
+def test_pose_inside_the_assembly_zone_is_nearest_to_nominal(name, seed):
+    """Without load the springs are unloaded, and cvxpy solves the cone program."""
     posture = erring(name, seed)
     here = as_declared(posture, point=POINT)
     found = predict(here)
@@ -127,9 +127,7 @@ def test_reported_pose_inside_the_zone_is_the_nearest_to_the_nominal_pose(name, 
 
 
 @pytest.mark.parametrize(("name", "margin"), [("five_bar", 0.0), ("orthoglide", 0.02)])
-def test_choice_of_the_nearest_pose_under_a_load_does_not_change_the_energy(
-    name, margin
-):
+def test_selecting_the_nearest_pose_preserves_the_energy(name, margin):
     posture = erring(name, 3)
     load = np.array([0, 0, 0, 0, -20.0, 0])
     here = as_declared(posture, load, point=POINT)
@@ -153,10 +151,10 @@ def test_choice_of_the_nearest_pose_under_a_load_does_not_change_the_energy(
 def test_pose_error_of_a_platform_on_two_pins_is_its_error_minus_one_clearance(
     clearance,
 ):
-    """Two rigid chains to one platform, 0.1 mm off, their pins with clearance c.
+    """Two rigid chains carry one platform, 0.1 mm apart, on pins with clearance c.
 
-    The platform stands where both pins reach it: nearest to nominal it is off by
-    what the first pin's clearance does not make good, 0.1 mm - c.
+    Both pins must reach the platform: its pose nearest to nominal is off by 0.1 mm - c,
+    the part of the error that the first pin's clearance does not cover.
     """
     pin = Clearance(radial=clearance, spin=0.0)
     frames = (
@@ -175,7 +173,7 @@ def test_pose_error_of_a_platform_on_two_pins_is_its_error_minus_one_clearance(
 
 
 def test_determined_pose_is_not_reported_as_free():
-    """A load presses all clearances, or there is no clearance."""
+    """A load closes all clearances, or there is no clearance."""
     tight = home_posture(coaxial_beams(np.array([0, 0, 0, 1e-4, 0, 0])))
     assert predict(as_declared(tight)).undetermined.tolist() == [False]
     pin = Clearance(radial=2e-5, axial=2e-5, tilt=1e-4, spin=1e-4)
@@ -197,8 +195,8 @@ def test_determined_pose_is_not_reported_as_free():
         assert found.deviation[0] == pytest.approx(pushed, abs=1e-10)
 
 
-def test_prediction_from_settled_clearances_equals_the_first_prediction():
-    """The prediction is the same if no effect is added."""
+def test_prediction_with_fixed_rest_positions_equals_the_first_prediction():
+    """Without additional effects, the prediction does not change."""
     here = as_declared(erring("five_bar", 5), point=POINT)
     found, held = predict(here), predict(with_rest_positions(here))
     assert held.deviation == pytest.approx(found.deviation, abs=1e-9)
@@ -226,7 +224,7 @@ frame = [
 
 @pytest.fixture(scope="module")
 def with_clearance(tmp_path_factory):
-    """A slide whose clearance lets its platform hang loose, 24 readings of noise."""
+    """A slide whose clearance leaves the platform loose, with 24 noisy readings."""
     rng = np.random.default_rng(1)
     rows = [
         ",".join([f"r{k}", str(0.02 * (k % 8)), *map(str, rng.normal(0, 5e-6, 3))])
@@ -238,7 +236,7 @@ def with_clearance(tmp_path_factory):
 
 
 @pytest.mark.parametrize("command", ["inspect", "diagnose"])
-def test_commands_report_rows_with_undetermined_clearance(
+def test_commands_report_readings_with_undetermined_clearance(
     command, with_clearance, tmp_path, run
 ):
     target = tmp_path / "found.json"
@@ -252,7 +250,7 @@ def test_commands_report_rows_with_undetermined_clearance(
 def test_nearest_pose_respects_the_motion_limit_of_a_joint():
     """A pin limited to 1e-3 rad with an error of 1.5e-3: it cannot return to nominal.
 
-    Closed against a clearance of 2e-3 it turns by q + 1.5e-3 = v: 5e-4 at least.
+    Closed by a clearance of 2e-3, it rotates by v = q + 1.5e-3, which is at least 5e-4.
     """
     robot = Robot("pin", "end", (
         Frame("pin", joint="revolute", clearance=Clearance(spin=1e-3),

@@ -1,4 +1,4 @@
-"""Bounds of (27): closed forms, the reference's brackets, and a second method."""
+"""Bounds of (27): closed forms, published bounds, and a second method."""
 
 from dataclasses import replace
 
@@ -45,7 +45,7 @@ def bounds(robot, assumption="frozen", **options):
 
 
 def assert_holds(bracket, value, tolerance):
-    """The bracket is as narrow as asked and holds the value."""
+    """The bounds are as tight as requested and enclose the value."""
     low, high = bracket
     assert high - low <= tolerance
     slip = 1e-9 * value
@@ -55,7 +55,7 @@ def assert_holds(bracket, value, tolerance):
 
 def test_pose_error_of_one_joint_equals_its_clearances_by_hand():
     """Rotation: tilt and spin are perpendicular.  Translation: disc and interval, and
-    the arm of 0.3 m sweeps (spin along y, tilt along z); worked by hand below.
+    the arm of 0.3 m adds spin along y and tilt along z.
     """
     clearance = Clearance(radial=2e-5, axial=1e-5, tilt=4e-4, spin=3e-4)
     found = bounds(serial(clearance))
@@ -95,7 +95,7 @@ def test_free_platform_has_an_infinite_pose_error():
 
 @pytest.mark.parametrize("spin", [1.0, 1e-3, 1e-4, 1e-6, 1e-9, 0.0])
 def test_pose_error_includes_the_motion_limit_of_a_passive_joint(spin):
-    """With an arm L, y: radial + L spin, z: axial + L tilt, both together, by hand."""
+    """For an arm L, y = radial + L spin and z = axial + L tilt occur together."""
     clearance = Clearance(radial=1e-5, axial=2e-5, tilt=3e-4, spin=spin)
     hub = Frame("hub", joint="revolute", clearance=clearance)
     found = bounds(Robot("arm", "tool", (hub, Frame("tool", "hub", [0.2, 0, 0]))))
@@ -105,7 +105,7 @@ def test_pose_error_includes_the_motion_limit_of_a_passive_joint(spin):
 
 
 def test_tool_point_on_a_bearing_axis_has_a_bounded_translation_error():
-    """On the axis, h above the bearing: radial + h tilt, and axial; by hand.
+    """At height h on the bearing axis, the bounds are radial + h tilt, and axial.
 
     Off the axis the translation error is infinite.
     """
@@ -124,7 +124,7 @@ def test_tool_point_on_a_bearing_axis_has_a_bounded_translation_error():
 
 
 def hinged_frame(spin):
-    """A four-bar with clearance in its pins, two of them bounded to +-spin."""
+    """A four-bar with clearance in its pins, two of which are limited to +-spin."""
     clearance = small_clearance(spin=spin)
     robot = planar_four_bar()
     limited = {"pin_a": clearance, "rocker": clearance, "pin_b": small_clearance()}
@@ -134,7 +134,7 @@ def hinged_frame(spin):
 
 
 def feasible(posture, cp):
-    """Clearance screws within every bound that close the perfect robot, for cvxpy."""
+    """Clearance screws within all bounds that close the ideal robot, for cvxpy."""
     robot, lin = posture.robot, linearise(posture)
     c = cp.Variable((len(robot.frames), 6))
     moved = 1e-4 * cp.reshape(c, (6 * len(robot.frames),), order="C")
@@ -148,8 +148,8 @@ def feasible(posture, cp):
 
 
 @pytest.mark.parametrize("spin", [1.0, 3e-4, 1e-4, 1e-5, 1e-8])
-def test_screws_of_the_bounds_are_feasible_in_the_closed_chain(spin, rng):
-    """Checked in the closures by cvxpy, which also gives the supports; to 1e-6."""
+def test_screws_that_attain_the_bounds_satisfy_the_closures(spin, rng):
+    """cvxpy checks the closures and computes the support functions, to 1e-6."""
     import cvxpy as cp
 
     from forcefit.assembly.linear.reference.as_printed import OPTIMAL, _solve
@@ -172,7 +172,7 @@ def test_screws_of_the_bounds_are_feasible_in_the_closed_chain(spin, rng):
 
 @pytest.mark.parametrize("asked", [{}, {"energy_budget": 0.5}])
 def test_energy_budget_of_two_springs_allows_a_ball_of_known_radius(asked):
-    """E - E* = (k1 + k2)/2 |x - x*|^2 for every motion of the meeting point."""
+    """E - E* = (k1 + k2)/2 |x - x*|^2 for every motion x of the common point."""
     k1, k2, gap, eta = 1e6, 3e6, 2e-4, asked.get("energy_budget", 0.05)
     robot = coaxial_beams(np.array([0, 0, 0, gap, 0, 0]), (k1, k2))
     least = k1 * k2 / (k1 + k2) * gap**2 / 2
@@ -201,20 +201,20 @@ def test_motion_limit_of_a_joint_limits_the_pose_error_of_a_closed_chain(limit):
 
 
 @pytest.mark.parametrize("stiffness", [1e6, 1e-6, 1e-12])
-def test_frozen_assumption_leaves_no_clearance_in_a_loaded_joint(stiffness):
+def test_frozen_assumption_fixes_the_clearance_of_a_loaded_joint(stiffness):
     robot = coaxial_beams(
         np.array([0, 0, 0, 3e-4, 0, 0]), (stiffness, stiffness),
         clearance=Clearance(radial=1e-4, axial=2e-5),
     )  # fmt: skip
     answer = solve_assembly(home_posture(robot))
     found = bounds(robot)
-    # the loaded disc is held; the unloaded interval along z is loose, but the springs
-    # that would have to follow it are frozen
+    # the loaded disc is fixed; the unloaded interval along z is free, but the springs
+    # that would have to follow it are fixed
     size = float(np.linalg.norm(answer.platform_screw[3:]))
     assert_holds(found.translation_error, size, 1e-9)
 
 
-def test_unknown_assumption_and_budget_under_load_are_refused():
+def test_unknown_assumption_and_budget_under_load_are_rejected():
     many = solve_assembly(
         [home_posture(coaxial_beams(np.zeros(6)))], [1, 0, 0, 0, 0, 0]
     )
@@ -228,8 +228,8 @@ def test_unknown_assumption_and_budget_under_load_are_refused():
 @pytest.mark.parametrize(("case", "point"), CASES)
 @pytest.mark.parametrize(("key", "assumption"), [("rigid", "frozen"), ("free", "free")])
 def test_pose_error_bounds_overlap_the_published_bounds(case, point, key, assumption):
-    """Both hold the truth, so they overlap; 1e-7 is what the reference's own
-    deformations leave uncertain where the energy is nearly zero.
+    """Both contain the true value, so they overlap; the published deformations are
+    uncertain by 1e-7 where the energy is nearly zero.
     """
     pose = {"tx": point["x"], "tz": point["z"]}
     for name, robot in (("full", irsbot2_with(case)), ("clear", irsbot2())):

@@ -1,4 +1,4 @@
-"""The certificate of the platform screw against least energies in exact fractions."""
+"""Platform screw bounds, compared with exact rational solutions of minimum energy."""
 
 from dataclasses import replace
 from fractions import Fraction
@@ -17,7 +17,7 @@ from tests.robots_for_tests import coaxial_beams, random_robot
 
 
 def exactly(A):
-    """An array of floats as rows of fractions: no digit is lost."""
+    """Convert an array of floats exactly to rows of fractions."""
     return [[Fraction(float(v)) for v in row] for row in A]
 
 
@@ -49,7 +49,7 @@ def solved(K, right):
 
 
 def exact_screw(answer):
-    """Platform screw of least energy of a robot without clearance, every digit right.
+    """Exact minimum-energy platform screw of a robot without clearance.
 
     y = -A_y' l, A_y y + A_q q = -misfit and A_q' l = 0, with the columns as given.
     """
@@ -73,7 +73,7 @@ def exact_screw(answer):
 
 
 def tight(robot, change):
-    """The robot without clearance, its links changed."""
+    """The robot without clearance and with modified links."""
     return replace(robot, frames=tuple(
         replace(f, clearance=None, link=change(f.link) if f.link else None)
         for f in robot.frames
@@ -117,7 +117,7 @@ def test_screw_bound_holds_for_stiffnesses_of_different_magnitude(spread):
 @pytest.mark.parametrize("young", [7e10, 1e18, 1e24, 1e30])
 @pytest.mark.parametrize("name", ["four_bar", "five_bar"])
 def test_true_screw_error_is_below_the_stated_bound_for_any_stiffness(name, young):
-    """With Young = 1e30 Pa and elastic drives the error exceeds the screw itself."""
+    """For E = 1e30 Pa and elastic drives, the error exceeds the screw itself."""
     rng = np.random.default_rng(1)
     robot = load_robot(name)
     robot = robot.with_errors(1e-3 * rng.uniform(-1, 1, (len(robot.frames), 6)))
@@ -135,8 +135,8 @@ def test_true_screw_error_is_below_the_stated_bound_for_any_stiffness(name, youn
         assert "the stiffest spring is" in unproved(answer)
 
 
-def test_solution_spoilt_by_rounding_is_reported_as_not_proved():
-    """Links of 1e24 Pa with elastic drives; one posture, and one of many."""
+def test_solution_dominated_by_round_off_is_reported_as_not_proved():
+    """Links of 1e24 Pa with elastic drives, at a single posture and at one of many."""
     robot = load_robot("five_bar")
     errors = 1e-3 * np.random.default_rng(1).uniform(-1, 1, (len(robot.frames), 6))
     robot = tight(robot.with_errors(errors), lambda link: replace(link, young=1e24))
@@ -152,7 +152,7 @@ def test_solution_spoilt_by_rounding_is_reported_as_not_proved():
 
 
 def two_springs(k, gap, open_):
-    """Two links of k that meet: energies known to ``gap`` [J], closures ``open_``."""
+    """Two links of stiffness k, with energy gap ``gap`` [J] and residual ``open_``."""
     assembly = solve_assembly(home_posture(coaxial_beams(np.zeros(6), (k, k))))
     vars(assembly).update(uncertainty=gap, rounding=open_)
     return assembly
@@ -161,8 +161,8 @@ def two_springs(k, gap, open_):
 def test_screw_bound_of_two_springs_equals_its_closed_form():
     """(y_1, y_2) within sqrt(2 g), equal if closed: sqrt(g / k) along every axis.
 
-    Where the closure may stay open y_2 may be zero, and y_1 all: sqrt(2 g / k).
-    The box around a ball is sqrt(3) times as far.
+    If the closure may stay open, y_2 can be zero and y_1 carries the whole gap:
+    sqrt(2 g / k).  The box around a ball is larger by a factor of sqrt(3).
     """
     k, gap = 4e4, 1e-6
     closed = bound_screw(two_springs(k, gap, 1e-15))
@@ -177,7 +177,7 @@ def test_screw_bound_of_two_springs_equals_its_closed_form():
 
 
 def test_clearance_outside_the_loop_is_reported_as_undetermined_and_not_as_error():
-    """A hand with radial and axial clearance on two bent beams: disc r, length a."""
+    """A gripper with radial clearance r and axial clearance a on two bent beams."""
     r, a = 3e-5, 2e-5
     beams = coaxial_beams([0, 0, 0, 1e-4, 0, 0], (4e4, 4e4))
     hand = Frame("hand", "end_one", clearance=Clearance(radial=r, axial=a))
@@ -191,8 +191,8 @@ def test_clearance_outside_the_loop_is_reported_as_undetermined_and_not_as_error
 
 
 @pytest.mark.parametrize("name", ["irsbot2", "hexapod", "delta"])
-def test_open_distance_without_errors_equals_the_largest_pose_error(name):
-    """The computed screw is zero, so `solve` and `error` state one quantity."""
+def test_undetermined_range_without_errors_equals_the_largest_pose_error(name):
+    """The computed screw is zero, so `solve` and `error` report the same quantity."""
     assembly = solve_assembly(home_posture(load_robot(name)))
     assert not assembly.platform_screw.any()
     found = bound_screw(assembly)

@@ -1,4 +1,4 @@
-"""Rotation by clearance of a 3-UPU with locked drives, by finite geometry alone.
+"""Rotation of a 3-UPU robot within its clearances, computed from finite geometry.
 
 The table of docs/seoul.md.  A leg's twist is the angle about the leg between the inner
 axes of its two universal joints.  Four hinges that tilt by at most c permit a twist of
@@ -22,7 +22,7 @@ TANGENTIAL = np.cross([0, 0, 1], RADIAL)
 
 
 def unit(vectors):
-    """Vectors along the last axis divided by their lengths."""
+    """Normalise vectors along the last axis."""
     return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
 
 
@@ -45,7 +45,7 @@ def hinge_tilts(position, outer, turns):
 
 
 def farthest(position, outer, tilt, rays, step):
-    """The rays that go farthest until a hinge is at its limit, and how far [rad]."""
+    """Rays with the largest rotation [rad] before a hinge reaches its limit."""
     rays, steps = unit(rays), 0
     while True:
         tilts = hinge_tilts(position, outer, (steps + 1) * step * rays)
@@ -76,7 +76,7 @@ def largest_finite_rotation(position, outer, tilt):
 
 @pytest.fixture(scope="module")
 def seoul(tmp_path_factory):
-    """The robot of the page."""
+    """The robot of the example page."""
     path = tmp_path_factory.mktemp("seoul") / "seoul.toml"
     texts = {title: text for _, title, text in blocks(DOCS / "seoul.md")}
     path.write_text(texts["seoul.toml"])
@@ -95,7 +95,7 @@ def first_order(robot, position):
     [(0.0, 0.0, 45), (0.02, 0.01, 74), (0.05, 0.02, 21.5), (0.1, 0.05, 8.9)],
 )
 def test_finite_rotation_is_at_least_the_value_of_the_example_page(x, y, shown):
-    """A search along rays finds less than the largest rotation."""
+    """A search along rays cannot exceed the largest rotation."""
     found = largest_finite_rotation((x, y, 0.45), RADIAL, TILT)
     assert shown <= 1e3 * found <= 1.04 * shown
 
@@ -105,7 +105,7 @@ def test_finite_rotation_is_at_least_the_value_of_the_example_page(x, y, shown):
 def test_first_order_rotation_is_the_limit_of_finite_rotations_for_small_clearances(
     seoul, factor
 ):
-    """The relative difference is of the order of the rotation over 49 mrad."""
+    """The relative difference is of the order of the rotation divided by 49 mrad."""
     position = (0.02, 0.01, 0.45)
     bound = first_order(seoul, position)
     finite = largest_finite_rotation(position, RADIAL, factor * TILT) / factor

@@ -1,4 +1,4 @@
-"""Many points in one call: equal to single points, selected, proved or refused."""
+"""Solutions at many points equal those at single points and can be selected."""
 
 from dataclasses import replace
 
@@ -24,7 +24,7 @@ K = 1e6
 
 
 def pins(gaps):
-    """A spring that ends in a pin of 1e-4 m, and a gap along x in each row."""
+    """A spring with a pin of clearance 1e-4 m, and a gap along x for each point."""
     frames = (
         Frame("arm", translation=[0.5, 0, 0], link=MatrixLink(K * np.eye(6))),
         Frame("pin", "arm", clearance=Clearance(radial=1e-4)),
@@ -38,7 +38,7 @@ def pins(gaps):
 
 
 def rigid_pins(gaps):
-    """The same without the spring: a gap beyond the clearance cannot be closed."""
+    """The same without the spring, so that larger gaps cannot be closed."""
     home, errors = pins(gaps)
     frames = (Frame("arm", translation=[0.5, 0, 0]), *home.robot.frames[1:])
     robot = Robot("rigid", "end", frames, (("end", "wall"),))
@@ -46,7 +46,7 @@ def rigid_pins(gaps):
 
 
 def test_points_can_be_selected_by_mask_slice_and_repeated_indices():
-    """The energy is K (gap - 1e-4)^2 / 2 beyond the clearance, by hand."""
+    """Beyond the clearance, the energy is K (gap - 1e-4)^2 / 2."""
     gaps = np.array([0.5e-4, 2e-4, 3e-4, 1.5e-4])
     home, errors = pins(gaps)
     many = solve_assembly(home, errors=errors)
@@ -62,7 +62,7 @@ def test_points_can_be_selected_by_mask_slice_and_repeated_indices():
         many[4]
 
 
-def test_point_without_solution_keeps_its_status_when_selected():
+def test_point_without_solution_retains_its_status_when_selected():
     home, errors = rigid_pins(np.array([0.5e-4, 2e-4, 0.1e-4]))
     many = solve_assembly(home, errors=errors)
     assert many.status.tolist() == ["ok", "cannot assemble", "ok"]
@@ -81,8 +81,8 @@ def test_solution_of_a_single_point_has_no_length():
 
 
 @pytest.mark.parametrize("loaded", [(1, 0), (0, 1), (1, 1), (0, 0)])
-def test_loaded_and_unloaded_points_keep_their_own_errors(loaded):
-    """Stored: K g^2 / 4 of the gap and F^2 / 4 K of the load, which are independent."""
+def test_loaded_and_unloaded_points_retain_their_own_errors(loaded):
+    """The energies K g^2 / 4 of the gap and F^2 / 4 K of the load are additive."""
     sets = np.zeros((2, 6, 6))
     sets[:, 2, 3] = 1e-4, 3e-4
     at = home_posture(coaxial_beams(np.zeros(6), (K, K)))
@@ -95,8 +95,8 @@ def test_loaded_and_unloaded_points_keep_their_own_errors(loaded):
         assert (one.posture.robot.errors == errors).all()
 
 
-def test_redundant_free_motions_have_the_least_norm():
-    """Two pins on one axis share its rotation: half each, as by the reference."""
+def test_redundant_free_motions_have_minimum_norm():
+    """Two pins on a common axis each take up half of the rotation."""
     gap = [1e-3, 0, 2e-3, 1e-4, 0, 0]
     frames = (
         Frame("one", translation=[0.5, 0, 0], link=MatrixLink(1e5 * np.eye(6))),
@@ -117,7 +117,7 @@ def test_redundant_free_motions_have_the_least_norm():
 
 
 def test_energy_of_a_stiff_spring_in_series_with_a_soft_one_is_accurate():
-    """1 and 1e-8 rad/(N m) about one axis, twice 1e-8 across it."""
+    """Compliances of 1 and 1e-8 rad/(N m) about one axis, and 1e-8 twice across it."""
     soft = np.diag([1.0, 1e8, 1e8, 1e8, 1e8, 1e8])
     gap = np.array([1e-2, 1e-4, 0, 0, 0, 0])
     frames = (
@@ -145,14 +145,14 @@ def test_energy_of_a_stiff_spring_in_series_with_a_soft_one_is_accurate():
         ((2, 6, 3, 4), None, r"transforms of shape \(2, 6, 3, 4\)"),
     ],
 )
-def test_transforms_or_errors_of_a_wrong_shape_are_refused(shape, errors, message):
+def test_transforms_or_errors_of_wrong_shape_are_rejected(shape, errors, message):
     robot = coaxial_beams(np.zeros(6))
     given = None if errors is None else np.zeros(errors)
     with pytest.raises(ValueError, match=message):
         assemble_at(robot, np.zeros(shape), given)
 
 
-def test_values_that_are_not_finite_are_refused():
+def test_nonfinite_values_are_rejected():
     robot = coaxial_beams(np.zeros(6))
     T = home_posture(robot).transforms[None].copy()
     with pytest.raises(ValueError, match="not all finite"):
@@ -167,13 +167,13 @@ def test_empty_list_of_postures_gives_an_empty_solution():
     assert len(assemble_at(robot, np.zeros((0, 6, 4, 4))).energy) == 0
 
 
-# some postures in blocks of two, four and eight, where their factors are kept
+# some postures are repeated in blocks of two, four and eight, to reuse their factors
 BLOCKS = [0] * 16 + [5] * 8 + [3] * 8 + [0] * 5 + [3, 7, 3, 7] + [0] * 16 + [7] * 9
 
 
 @pytest.mark.parametrize("load", ["none", "each its own", "the same"])
 def test_energy_of_a_point_is_independent_of_its_neighbours(grid, rng, load):
-    """In another order, among other points, alone: bit-identical."""
+    """Bit-identical in another order, among other points, and alone."""
     robot, postures = grid
     at = together([*postures, *(postures[i] for i in BLOCKS)])
     count = len(postures) + len(BLOCKS)
@@ -196,7 +196,7 @@ def test_energy_of_a_point_is_independent_of_its_neighbours(grid, rng, load):
 
 @pytest.mark.parametrize("loaded", [False, True])
 def test_energy_with_motion_limits_equals_the_reference_method(loaded):
-    """Equal to 1e-8 of the energy and the work, which both certificates allow."""
+    """Both agree within their certificates, 1e-8 of energy and work."""
     held = 0
     for seed in range(20):
         rng = np.random.default_rng(seed)
@@ -214,7 +214,7 @@ def test_energy_with_motion_limits_equals_the_reference_method(loaded):
 
 
 def test_postures_of_different_rank_do_not_depend_on_each_other(rng):
-    """Rotations of three parallel hinges are independent unless they are in line."""
+    """The closure rank of three parallel hinges drops if they are collinear."""
     home = home_posture(BUILT_IN["five_bar"]())
     robot, T = home.robot, np.repeat(home.transforms[None], 8, axis=0)
     T[::3, :, 1:3, 3] = 0.0
@@ -249,10 +249,10 @@ def test_margin_of_a_point_is_independent_of_its_neighbours(grid, rng, compliant
 
 @pytest.mark.parametrize("kappa", [0.05, 0.3, 1.0])
 @pytest.mark.parametrize("load", [None, [1.0, 2.0, 3.0, 30.0, 10.0, -100.0]])
-def test_draws_at_one_posture_are_bit_identical_to_separate_points(
+def test_samples_at_one_posture_are_bit_identical_to_separate_points(
     grid, rng, kappa, load
 ):
-    """One posture for all draws, or a posture for each."""
+    """All samples share one posture, or each has its own."""
     robot, postures = grid
     errors = kappa * robot.errors * rng.uniform(-1, 1, (61, 1, 1))
     errors += kappa * robot.errors * rng.uniform(-1, 1, (61, *robot.errors.shape))

@@ -1,4 +1,4 @@
-"""Helical joints: chains, loops and solvers."""
+"""Helical joints in chains, loops and all solvers."""
 
 from dataclasses import replace
 
@@ -18,7 +18,7 @@ METHODS = ["compiled", "reference"]
 
 
 def test_pose_of_a_chain_is_the_product_of_matrix_exponentials(rng):
-    """exp of each joint's twist [w; p x w + h w], read at the base origin, at home."""
+    """Product of exponentials of the twists [w; p x w + h w] at home, base origin."""
     frames, twists, parent = [], [], "base"
     for k, pitch in enumerate([0.3, -0.2, 0.0, 0.7]):
         kind = "helical" if pitch else "revolute"
@@ -42,7 +42,7 @@ def test_pose_of_a_chain_is_the_product_of_matrix_exponentials(rng):
 
 
 def held_nut(turned, shifted, k=None):
-    """A nut of 25 um axial clearance on a seat with an error along the thread."""
+    """A nut with 25 um axial clearance on a seat with an error along the thread."""
     K = None if k is None else np.diag([np.inf, np.inf, 0, np.inf, np.inf, k])
     thread = Frame(
         "thread", joint="helical", pitch=0.004, joint_stiffness=K,
@@ -55,7 +55,7 @@ def held_nut(turned, shifted, k=None):
 
 @pytest.mark.parametrize(("turned", "shifted"), [(0.05, 1e-5), (-0.1, 2e-5), (0, 3e-5)])
 def test_margin_of_a_nut_is_its_offset_from_the_thread(turned, shifted):
-    """|TZ - h RZ| / b, the rotation alone being free."""
+    """The margin is |TZ - h RZ| / b, since only the motion along the thread is free."""
     at = held_nut(turned, shifted)
     expected = abs(shifted - 0.004 / (2 * np.pi) * turned) / 25e-6
     for method in METHODS:
@@ -66,7 +66,7 @@ def test_margin_of_a_nut_is_its_offset_from_the_thread(turned, shifted):
 
 
 def test_energy_of_a_forced_nut_equals_that_of_its_offset_beyond_the_clearance():
-    """k (|TZ - h RZ| - b)^2 / 2, finite motions too: all of them share one axis."""
+    """The energy is k (|TZ - h RZ| - b)^2 / 2, also exactly, for a common axis."""
     at = held_nut(-0.1, 2e-5, 1e7)
     over = 2e-5 + 0.1 * 0.004 / (2 * np.pi) - 25e-6
     for method in METHODS:
@@ -80,7 +80,7 @@ def test_energy_of_a_forced_nut_equals_that_of_its_offset_beyond_the_clearance()
 
 
 def random_threads(seed):
-    """Three legs of random joints, every revolute joint made helical."""
+    """Three legs of random joints, with helical instead of revolute joints."""
     rng, frames = np.random.default_rng(seed), []
     robot = random_robot(rng, legs=3, joints=4, link_share=1.0)
     for f in robot.frames:
@@ -107,7 +107,7 @@ def test_three_solvers_agree_on_random_loops_with_oblique_threads(seed):
 
 @pytest.mark.parametrize("seed", range(4))
 def test_exact_solution_differs_by_the_square_of_the_errors(seed):
-    """Ratio of the differences at full and half size: 4, up to the third order."""
+    """Halving the errors reduces the difference by a factor of 4, to third order."""
     robot = random_threads(seed)
     tight = replace(
         robot, frames=tuple(replace(f, clearance=None) for f in robot.frames)

@@ -1,4 +1,4 @@
-"""The zone margin (21): closed forms, properties, and the problem in cvxpy."""
+"""Zone margin (21): closed forms, properties, and the printed problem in cvxpy."""
 
 from dataclasses import replace
 
@@ -50,7 +50,7 @@ def test_margin_is_infinite_without_clearance_in_the_error_direction():
 
 
 def test_passive_joints_compensate_in_plane_errors_without_clearance():
-    """A four-bar's pins take up errors in its plane, and none across it."""
+    """The pins of a four-bar take up in-plane errors, but no out-of-plane errors."""
     errors = np.zeros((6, 6))
     errors[2] = [0, 0, 1e-3, 1e-4, 2e-4, 0]
     robot = planar_four_bar(errors=errors)
@@ -61,7 +61,7 @@ def test_passive_joints_compensate_in_plane_errors_without_clearance():
 
 @pytest.mark.parametrize("method", METHODS)
 def test_range_of_a_passive_joint_does_not_scale_with_the_margin(method):
-    """Slider of range 1e-4, axial clearance of 1e-5: (3e-4 - 1e-4) / 1e-5."""
+    """Slider range 1e-4 and axial clearance 1e-5: (3e-4 - 1e-4) / 1e-5."""
     frames = (
         Frame("slide", joint="prismatic", clearance=Clearance(axial=1e-4)),
         Frame("joint", "slide", clearance=Clearance(axial=1e-5)),
@@ -96,7 +96,7 @@ def test_clearances_scaled_by_the_margin_just_assemble():
         assert zone.assemblable == inside
 
 
-def test_unknown_compliant_option_is_refused():
+def test_unknown_compliant_option_is_rejected():
     at = home_posture(planar_four_bar())
     for posture in (at, [at]):
         with pytest.raises(ValueError, match="compliant is 'soft', expected 'rigid'"):
@@ -105,7 +105,7 @@ def test_unknown_compliant_option_is_refused():
 
 @settings(deadline=None, max_examples=12)
 @given(seed=st.integers(0, 2**32 - 1), legs=st.integers(2, 3))
-def test_margin_of_random_robots_equals_the_printed_problem_in_cvxpy(seed, legs):
+def test_margin_of_random_robots_matches_the_paper_in_cvxpy(seed, legs):
     rng = np.random.default_rng(seed)
     posture = home_posture(random_robot(rng, legs, 3))
     for compliant in ("rigid", "free"):
@@ -125,7 +125,7 @@ def test_margin_of_random_robots_equals_the_printed_problem_in_cvxpy(seed, legs)
 
 @pytest.mark.parametrize("compliant", ["rigid", "free"])
 def test_margins_of_many_robots_equal_the_reference_method(compliant, rng):
-    """Both margins lie within 1e-8 of their common certified bounds."""
+    """Both margins agree within their certified bounds, to 1e-8."""
     homes = [home_posture(make()) for make in BUILT_IN.values()]
     for seed in range(80):
         draw = np.random.default_rng(seed)
@@ -144,7 +144,7 @@ def test_margins_of_many_robots_equal_the_reference_method(compliant, rng):
 
 
 def test_margins_of_several_errors_or_postures_are_gap_over_clearance():
-    """Several errors at one posture, errors for each posture, and postures alone."""
+    """Several errors at one posture, errors for each posture, and several postures."""
     gaps = np.array([1e-5, 4e-5, -3e-5])
     sets = np.zeros((3, 6, 6))
     sets[:, 2, 5] = gaps
@@ -162,7 +162,7 @@ def test_margins_of_several_errors_or_postures_are_gap_over_clearance():
 
 
 def test_margins_are_selected_by_index_and_one_point_has_no_length():
-    """Gap over clearance at one point; norms of the forces on its cones sum to 1."""
+    """Gap over clearance at one point; the norms of the cone forces add up to 1."""
     sets = np.zeros((3, 6, 6))
     sets[:, 2, 5] = [1e-5, 4e-5, -3e-5]
     at = home_posture(coaxial_beams(np.zeros(6), clearance=PLAY))

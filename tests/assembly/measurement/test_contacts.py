@@ -1,4 +1,4 @@
-"""Contact laws in series with springs: the forces are in balance."""
+"""Contact laws in series with springs, whose forces balance."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ LAWS = (ContactLaw("a", 3e5, 1.5), ContactLaw("b", 2e3, 1.1))
 
 
 def in_unit(force):
-    """The laws with forces in another unit."""
+    """The contact laws with forces in another unit."""
     return tuple(ContactLaw(x.frame, x.coefficient * force, x.exponent) for x in LAWS)
 
 
@@ -20,7 +20,7 @@ def law(one, d):
 
 @pytest.mark.parametrize("force", [1e-9, 1.0])
 def test_coupled_contacts_are_in_balance(rng, force):
-    """The matrix A couples them; Newton's method converges in a few steps."""
+    """The contacts are coupled by A, and Newton's method converges in a few steps."""
     B = rng.normal(size=(6, 2, 2)) * 300
     A = -force * B @ B.mT
     w = force * rng.normal(size=(6, 2)) * [50.0, 20.0]

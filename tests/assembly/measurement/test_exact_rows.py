@@ -1,4 +1,4 @@
-"""Exact equilibria of many rows equal those of single rows."""
+"""Exact equilibria of many measurements equal those of single measurements."""
 
 from dataclasses import replace
 
@@ -22,7 +22,7 @@ ROBOTS = {"five_bar": 0.3, "3rrr": 0.2, "hexapod": 0.02, "arm6": 0.4}
 
 
 def loaded_rows(name, rng, laws=()):
-    """A tight robot with errors under loads and weight, at configurations of its own.
+    """A robot without clearance, with errors, loads and weight, at several postures.
 
     Errors of 0.2 mm and mrad, forces of some 100 N.
     """
@@ -45,10 +45,10 @@ def loaded_rows(name, rng, laws=()):
 
 @pytest.mark.parametrize(("name", "pieces"), [*((n, 1) for n in ROBOTS),
                                               ("five_bar", 3)])  # fmt: skip
-def test_exact_solutions_of_all_rows_together_equal_single_exact_solutions(
+def test_exact_solutions_of_all_measurements_equal_single_exact_solutions(
     name, pieces, rng
 ):
-    """Both converge to 1e-12; nominal closures are rounded to 1e-12 at worst."""
+    """Both converge to 1e-12, and nominal closures hold to 1e-12."""
     here = loaded_rows(name, rng)
     if pieces > 1:
         whole, _ = solve_rows(here, np.zeros((len(here), 0)))
@@ -75,7 +75,7 @@ BAR = Robot(
 
 
 @pytest.mark.parametrize("force", [5.0, 200.0, -200.0])
-def test_bar_on_a_contact_rests_at_its_moment_balance(force):
+def test_bar_on_a_contact_rests_where_its_moments_balance(force):
     """c |a|^n sign(a) = F L cos a for the angle a: the arm shortens as it turns."""
     c, n = 2e5, 1.5
     load = [0, 0, 0, 0, force, 0]
@@ -89,14 +89,14 @@ def test_bar_on_a_contact_rests_at_its_moment_balance(force):
 
 
 def test_contact_without_load_has_zero_deflection():
-    """Its secant stiffness, infinite there, has no influence."""
+    """The secant stiffness is infinite without load, but has no influence."""
     here = as_declared(home_posture(BAR), np.zeros(6))
     here = replace(here, laws=(ContactLaw("drive", 2e5, 1.5),), exact=True)
     np.testing.assert_array_equal(predict(here).deviation, 0.0)
 
 
-def test_rows_that_do_not_converge_are_solved_by_the_exact_solver():
-    """A spring so soft that the bar turns by radians."""
+def test_measurements_that_do_not_converge_are_solved_one_by_one():
+    """The spring is so soft that the bar rotates by radians."""
     K = np.diag([np.inf, np.inf, 1.0, np.inf, np.inf, np.inf])
     frames = (replace(BAR.frames[0], joint_stiffness=K), BAR.frames[1])
     robot = replace(BAR, frames=frames)

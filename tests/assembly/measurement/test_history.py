@@ -1,4 +1,4 @@
-"""States that lag behind a variable, against the differential equation."""
+"""States that lag behind a variable, compared with the differential equation."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ VALUES = np.array([1.0, 4.0, -2.0, -2.0, 5.0, 5.0])
 
 
 def by_integration(times, values, time_constant, held):
-    """tau y' = u - y from y = 0 at time 0: u held from the row before, or even."""
+    """Integrate tau y' = u - y from y = 0 at time 0, for held or linearly varying u."""
     state, answers = 0.0, []
     before, last = values[0], 0.0
     for time, value in zip(times, values, strict=True):
@@ -34,7 +34,7 @@ def by_integration(times, values, time_constant, held):
 def test_lag_of_an_effect_equals_the_integrated_differential_equation(
     held, time_constant
 ):
-    """Also with two rows at the same time, between which nothing settles."""
+    """Two of the readings are taken at the same time."""
     history, row = in_order({"time": TIMES, "u": VALUES}, None)
     assert row.tolist() == [*range(6)]
     found = history.lagged("u", time_constant, held=held)
@@ -45,8 +45,8 @@ def test_lag_of_an_effect_equals_the_integrated_differential_equation(
     )
 
 
-def test_history_of_effects_begins_at_rest_in_each_session_for_rows_in_any_order(rng):
-    """The state of each row depends on the rows of its own session only."""
+def test_history_of_effects_starts_at_rest_in_each_session_whatever_the_row_order(rng):
+    """The state at each reading depends only on readings of the same session."""
     mixed = rng.permutation(12)
     times, values = np.tile(TIMES, 2)[mixed], np.r_[VALUES, 2 * VALUES][mixed]
     session = np.repeat(["warm", "cold"], 6)[mixed]
@@ -60,7 +60,7 @@ def test_history_of_effects_begins_at_rest_in_each_session_for_rows_in_any_order
 
 
 def directions_by_hand(values, session, approach):
-    """Row after row: the sign of the last step of the session, or how it came."""
+    """Sign of the last change within the session, otherwise the approach direction."""
     found = []
     for i, value in enumerate(values):
         if i == 0 or session[i] != session[i - 1]:
@@ -75,7 +75,7 @@ def directions_by_hand(values, session, approach):
 
 
 def test_approach_direction_is_that_of_the_last_motion_in_the_session(rng):
-    """Sessions that begin anywhere, variables that do not or hardly change."""
+    """Sessions start at arbitrary readings, and some variables barely change."""
     for _ in range(30):
         count = int(rng.integers(1, 9))
         values = np.cumsum(rng.choice([-1.0, 0.0, 0.0, 5e-10, 1.0], count))

@@ -1,4 +1,4 @@
-"""Readings of a device on a moved platform, by homogeneous transforms of SciPy."""
+"""Readings of a device on a displaced platform, compared with SciPy transforms."""
 
 from dataclasses import replace
 
@@ -34,7 +34,7 @@ def rows():
 @pytest.mark.parametrize("own_targets", [False, True])
 @pytest.mark.parametrize("by_row", [False, True])
 def test_reading_equals_the_rigid_body_transform(rows, own_targets, by_row, rng):
-    """A device turned by 1 rad reads the position of a point of a turned platform."""
+    """A device rotated by 1 rad measures a point on a rotated platform."""
     count = (ROWS,) if by_row else ()
     base, tool = rng.normal(size=(*count, 6)), rng.normal(size=(*count, 3))
     target = rng.normal(size=(ROWS, 3)) if own_targets else None
@@ -66,7 +66,7 @@ def test_second_order_part_is_added_to_the_linear_model_only(rows, rng):
 
 
 def test_work_of_a_load_does_not_depend_on_the_reference_point(rows, rng):
-    """M . theta + F . t at the reference point and at the platform's origin."""
+    """M . theta + F . t is equal at the reference point and the platform origin."""
     load, screw = rng.normal(size=(ROWS, 6)), rng.normal(size=6)
     here = as_declared(rows, load, point=POINT)
     moved = here.load_at_origin()

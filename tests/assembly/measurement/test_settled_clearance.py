@@ -1,4 +1,4 @@
-"""Clearances taken up by loads, measured points, and clearances at rest."""
+"""Clearances closed by loads, measured points, and rest positions."""
 
 from dataclasses import replace
 
@@ -18,13 +18,13 @@ RADIAL, AXIAL = 1e-5, 3e-5
 
 
 def at_home(robot, load, **given):
-    """One row."""
+    """Conditions of one measurement."""
     postures = together([home_posture(robot)])
     return as_declared(postures, np.array([load], dtype=float), **given)
 
 
 def pin(**clearance):
-    """A passive pin about z, turned about x, whose arm points along its x."""
+    """A passive pin about z, rotated about x, with an arm along its x axis."""
     return Robot("pin", "tip", (
         Frame("pin", joint="revolute", rotation=[0.7, 0, 0],
               clearance=Clearance(**clearance)),
@@ -33,19 +33,19 @@ def pin(**clearance):
 
 
 @pytest.mark.parametrize("unit", [1e-12, 1.0, 1e6])
-def test_load_of_any_size_moves_a_joint_to_its_bound_in_the_direction_of_the_load(unit):
-    """A pin along x: radially by its clearance, axially by nothing."""
+def test_load_of_any_size_moves_a_joint_to_its_bound_along_the_load(unit):
+    """A pin along x moves radially by its clearance, but not axially."""
     conditions = at_home(pin(radial=RADIAL), unit * np.array([0, 0, 0, 2.0, 0, 0]))
     settled, undetermined = with_clearances_taken_up(conditions)
     expected = np.zeros((1, 2, 6))
     expected[0, 0, 3] = RADIAL
     assert settled.errors == pytest.approx(expected, abs=1e-18)
-    # its own motion is no clearance that could be undetermined
+    # the joint motion itself is not an undetermined clearance
     assert undetermined.tolist() == [False]
 
 
-def test_a_ball_rests_at_its_radius_in_the_direction_of_the_load():
-    """The pin is turned by 0.7 rad about x; a cylinder would rest at its corner."""
+def test_ball_clearance_rests_at_its_radius_along_the_load():
+    """The pin is rotated by 0.7 rad about x; a cylinder would rest at its corner."""
     load = np.array([0, 0, 0, 2.0, 1.0, -2.0])
     settled, undetermined = with_clearances_taken_up(at_home(pin(ball=RADIAL), load))
     c, s = np.cos(0.7), np.sin(0.7)
@@ -64,7 +64,7 @@ def test_clearance_without_load_is_undetermined_and_centred():
 
 
 def test_measured_point_is_transformed_with_the_platform():
-    """The platform's axes are turned by 0.7 rad about x."""
+    """The platform axes are rotated by 0.7 rad about x."""
     point = np.array([0.1, 0.2, -0.3])
     conditions = at_home(pin(), np.zeros(6), point=point)
     c, s = np.cos(0.7), np.sin(0.7)
@@ -74,7 +74,7 @@ def test_measured_point_is_transformed_with_the_platform():
 
 
 def test_clearance_at_rest_is_a_fraction_of_its_bounds():
-    """Tilt, spin, radial and axial bounds; a pin's spin is motion and no clearance."""
+    """Tilt, spin, radial and axial bounds; the spin of a pin is not a clearance."""
     robot = Robot("two", "tip", (
         Frame("fixed", clearance=Clearance(1e-5, 2e-5, 3e-4, 4e-4)),
         Frame("pin", "fixed", joint="revolute",

@@ -1,4 +1,4 @@
-"""Linear solution of all rows together: against the cone solver, reciprocity."""
+"""Linear solution of all measurements together: cone solver and reciprocity."""
 
 from dataclasses import replace
 
@@ -21,12 +21,12 @@ STILL = np.zeros((1, 3))
 
 
 def at_home(robot):
-    """One posture, as a batch of one."""
+    """A single posture as a batch."""
     return together([home_posture(robot)])
 
 
 def solved(robot, load, errors=None):
-    """The robot's only row."""
+    """Conditions of a single measurement."""
     errors = robot.errors if errors is None else errors
     postures = at_home(robot)
     forces = loads_with_weight(postures, np.array(load, dtype=float)[None], STILL)
@@ -34,17 +34,17 @@ def solved(robot, load, errors=None):
 
 
 def farthest(found, expected):
-    """Largest difference, rotations and translations scaled by their own largest."""
+    """Largest difference relative to the largest rotation or translation."""
     parts = np.asarray(found).reshape(-1, 2, 3), np.asarray(expected).reshape(-1, 2, 3)
     scale = np.abs(parts[1]).max(axis=(0, 2), keepdims=True) + 1e-300
     return np.abs((parts[0] - parts[1]) / scale).max()
 
 
 def elastic_robot(seed, legs):
-    """Tight joints and a spring in every body: one equilibrium under any load."""
+    """A tight robot with elastic bodies has a unique equilibrium under any load."""
     rng = np.random.default_rng(seed)
     robot = random_robot(rng, legs, link_share=1.0)
-    # not even bounds of sliding joints' own motion
+    # without motion limits of prismatic joints
     tight = tuple(replace(f, clearance=None) for f in robot.frames)
     return replace(robot, frames=tight), rng
 
@@ -52,7 +52,7 @@ def elastic_robot(seed, legs):
 @settings(max_examples=20, deadline=None)
 @given(seeds, st.integers(2, 3))
 def test_linear_solution_of_a_loaded_robot_equals_the_cone_solver(seed, legs):
-    """1e-6: stiffness ratios of 1e6 and rounding of 1e-16 in two factorisations."""
+    """The tolerance 1e-6 allows for round-off at stiffness ratios of 1e6."""
     robot, rng = elastic_robot(seed, legs)
     load = rng.normal(size=6) * [5, 5, 5, 50, 50, 50]
     fast = solved(robot, load)
@@ -63,7 +63,7 @@ def test_linear_solution_of_a_loaded_robot_equals_the_cone_solver(seed, legs):
 
 
 def rigid_four_bar(error):
-    """A four-bar of rigid bars, the rocker's end off by an error."""
+    """A four-bar of rigid bars with an error at the rocker end."""
     robot = planar_four_bar()
     frames = [replace(f, link=None) for f in robot.frames]
     frames[-1] = replace(frames[-1], geometric_error=error)
@@ -71,10 +71,10 @@ def rigid_four_bar(error):
 
 
 def test_rigid_four_bar_compensates_in_plane_errors_as_in_closed_form():
-    """The closure has rank 3 of 6, which suffices in the plane.
+    """The closure has rank 3 of 6, which is sufficient in the plane.
 
-    The rocker longer by a: the pin of the coupler, which the locked crank holds, moves
-    by h along the coupler's normal, and h n . u = a along the rocker's u.
+    With the rocker longer by a and the crank locked, the coupler pin moves by h along
+    the coupler normal n, where h n . u = a along the rocker direction u.
     """
     a = 1e-5
     robot = rigid_four_bar([0, 0, 0, 0, 0, 0])
@@ -98,7 +98,7 @@ def test_rigid_four_bar_compensates_in_plane_errors_as_in_closed_form():
 @pytest.mark.parametrize("size", [1e-4, 1e-6])
 @pytest.mark.parametrize("row", [0, 1, 5])
 def test_rigid_four_bar_with_out_of_plane_errors_is_not_solved(row, size):
-    """The row goes to the solver that reports the reason."""
+    """The measurement is passed to the solver that reports the reason."""
     robot = rigid_four_bar(size * np.eye(6)[row])
     assert not solved(robot, np.zeros(6)).solved.any()
     with pytest.raises(CannotAssemble):
@@ -108,7 +108,7 @@ def test_rigid_four_bar_with_out_of_plane_errors_is_not_solved(row, size):
     assert told.reason[0]
 
 
-def test_robot_with_clearance_is_refused():
+def test_robot_with_clearance_is_rejected():
     robot = coaxial_beams(np.zeros(6), clearance=Clearance(radial=1e-5))
     with pytest.raises(ValueError, match="found a clearance, expected a robot without"):
         flexibility(at_home(robot))

@@ -1,4 +1,4 @@
-"""Frames that deform by laws of their own wrench, compared with bisection."""
+"""Frames whose deformation depends on their wrench, compared with bisection."""
 
 from dataclasses import replace
 
@@ -16,7 +16,7 @@ POST = Robot("post", "top", (Frame("foot"), Frame("top", "foot", [0, 0, 1.0])))
 
 
 def settled_by(law, unit=1.0):
-    """Deflection d of a place under the wrench 3 - 2 d, d in a unit."""
+    """Deflection d of a location under the wrench 3 - 2 d, in a given unit."""
     one = Yield(
         "foot", 1, (("foot", 1),), np.zeros((1, 1)), lambda x, w: unit * law(w[:, 0])
     )
@@ -41,7 +41,7 @@ def test_deformation_by_a_power_law_equals_bisection(power, unit):
     assert give / unit == pytest.approx(expected, rel=1e-9)
 
 
-def test_springs_of_unbounded_deformation_are_refused():
+def test_springs_of_unbounded_deformation_are_rejected():
     """d = w + d has no solution under a load."""
     one = Yield("foot", 1, (("foot", 1),), np.zeros((1, 1)), lambda x, w: w[:, 0])
     here = replace(as_declared(home_posture(POST), np.zeros(6)), yields=(one,))
@@ -49,15 +49,15 @@ def test_springs_of_unbounded_deformation_are_refused():
         Yields(here).correction(np.ones((1, 1)), np.zeros((1, 1)), np.ones((1, 1, 1)))
 
 
-def test_law_without_convergence_is_refused():
-    """It deforms under any load so far that the load vanishes."""
+def test_law_without_convergence_is_rejected():
+    """The law deforms under any load until the load vanishes."""
     with pytest.raises(SolverFailed, match="do not converge in 40 steps"):
         settled_by(lambda w: np.where(w > 0, 2.0, 0.0))
 
 
 @pytest.mark.parametrize("compliance", [-1e-4, 0.0, 3e-4])
 def test_linear_compliances_become_joint_springs_and_other_laws_remain(compliance):
-    """In series with the declared spring; a compliance that is not positive remains."""
+    """Springs act in series with the declared one; others are not converted."""
     K = np.diag([np.inf, 1e4] + [np.inf] * 4)
     robot = Robot("post", "top", (
         Frame("foot", joint_stiffness=K), Frame("top", "foot", [0, 0, 1.0]),

@@ -1,4 +1,4 @@
-"""Load-deflection curves and paths past limit points: closed forms."""
+"""Load-deflection curves and paths past limit points, compared with closed forms."""
 
 import numpy as np
 import pytest
@@ -30,7 +30,7 @@ def cantilever(link):
 
 @pytest.mark.parametrize("state", ["contact", "exact"])
 def test_rigid_direction_has_infinite_stiffness_and_no_events(state):
-    """A slide with a spring along x, turned by a rounded right angle: rigid along z."""
+    """A slide with a spring along x, turned by a rounded right angle about y."""
     K = np.diag([np.inf] * 5 + [1e5])
     frames = (
         Frame("slide", rotation=[0, np.pi / 2, 0], joint="prismatic",
@@ -46,8 +46,8 @@ def test_rigid_direction_has_infinite_stiffness_and_no_events(state):
 
 
 @pytest.mark.parametrize("state", ["contact", "exact"])
-def test_curve_passes_the_clearance_and_then_follows_the_spring(state):
-    """Deflection = sign(F) c + F / k; without load it is anywhere in the clearance."""
+def test_curve_crosses_the_clearance_and_then_follows_the_spring(state):
+    """The deflection is sign(F) c + F / k, and undetermined without load."""
     c, k = 1e-4, 1e5
     curve = deflection_curve(bush(c, k), FZ, np.arange(-30.0, 31.0, 10.0), state=state)
     loaded = curve.loads != 0.0
@@ -64,7 +64,7 @@ def test_curve_passes_the_clearance_and_then_follows_the_spring(state):
 
 
 def test_contact_forced_by_an_error_opens_at_its_preload():
-    """A closure pressed on its stop by k (e - c) opens at that load.
+    """A closure preloaded on its stop by k (e - c) opens at that load.
 
     Two springs k hold the tip; the contact opens when the other spring carries the
     whole load, 2 k (e - c) / 2.
@@ -93,7 +93,7 @@ def test_contact_forced_by_an_error_opens_at_its_preload():
 
 
 def test_tangent_stiffness_is_the_slope_of_the_curve():
-    """Central differences along a loaded robot's curve, error of second order."""
+    """Central differences along the curve of a loaded robot, of second order."""
     posture = home_posture(load_robot("four_bar"))
     loads = 100.0 + np.array([-0.5, 0.0, 0.5])
     curve = deflection_curve(posture, FY, loads, state="exact")
@@ -115,7 +115,7 @@ def test_clamped_column_has_a_critical_event_at_the_euler_load():
 
 
 def test_thin_cantilever_has_a_critical_event_at_the_lateral_buckling_load():
-    """4.013 sqrt(EI GJ) / L^2 (Michell, Prandtl 1899), and the effect of prebuckling.
+    """4.013 sqrt(EI GJ) / L^2 (Michell, Prandtl 1899), with the effect of prebuckling.
 
     1 / sqrt((1 - I_y/I_z) (1 - GJ/EI_z)) for the latter; 16 pieces leave 0.1 %.
     """
@@ -133,7 +133,7 @@ def test_thin_cantilever_has_a_critical_event_at_the_lateral_buckling_load():
 
 
 def shallow_arch():
-    """Von Mises' truss: two springs k at an angle that meet in a slider."""
+    """Von Mises truss: two inclined springs k that meet at a slider."""
     half, rise, k = 1.0, 0.1, 1e5
     length, angle = np.hypot(half, rise), np.arctan2(rise, half)
     K = np.diag([np.inf, np.inf, np.inf, k, np.inf, np.inf])
@@ -152,7 +152,7 @@ def shallow_arch():
 
 @pytest.mark.slow
 def test_shallow_arch_jumps_at_its_limit_load():
-    """F(w) = 2 k (L / l - 1) (h - w), l^2 = a^2 + (h - w)^2: largest, then a jump."""
+    """F(w) = 2 k (L / l - 1) (h - w), l^2 = a^2 + (h - w)^2 jumps at its maximum."""
     rise = 0.1
     limit = arch_force(np.linspace(0.0, rise, 100_001)).max()
     loads = -np.array([0.0, 0.5, 0.9, 0.99, 1.05, 1.2]) * limit
@@ -163,15 +163,15 @@ def test_shallow_arch_jumps_at_its_limit_load():
     assert -jump.load == pytest.approx(limit, rel=1e-3)
     assert curve.deflection[3] > -rise
     assert curve.deflection[4] < -2 * rise
-    # back: it stays below until the load there is lost too
+    # unloading: it stays below until the load falls to the lower limit point
     assert curve.deflection[-2] == pytest.approx(curve.deflection[5], rel=0.2)
     assert curve.deflection[-2] < -2 * rise < curve.deflection[1]
 
 
 def test_pinned_column_with_a_guided_platform_buckles_in_its_links():
-    """Pinned at both ends, the platform on a slide along it: pi^2 E I / L^2.
+    """Euler load pi^2 E I / L^2 of a column with both ends pinned, guided by a slide.
 
-    Sixteen pieces buckle earlier by a share that falls with the square of their number.
+    The buckling load of n pieces is too low by a fraction proportional to 1 / n^2.
     """
     E, width, height = 7e10, 0.01, 0.02
     beam = BeamLink({"width": width, "height": height}, E, 0.3, up=(0, 0, 1), pieces=16)
@@ -195,13 +195,13 @@ def test_pinned_column_with_a_guided_platform_buckles_in_its_links():
 
 
 def arch_force(height, half=1.0, rise=0.1, k=1e5):
-    """Load on von Mises' truss at the height of its apex, downwards."""
+    """Downward load on the von Mises truss at a given height of its apex."""
     length = np.hypot(half, rise)
     return 2 * k * (length / np.hypot(half, height) - 1) * height
 
 
 def test_path_of_a_shallow_arch_equals_its_closed_form_past_limit_points():
-    """The path rises to the limit point, passes the flat arch, and falls again."""
+    """The path rises to the limit point, passes the flat state, and falls again."""
     limit = arch_force(np.linspace(0, 0.1, 100_001)).max()
     curve = follow_load(shallow_arch(), FY, 0.0, -1.5 * limit)
     heights = 0.1 + curve.deflection
@@ -217,7 +217,7 @@ def test_path_of_a_shallow_arch_equals_its_closed_form_past_limit_points():
 
 
 def test_column_on_a_torsion_spring_has_a_branch_point_at_k_over_l():
-    """A straight rigid bar stays in equilibrium; from k / L on it can also buckle."""
+    """A straight rigid bar remains in equilibrium, but can buckle from k / L on."""
     K = np.diag([np.inf, np.inf, 50.0, np.inf, np.inf, np.inf])
     hinge = Frame("hinge", joint="revolute", joint_stiffness=K)
     bar = Frame("bar", "hinge", [0.4, 0, 0])
@@ -244,7 +244,7 @@ def test_two_bars_on_torsion_springs_have_branch_points_at_both_loads():
 
 
 def test_rods_that_spin_freely_cause_no_events_on_the_path():
-    """The delta has six rods; the tangent without load is the classical stiffness."""
+    """Six Delta rods can spin; the unloaded tangent is the classical stiffness."""
     posture = home_posture(load_robot("delta"))
     curve = follow_load(posture, 5, 0.0, -500.0, count=4)
     classical = platform_stiffness(posture).along(np.eye(6)[5])[0]

@@ -1,4 +1,4 @@
-"""K_C of many postures equals that of single ones; refusals."""
+"""K_C at many postures equals that at single postures; invalid input is rejected."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ LOAD = [0.0, 0, 0, 10, 0, -50]
 
 
 def assert_same(many, row, one):
-    """Entries over sqrt(C_ii C_jj); both keep compliances of very different sizes."""
+    """Compare entries relative to sqrt(C_ii C_jj), which vary over many magnitudes."""
     C = one.compliance
     if one.free.size:
         np.testing.assert_array_equal(many.compliance[row], C)
@@ -40,7 +40,7 @@ def assert_same(many, row, one):
 
 
 def test_stiffness_does_not_depend_on_other_postures(rng):
-    """Bit-identical: alone, or in another order."""
+    """Bit-identical alone and in another order."""
     robot = load_robot("irsbot2")
     poses = np.full((19, 6), np.nan)
     poses[:, 0], poses[:, 2] = np.linspace(-0.3, 0.3, 19), -0.45
@@ -54,7 +54,7 @@ def test_stiffness_does_not_depend_on_other_postures(rng):
 
 @pytest.mark.parametrize("seed", range(30))
 def test_stiffness_of_random_robots_equals_that_of_one_posture(seed):
-    """Some have free motions, some rigid directions; the ranks are equal."""
+    """Some robots have free motions, some rigid directions; the ranks agree."""
     rng = np.random.default_rng(seed)
     posture = home_posture(random_robot(rng, legs=int(rng.integers(1, 4))))
     many = platform_stiffness([posture])
@@ -63,7 +63,7 @@ def test_stiffness_of_random_robots_equals_that_of_one_posture(seed):
 
 @pytest.mark.parametrize("method", METHODS)
 def test_stiffness_among_many_equals_that_of_its_single_posture_at_any_point(method):
-    """Compliance, stiffness and shares of each posture."""
+    """Compliance, stiffness and compliance shares agree at each posture."""
     robot = load_robot("irsbot2")
     poses = np.full((3, 6), np.nan)
     poses[:, 0], poses[:, 2] = [-0.2, 0.0, 0.25], -0.45
@@ -87,7 +87,7 @@ def test_stiffness_among_many_equals_that_of_its_single_posture_at_any_point(met
 
 @pytest.mark.parametrize("state", ["contact", "exact"])
 def test_tangents_of_many_postures_are_bit_identical_to_those_of_single_postures(state):
-    """For every property of the result."""
+    """Every property of the result is compared."""
     clearance = Clearance(radial=2e-5, axial=1e-5, tilt=1e-3)
     gap = np.array([0, 0, 0, 1e-4, 0, 0])
     posture = home_posture(coaxial_beams(gap, clearance=clearance))
@@ -103,8 +103,8 @@ def test_tangents_of_many_postures_are_bit_identical_to_those_of_single_postures
     assert shares == {part: [s] * 2 for part, s in one.shares(UNIT[3]).items()}
 
 
-def test_free_motion_of_another_body_is_refused_with_a_fixed_platform():
-    """A wheel turns freely, driven by a couple on its rim."""
+def test_load_along_a_free_motion_of_another_body_is_rejected():
+    """A couple on its rim drives a wheel that rotates freely."""
     frames = (
         Frame("wheel", joint="revolute"),
         Frame("rim", "wheel", [0.1, 0, 0]),
@@ -127,13 +127,13 @@ def test_free_motion_of_another_body_is_refused_with_a_fixed_platform():
         ({"side": "left"}, "no side 'left'"),
     ],
 )
-def test_invalid_point_load_or_state_is_refused(words, message):
+def test_invalid_point_load_or_state_is_rejected(words, message):
     with pytest.raises(ValueError, match=message):
         platform_stiffness(home_posture(load_robot("orthoglide")), **words)
 
 
 @pytest.mark.parametrize("direction", [[0] * 6, [1, 0, 0], [np.nan] * 6, "tx"])
-def test_invalid_direction_is_refused(direction):
+def test_invalid_direction_is_rejected(direction):
     stiffness = platform_stiffness(home_posture(load_robot("orthoglide")))
     for asked in (stiffness.along, stiffness.shares):
         with pytest.raises(BadInput, match="direction: found"):

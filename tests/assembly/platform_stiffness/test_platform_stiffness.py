@@ -1,4 +1,4 @@
-"""K_C against closed forms, symmetry, statics and differences of the equilibrium."""
+"""K_C, compared with closed forms, symmetry, and differences of equilibria."""
 
 from dataclasses import replace
 
@@ -22,7 +22,7 @@ UNIT = np.eye(6)
 
 
 def assert_same_matrix(M, expected, tolerance):
-    """Entries relative to sqrt(M_ii M_jj), so that rad and m weigh alike."""
+    """Scale entries by sqrt(M_ii M_jj), so that rad and m have equal weight."""
     size = np.sqrt(np.abs(np.diag(expected)))
     np.testing.assert_allclose(
         M / np.outer(size, size), expected / np.outer(size, size), atol=tolerance
@@ -30,7 +30,7 @@ def assert_same_matrix(M, expected, tolerance):
 
 
 def serial(*frames):
-    """A chain of frames from the base, the last one the platform."""
+    """A chain of frames from the base to the platform."""
     chain, above = [], "base"
     for frame in frames:
         chain.append(replace(frame, parent=above))
@@ -39,7 +39,7 @@ def serial(*frames):
 
 
 def test_cantilever_compliance_equals_the_textbook():
-    """L/EA, L/GJ, L^3/3EI + 6/5 L/GA, L^2/2EI, L/EI of a square section along x."""
+    """L/EA, L/GJ, L^3/3EI + 6/5 L/GA, L^2/2EI and L/EI for a square section along x."""
     L, a, E = 0.8, 0.02, 70e9
     A, inertia, G, J = a**2, a**4 / 12, E / 2, 0.1406 * a**4
     section = {"area": A, "I_y": inertia, "I_z": inertia, "J": J,
@@ -53,8 +53,8 @@ def test_cantilever_compliance_equals_the_textbook():
     assert_same_matrix(C, expected, 1e-12)
 
 
-def test_compliance_of_a_serial_chain_is_the_sum_over_its_parts_moved_to_the_tip():
-    """C = sum of X C_i X', each part moved to the tip: a serial arm."""
+def test_compliance_of_a_serial_chain_is_the_sum_of_its_parts_transformed_to_the_tip():
+    """C is the sum of X C_i X', where X transforms each part to the tip."""
     rng = np.random.default_rng(1)
     frames, expected = [], np.zeros((6, 6))
     steps, springs = rng.normal(size=(3, 3)), []
@@ -79,14 +79,14 @@ def test_stiffness_of_three_equal_legs_has_threefold_symmetry(name):
 
 
 def test_orthoglide_stiffness_is_isotropic_at_home():
-    """By design (Wenger and Chablat): k I for forces, no coupling."""
+    """By design (Wenger and Chablat), the force stiffness is k I without coupling."""
     K = platform_stiffness(home_posture(load_robot("orthoglide"))).stiffness
     assert_same_matrix(K, np.diag([K[0, 0]] * 3 + [K[3, 3]] * 3), 1e-9)
 
 
 @pytest.mark.parametrize("name", ["irsbot2", "hexapod", "four_bar", "delta", "arm6"])
 def test_displacement_under_a_unit_load_equals_the_compliance(name):
-    """The least energy solution under a load w moves by C w: another solver."""
+    """The minimum-energy solution under a load w, from another solver, moves by C w."""
     robot = load_robot(name)
     frames = tuple(replace(frame, clearance=None) for frame in robot.frames)
     posture = home_posture(replace(robot, frames=frames))
@@ -98,7 +98,7 @@ def test_displacement_under_a_unit_load_equals_the_compliance(name):
 
 
 def differences(solve, posture, load, step):
-    """(6, 6) central differences of the platform screw by the load; its last screw."""
+    """(6, 6) central differences of the platform screw, and the last screw."""
     columns = []
     for row in range(6):
         ahead, back = (
@@ -110,7 +110,7 @@ def differences(solve, posture, load, step):
 
 
 def as_small_motion(C, screw):
-    """From changes of the rotation vector and work m.theta to small turns."""
+    """Convert changes of the rotation vector to small rotations."""
     J = np.eye(6)
     J[:3, :3] = turn_jacobian(screw[:3])
     return J @ C @ J.T
@@ -121,10 +121,10 @@ LOAD = np.array([3.0, -5.0, 2.0, 150.0, 80.0, -200.0])
 
 @pytest.mark.parametrize("case", NUMBERS["cases"], ids=lambda case: case["name"])
 def test_paper_robot_tangent_equals_differences_of_its_equilibria(case):
-    """At the paper's full errors, with pressed clearances and internal forces.
+    """Evaluated at the full errors of the paper, with closed clearances.
 
     The cone solver stops at a gap of 1e-8 of the energy, which leaves 1e-4 in screws;
-    the exact equilibrium is solved to rounding.
+    the exact equilibrium is solved to machine precision.
     """
     posture = place_robot(irsbot2_with(case), {"tx": 0.1, "tz": -0.5})
     linear, exact = solve_assembly(posture, LOAD), solve_exact(posture, LOAD)
@@ -161,7 +161,7 @@ def test_random_robot_tangents_equal_differences_of_equilibria(seed):
     "seed", [12, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (42, 65))]
 )
 def test_tangent_equals_differences_at_rotations_of_a_radian(seed):
-    """Differences extrapolated to step zero; moments act on the turned platform."""
+    """Differences are extrapolated to zero step, on the rotated platform."""
     rng = np.random.default_rng(seed)
     robot = random_robot(rng, legs=int(rng.integers(1, 4)))
     posture = home_posture(robot)
@@ -170,8 +170,8 @@ def test_tangent_equals_differences_at_rotations_of_a_radian(seed):
     assert by_differences(posture, load)[0] < 1e-8
 
 
-def test_compliance_at_another_point_follows_the_screw_transform():
-    """w . s does not depend on the reference point: C changes to X C X'."""
+def test_compliance_at_another_point_follows_from_the_screw_transform():
+    """w . s does not depend on the reference point, so C becomes X C X'."""
     posture = home_posture(load_robot("irsbot2"))
     at_origin, r = platform_stiffness(posture), np.array([0.1, -0.2, 0.05])
     at_point = platform_stiffness(posture, at=r)
@@ -183,7 +183,7 @@ def test_compliance_at_another_point_follows_the_screw_transform():
 
 
 def test_centre_of_stiffness_is_at_the_position_of_a_single_spring():
-    """A diagonal link stiffness, a rigid arm beyond: the centre is at its tip."""
+    """For a diagonal link stiffness and a rigid arm, the centre is at the link tip."""
     K = np.diag([20.0, 30.0, 40.0, 1e4, 2e4, 3e4])
     spring = Frame("spring", translation=[0.3, 0.1, 0.2], link=MatrixLink(K))
     arm = Frame("arm", translation=[0.5, -0.4, 0.1])
@@ -193,7 +193,7 @@ def test_centre_of_stiffness_is_at_the_position_of_a_single_spring():
 
 
 def test_eigen_stiffnesses_of_a_diagonal_spring_are_its_diagonal():
-    """Rotations count as length times angle: k / length^2."""
+    """Rotations are multiplied by the length, which gives k / length^2."""
     K = np.diag([20.0, 30.0, 40.0, 1e4, 2e4, 3e4])
     spring = Frame("spring", translation=[0.5, 0, 0], link=MatrixLink(K))
     eigen = platform_stiffness(serial(spring)).eigen
@@ -214,7 +214,7 @@ def test_compliance_shares_sum_to_one_and_the_share_of_a_single_link_is_one():
 
 
 def test_compliance_along_a_free_motion_is_nan_and_the_motion_is_reported():
-    """A slide along x on a spring: TX is free, the other entries are the spring's."""
+    """For a slide along x on a spring, TX is free; the other entries are preserved."""
     K = np.diag([20.0, 30.0, 40.0, 1e4, 2e4, 3e4])
     spring = Frame("spring", rotation=[0, np.pi / 2, 0], joint="prismatic",
                    link=MatrixLink(K))  # fmt: skip
@@ -231,7 +231,7 @@ def test_compliance_along_a_free_motion_is_nan_and_the_motion_is_reported():
 
 
 def test_rigid_direction_has_zero_compliance_and_infinite_stiffness():
-    """A hinge with a torsion spring, a rigid arm along x: RZ and TY move together."""
+    """A hinge with a torsion spring and a rigid arm along x couples RZ and TY."""
     hinge = Frame("hinge", joint="revolute", joint_stiffness=only(2, 50.0))
     tangent = platform_stiffness(serial(hinge, Frame("arm", translation=[0.4, 0, 0])))
     screw = np.array([0, 0, 1, 0, 0.4, 0])
@@ -244,7 +244,7 @@ def test_rigid_direction_has_zero_compliance_and_infinite_stiffness():
 
 
 def test_tangent_of_a_column_on_a_torsion_spring_vanishes_at_buckling():
-    """Rigid bar of length L on a spring k under a dead force F: k/L^2 - F/L."""
+    """A rigid bar of length L on a spring k under a dead force F: k/L^2 - F/L."""
     k, L = 50.0, 0.4
     hinge = Frame("hinge", joint="revolute", joint_stiffness=only(2, k))
     posture = serial(hinge, Frame("arm", translation=[L, 0, 0]))
@@ -260,10 +260,10 @@ def test_tangent_of_a_column_on_a_torsion_spring_vanishes_at_buckling():
 
 
 @pytest.mark.parametrize("state", ["contact", "exact"])
-def test_pressed_pin_is_stiff_normal_to_its_rim_and_rolls_along_it(state):
-    """Pressed by F with a radial clearance c, its stiffness along the rim is F/c."""
+def test_closed_pin_is_stiff_normal_to_its_rim_and_compliant_along_it(state):
+    """Under a force F with radial clearance c, the stiffness along the rim is F/c."""
     force, c, k = 30.0, 1e-3, 1e5
-    K = np.diag([1e9, 1e9, 1e9, k, k, k])  # so that the arm c turns nothing
+    K = np.diag([1e9, 1e9, 1e9, k, k, k])  # so that the arm c causes no rotation
     clearance = Clearance(radial=c)
     spring = Frame("spring", link=MatrixLink(K), clearance=clearance)
     posture = serial(spring, Frame("tip"))
@@ -288,9 +288,9 @@ def test_platform_within_its_clearance_has_zero_stiffness(state):
 
 @pytest.mark.parametrize("state", ["contact", "exact"])
 def test_stiffness_at_a_change_of_contact_depends_on_the_side(state):
-    """An error just takes up the clearance: rigid against the stop, else a spring.
+    """An error just takes up the clearance: rigid at the stop, otherwise a spring.
 
-    The contact force is zero, so both apply, each for one direction of the load.
+    The contact force is zero, so each applies for one direction of the load.
     """
     K = np.diag([1e3, 1e3, 1e3, 1e5, 1e5, 1e5])
     frames = (
@@ -309,7 +309,7 @@ def test_stiffness_at_a_change_of_contact_depends_on_the_side(state):
 def test_block_pressed_on_a_table_slides_freely_and_is_rigid_normal_to_the_table(
     write_file,
 ):
-    """Its drives cannot hold it within their clearances, nor can they tilt it."""
+    """Its drives can neither hold it within their clearances nor tilt it."""
     text = """
 format = 2
 name = "block"

@@ -1,4 +1,4 @@
-"""Natural frequencies against closed forms."""
+"""Natural frequencies, compared with closed forms."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -31,7 +31,7 @@ def cantilever(pieces, axis=(1.0, 0.0, 0.0)):
 def bending(root):
     """[Hz] a clamped-free beam, roots of cos x cosh x = -1, with its sections' turning.
 
-    Rayleigh's quotient with Euler's shape: the mass gains rho I times slope squared.
+    Rayleigh's quotient with Euler's shape, where the mass includes rho I slope^2.
     """
     inertia, area = SIDE**4 / 12, SIDE**2
     speed = np.sqrt(E * inertia / (RHO * area)) / LENGTH**2
@@ -55,7 +55,7 @@ def test_frequency_of_a_mass_on_a_torsion_spring_equals_its_closed_form():
 
 @pytest.mark.parametrize("moment", [0.0, 0.1])
 def test_weight_lowers_the_frequency_of_a_standing_pendulum(moment):
-    """omega^2 = (k - m g l) / (m l^2 + J); the tangent has the geometric part."""
+    """omega^2 = (k - m g l) / (m l^2 + J), with the geometric part in the tangent."""
     k, m, length, g = 50.0, 2.0, 0.4, 9.81
     hinge = Frame("hinge", joint="revolute", joint_stiffness=only(2, k))
     arm = Frame("arm", "hinge", [length, 0, 0], mass=m, inertia=moment * np.eye(3))
@@ -69,7 +69,7 @@ def test_weight_lowers_the_frequency_of_a_standing_pendulum(moment):
     ("pieces", "first", "second"), [(1, 6e-3, 0.6), (4, 5e-5, 2e-3), (8, 4e-6, 2e-4)]
 )
 def test_bending_frequencies_of_a_cantilever_equal_the_textbook(pieces, first, second):
-    """Roots 1.8751 and 4.6941; Rayleigh: from above, errors of order 1/n^4."""
+    """Roots 1.8751 and 4.6941 are approached from above, with errors of order 1/n^4."""
     modes = natural_modes(cantilever(pieces), 4)
     off = modes.frequencies / np.repeat([bending(1.8751041), bending(4.6940911)], 2) - 1
     assert (off > 0).all()
@@ -78,7 +78,7 @@ def test_bending_frequencies_of_a_cantilever_equal_the_textbook(pieces, first, s
 
 
 def test_axial_and_torsional_frequencies_equal_the_textbook():
-    """(1/4L) sqrt(E / rho) and (1/4L) sqrt(GJ / rho I_p), 8 pieces: 0.2 % high."""
+    """(1/4L) sqrt(E / rho) and (1/4L) sqrt(GJ / rho I_p); 8 pieces are 0.2 % high."""
     modes = natural_modes(cantilever(8), 60)
     G, J = E / 2.6, 0.140577 * SIDE**4
     twist = np.sqrt(G * J / (RHO * SIDE**4 / 6)) / (4 * LENGTH)
@@ -102,7 +102,7 @@ def test_free_motion_has_zero_frequency():
     np.testing.assert_array_equal(modes.frequencies, [0.0])
 
 
-def test_vibration_ignores_clearances_and_refuses_a_robot_without_mass():
+def test_vibration_ignores_clearances_and_rejects_a_robot_without_mass():
     posture = cantilever(1)
     (tip,) = posture.robot.frames
     loose = replace(tip, name="beam", clearance=Clearance(radial=1e-4))
@@ -117,7 +117,7 @@ def test_vibration_ignores_clearances_and_refuses_a_robot_without_mass():
 
 @pytest.mark.slow
 def test_frequencies_of_a_meshed_bar_equal_those_of_the_beam():
-    """A round bar of L / r = 11: bending to within the restraint of its ends.
+    """A round bar with L / r = 11, whose bending depends slightly on end restraint.
 
     Its 12 by 12 mass moved as a whole is that of its volume, 48 facets of a circle or
     more; ends that cannot warp make it 2 % stiffer at most.
@@ -207,7 +207,7 @@ joint = [
 """  # noqa: E501
 
 
-def test_point_mass_on_six_rods_has_three_modes_and_no_rounding_modes(tmp_path):
+def test_point_mass_on_six_rods_has_three_modes_and_no_spurious_modes(tmp_path):
     """Expected: K of the six bars, condensed to the translations of the mass.
 
     The two bars of a leg are springs EA/L, and their common drive is a spring along z.

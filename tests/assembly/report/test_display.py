@@ -1,4 +1,4 @@
-"""Text of objects in a console or notebook: a few lines, with units, at any size."""
+"""Text of objects in a console or notebook: a few lines with units, at any size."""
 
 import re
 from dataclasses import replace
@@ -37,7 +37,7 @@ def link():
 
 @pytest.fixture(scope="module")
 def shown(answer, link):
-    """One object of every kind that a user meets."""
+    """One object of every kind that is returned to users."""
     posture = answer.posture
     return [
         posture.robot, posture.robot.frames[0], posture, answer, solve_exact(posture),
@@ -49,8 +49,8 @@ def shown(answer, link):
     ]  # fmt: skip
 
 
-def test_text_of_every_result_object_has_a_few_lines(shown):
-    """The default text of a robot has 11 000 characters, of an assembly 52 000."""
+def test_text_of_every_result_object_is_a_few_lines_long(shown):
+    """The default text has 11 000 characters for a robot and 52 000 for an assembly."""
     for thing in shown:
         text = repr(thing)
         assert len(text) <= CHARACTERS, type(thing)
@@ -76,7 +76,7 @@ def test_assembly_summary_equals_the_lines_of_the_command(answer):
 
 
 def test_text_of_many_points_states_their_number_and_the_largest_value():
-    """Gap over clearance is 1, 2 and 4."""
+    """The ratios of gap to clearance are 1, 2 and 4."""
     play = Clearance(axial=1e-5, radial=1e-5)
     at = home_posture(coaxial_beams(np.zeros(6), clearance=play))
     errors = np.zeros((3, 6, 6))

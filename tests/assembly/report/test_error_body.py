@@ -1,4 +1,4 @@
-"""The body of possible errors: closed forms, inner points and outer bounds."""
+"""Set of possible errors: closed forms, inner points and outer bounds."""
 
 from itertools import product
 
@@ -23,7 +23,7 @@ def reach_of(*plays):
 
 
 def test_error_body_of_a_joint_clearance_is_a_cylinder():
-    """Disc of 3e-5 and interval of 1e-5: heights r sin(polar) + h cos(polar)."""
+    """Disc r = 3e-5 and interval h = 1e-5: heights r sin(polar) + h cos(polar)."""
     body = error_body(reach_of(Clearance(radial=3e-5, axial=1e-5)), "translation", 150)
     flat = np.hypot(body.directions[:, 0], body.directions[:, 1])
     expected = 3e-5 * flat + 1e-5 * np.abs(body.directions[:, 2])
@@ -62,7 +62,7 @@ def test_free_platform_or_unknown_part_has_no_error_body():
 
 
 def test_reported_deviation_of_an_error_body_is_the_largest_height_beyond_its_points():
-    """Four of the corners of a cube: the other corners are 2 / sqrt 3 beyond them."""
+    """Four corners of a cube are given; the others are 2 / sqrt 3 beyond them."""
     corners = np.array(list(product([-1.0, 1.0], repeat=3)))
     even = corners[corners.prod(axis=1) > 0]
     directions = np.vstack([corners / np.sqrt(3), np.eye(3)])

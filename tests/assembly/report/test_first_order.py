@@ -1,4 +1,4 @@
-"""Singular postures have no first-order verdict in solve, error and study."""
+"""At singular postures, solve, error and study report no first-order result."""
 
 import math
 import re
@@ -20,7 +20,7 @@ SAID = "singular posture: the first-order analysis is inconclusive; finite motio
 
 
 def test_solution_at_a_singular_posture_has_the_energy_of_finite_motions():
-    """In first order, modes that meet there take up errors without force."""
+    """To first order, the intersecting modes would take up errors without force."""
     results = solution_of(home_posture(three_upu(seed=1)))
     assert results["energy"] > 1e-4
     assert results["status"] == "singular"
@@ -47,11 +47,11 @@ def test_pose_error_at_a_singular_posture_has_no_first_order_bound(seed):
     assert SAID in pose_error_text(results)
 
 
-def test_energy_only_of_finite_motions_is_reported_as_singular():
-    """Near its dead centre a short rod is in tension: k (e - s)^2 / 2.
+def test_energy_that_exists_only_for_finite_motions_is_reported_as_singular():
+    """Near its dead centre, a rod that is too short is in tension: k (e - s)^2 / 2.
 
-    By s = crank + rod - distance it could be shorter; first order turns the crank
-    through the dead centre and sees no force.
+    The slack is s = crank + rod - distance; to first order, the crank rotates through
+    the dead centre without a force.
     """
     angle, short = 0.02, 2e-4
     rod = BeamLink({"radius": 0.01}, 70e9, 0.33)
@@ -68,7 +68,7 @@ def test_energy_only_of_finite_motions_is_reported_as_singular():
 
 
 def test_large_first_order_motion_is_reported_as_singular():
-    """0.1 mm from the singular axis first order turns the platform by radians."""
+    """0.1 mm from the singular axis, the first-order rotation is several radians."""
     aside = {"tx": 1e-4, "ty": 0.0, "tz": HEIGHT}
     results = solution_of(place_robot(three_upu(seed=1), pose=aside))
     assert np.abs(results["platform_screw"][:3]).max() > 0.3

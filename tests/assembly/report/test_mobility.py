@@ -1,4 +1,4 @@
-"""Mobility in words and as JSON, of mechanisms whose motions are known."""
+"""Mobility as text and as JSON, for mechanisms whose motions are known."""
 
 import json
 from pathlib import Path
@@ -47,7 +47,7 @@ def test_mobility_in_words_equals_the_literature(name):
     assert found["counts_certain"]
 
 
-def test_coupler_of_a_four_bar_turns_about_the_crossing_of_its_arms():
+def test_coupler_of_a_four_bar_rotates_about_the_crossing_of_its_arms():
     """Crank (0, 0) to (0.1, 0.3), rocker (0.8, 0) to (0.7, 0.5): 3x = -5 (x - 0.8)."""
     (turn,) = mobility_of(home_posture(MECHANISMS["four_bar"][0]()))["motions"]
     assert turn["kind"] == "turn"
@@ -68,7 +68,7 @@ def test_redundant_drive_is_reported():
     assert mobility_lines(found)["redundant drives"] == "1"
 
 
-def test_seoul_robot_has_fewer_freedoms_near_its_singular_home():
+def test_seoul_robot_has_fewer_degrees_of_freedom_near_its_singular_home():
     """5 at home and 3 near it (Zlatanov, Bonev, Gosselin 2002)."""
     found = mobility_of(home_posture(three_upu(X, 0.24)))
     assert (found["freedoms"], found["singular"]) == (5, True)
@@ -77,7 +77,7 @@ def test_seoul_robot_has_fewer_freedoms_near_its_singular_home():
 
 
 def test_three_coplanar_parallel_axes_allow_only_infinitesimal_motions():
-    """Two bars of 0.3 and 0.2 m stretched between hinges 0.5 m apart are rigid."""
+    """Collinear bars of 0.3 and 0.2 m between hinges 0.5 m apart are rigid."""
     robot = mechanism(
         "one", [0.1, 0, 0],
         joint("revolute", "base", "one", [0, 0, 0], driven=True),
@@ -98,8 +98,8 @@ def test_regular_home_is_not_singular(name):
     assert "near" not in found
 
 
-def test_ball_joint_rotated_by_a_right_angle_has_three_freedoms():
-    """Whatever three axes it is made of: it turns about every axis."""
+def test_ball_joint_rotated_by_a_right_angle_has_three_degrees_of_freedom():
+    """It rotates about every axis, whichever three axes model it."""
     robot = mechanism("ball", [0, 0, 0.2], joint("spherical", "base", "ball", [0] * 3))
     home = home_posture(robot)
     for axis in (X, Y, Z):
@@ -115,7 +115,7 @@ SCREWS = {
     # a turn about z through (1, 2, 0): at the origin v = p x w
     "turn": ([[0, 0, 1, 2, -1, 0]], [("turn", [1, 2, 0], None)]),
     "screw": ([[0, 0, 1, 2, -1, 0.3]], [("screw", [1, 2, 0], 0.3 * 2 * np.pi)]),
-    # cylindrical: the screw is a turn but for the translation along it
+    # cylindrical: the screw is a rotation, except for the translation along its axis
     "cylindrical": (
         [[0, 0, 1, 2, -1, 0.3], [0, 0, 0, 0, 0, 1]],
         [("translation", None, None), ("turn", [1, 2, 0], None)],
@@ -147,7 +147,7 @@ def test_pure_motions_of_screw_systems_equal_hand_calculation(name, size):
 
 
 def rounded(digits):
-    """A maker of joints whose points and axes have so many digits."""
+    """Function that creates joints whose points and axes are rounded to some digits."""
 
     def make(name, kind, first, second, at, axis, across, axis2, driven):
         axis, axis2 = (unit(np.round(v, digits)) for v in (axis, axis2))
@@ -162,7 +162,7 @@ def rounded(digits):
 def test_mobility_of_files_rounded_to_6_digits_equals_that_of_exact_files(
     name, monkeypatch
 ):
-    """Of Bennett's linkage they would be 0 if all its singular values counted."""
+    """For Bennett's linkage, the mobility would be 0 if all singular values counted."""
     make, expected = MECHANISMS[name]
     monkeypatch.setattr(mechanisms, "DrawnJoint", rounded(6))
     found = mobility_of(home_posture(make()))
@@ -175,7 +175,7 @@ def test_mobility_of_files_rounded_to_6_digits_equals_that_of_exact_files(
 
 
 def test_mobility_is_reported_as_uncertain_if_the_singular_values_have_no_gap():
-    """Axes tilted by 1e-4 and 2e-5 rad: the equations they add are of those sizes."""
+    """Axes tilted by 1e-4 and 2e-5 rad cause singular values of these sizes."""
     robot = mechanism(
         "one", [0.1, 0.2, 0],
         joint("revolute", "base", "one", [0, 0, 0], driven=True),

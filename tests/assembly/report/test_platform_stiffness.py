@@ -1,4 +1,4 @@
-"""Results of assembly stiffness: keys, sums, statuses, and charts of shares."""
+"""Results of assembly stiffness: keys, sums, statuses, and share charts."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Pictures of a robot: displaced bodies meet, and gaps close in an animation."""
+"""Plots of a robot: displaced bodies meet, and gaps close in an animation."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ def _assembly():
 
 
 def test_displaced_chains_meet_at_every_closure():
-    """The walk along the tree is independent of the closure matrix of eqs (16)-(20)."""
+    """Displacements along the tree are independent of the closure matrix (16)-(20)."""
     answer = _assembly()
     robot = answer.posture.robot
     screws = displaced_bodies(answer).end_screws
@@ -32,7 +32,7 @@ def test_displaced_chains_meet_at_every_closure():
 
 @pytest.mark.parametrize("name", ["delta", "hexapod", "orthoglide", "arm6"])
 def test_picture_fits_the_whole_robot_into_the_window(name):
-    """Nothing is drawn at the edges, and it fills more than half of the window."""
+    """The robot does not touch the edges and fills more than half of the window."""
     answer = solve_assembly(home_posture(load_robot(name)))
     plotter = robot_plotter(answer, exaggeration=1)
     plotter.remove_actor("caption")
@@ -70,7 +70,7 @@ def test_picture_shows_the_axes_of_driven_and_passive_joints():
          "--exaggeration: found 1e+300"),
     ],
 )  # fmt: skip
-def test_picture_that_cannot_be_drawn_is_refused_before_solving(
+def test_picture_that_cannot_be_drawn_is_rejected_before_solving(
     run, tmp_path, monkeypatch, words, message
 ):
     import forcefit.assembly.linear.energy
@@ -88,7 +88,7 @@ def test_picture_that_cannot_be_drawn_is_refused_before_solving(
 def test_error_body_of_a_loaded_robot_uses_the_frozen_assumption(
     run, tmp_path, monkeypatch
 ):
-    """The assumption budget, the default without a load, needs an unloaded robot."""
+    """The assumption budget, the default without a load, requires an unloaded robot."""
     import forcefit.assembly.report.error_body
 
     readings = []
@@ -129,7 +129,7 @@ LONGER = 1e-3  # [m]
 
 @pytest.fixture(scope="module")
 def robot():
-    """The paper's robot, in which one link is too long."""
+    """The paper's robot with one link that is too long."""
     perfect = load_robot("irsbot2")
     errors = np.zeros((len(perfect.frames), 6))
     errors[perfect.index("leg1.link_a"), 3] = LONGER
@@ -138,7 +138,7 @@ def robot():
 
 @pytest.mark.parametrize("closing", [0.0, 0.3, 1.0])
 def test_gaps_shrink_from_the_length_error_to_zero(robot, closing):
-    """A pure translation is as long at the end of its chain as where it arises."""
+    """A pure translation has the same length at the end of its chain."""
     assembly = solve_assembly(place_robot(robot, pose=POSE))
     sizes = np.linalg.norm(closing_gaps(assembly, closing), axis=1)
     open_closures = sizes > 1e-12
@@ -148,9 +148,7 @@ def test_gaps_shrink_from_the_length_error_to_zero(robot, closing):
 
 
 @pytest.mark.slow
-def test_animation_begins_open_and_ends_as_the_picture_of_the_assembly(
-    robot, run, tmp_path
-):
+def test_animation_begins_open_and_ends_with_the_assembly(robot, run, tmp_path):
     write_robot(robot, tmp_path / "long.toml")
     words = ["assembly", "show", tmp_path / "long.toml", "--pose", "tx=0.1,tz=-0.5",
              "--exaggeration", "50"]  # fmt: skip
@@ -187,7 +185,7 @@ def test_animation_begins_open_and_ends_as_the_picture_of_the_assembly(
          "--closing: five_bar has no open closure; expected geometric errors"),
     ],
 )  # fmt: skip
-def test_animation_that_cannot_be_drawn_is_refused(
+def test_animation_that_cannot_be_drawn_is_rejected(
     run, tmp_path, monkeypatch, words, message
 ):
     monkeypatch.chdir(tmp_path)

@@ -1,4 +1,4 @@
-"""Results printed by solve: certified sizes, remarks, and tables of wrenches."""
+"""Results printed by solve: certified errors, remarks, and wrench tables."""
 
 from pathlib import Path
 
@@ -14,7 +14,7 @@ from forcefit.assembly.robots import load_robot
 
 
 def test_largest_error_of_solve_equals_the_certified_pose_error():
-    """A bush of radius r and half length a: the tip moves by hypot(r, a)."""
+    """The tip of a bush with radius r and half length a moves by hypot(r, a)."""
     r, a = 3e-5, 4e-5
     frames = (
         Frame("bush", clearance=Clearance(radial=r, axial=a)), Frame("tip", "bush")

@@ -1,4 +1,4 @@
-"""The robot as a scene: displacements and forces equal those of the assembly."""
+"""Scene of a robot, whose displacements and forces equal those of the assembly."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ FORCE, LENGTH = 50.0, 0.4
 
 
 def cantilever(force=FORCE):
-    """A round bar along x, held at its base, loaded at its tip."""
+    """A round bar along x, clamped at its base and loaded at its tip."""
     beam = BeamLink({"radius": 0.01}, 2e11, 0.3, theory="euler")
     tip = Frame("tip <b>", translation=[LENGTH, 0, 0], link=beam)
     return solve_assembly(home_posture(Robot("bar", "tip <b>", (tip,))),
@@ -27,7 +27,7 @@ def scene_of(assembly, closing=None, body=None):
 
 
 def test_bent_bar_follows_the_elastic_line_of_a_cantilever():
-    """w(s) = F s^2 (3 L - s) / (6 E I); at the middle 5/16 of the tip's."""
+    """w(s) = F s^2 (3 L - s) / (6 E I), so the middle has 5/16 of the tip value."""
     (bar,) = scene_of(cantilever())["bodies"]
     moved, nominal = np.array(bar["moved"]), np.array(bar["nominal"])
     s = nominal[:, 0]

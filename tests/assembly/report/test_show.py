@@ -1,4 +1,4 @@
-"""Pictures in Python show the numbers of the mechanics, in a notebook and elsewhere."""
+"""Pictures of robots and results in a notebook and elsewhere."""
 
 import html
 import re
@@ -41,7 +41,7 @@ def bent():
 
 
 def lines_of(figure):
-    """Points in the unit of the axes, by the name in the legend."""
+    """Points of the line with a given legend entry, in the unit of the axes."""
     (axes,) = figure.axes
     return {
         line.get_label(): np.column_stack(line.get_data_3d())
@@ -51,7 +51,7 @@ def lines_of(figure):
 
 
 def test_figure_of_a_loaded_bar_follows_the_elastic_line():
-    """w(L) = F L^3 / (3 E I), exaggerated by the factor of the title; in mm."""
+    """w(L) = F L^3 / (3 E I), exaggerated by the factor in the title, in mm."""
     figure = bent().plot(interactive=False)
     lines = lines_of(figure)
     title = figure.axes[0].get_title()
@@ -85,7 +85,7 @@ def test_picture_of_a_finite_rotation_has_its_true_size():
 
 
 def test_figure_of_a_robot_shows_its_home_pose():
-    """A crank of 0.3 m turned to 90 degrees, and a bar of 0.2 m straight on."""
+    """A crank of 0.3 m at 90 degrees, with a collinear bar of 0.2 m."""
     drive = Frame("drive", joint="revolute", actuated=True, position=np.pi / 2)
     elbow = Frame("elbow", "drive", translation=[0.3, 0, 0])
     tip = Frame("tip", "elbow", translation=[0.2, 0, 0])
@@ -97,7 +97,7 @@ def test_figure_of_a_robot_shows_its_home_pose():
 
 
 def test_bar_chart_shows_springs_in_series_in_proportion_to_their_compliance():
-    """Of k and 2 k in series the first has two thirds of the compliance."""
+    """For k and 2 k in series, the first has two thirds of the compliance."""
     soft = MatrixLink(np.diag([1e3, 1e3, 1e3, 1e5, 1e5, 1e5]))
     stiff = MatrixLink(np.diag([2e3, 2e3, 2e3, 2e5, 2e5, 2e5]))
     frames = (Frame("a", link=soft), Frame("b", "a", link=stiff))
@@ -111,7 +111,7 @@ def test_bar_chart_shows_springs_in_series_in_proportion_to_their_compliance():
 
 
 def slack():
-    """A bar whose tip may move by 0.2 mm within its joint."""
+    """A bar whose tip can move by 0.2 mm within the clearance of its joint."""
     joint = Frame("joint", clearance=ff.Clearance(radial=2e-4, axial=1e-4))
     tip = Frame("tip", "joint", translation=[LENGTH, 0, 0])
     return solve_assembly(home_posture(Robot("slack", "tip", (joint, tip))))
@@ -145,7 +145,7 @@ def test_interactive_scene_is_shown_in_a_notebook(monkeypatch):
 
 
 class Formatter(dict):
-    """The functions of a format by type, as IPython keeps them."""
+    """Formatting functions by type, as stored by IPython."""
 
     for_type = dict.__setitem__
 

@@ -34,7 +34,7 @@ def robot():
 
 @pytest.mark.parametrize("point", POINTS, ids=lambda p: f"{p['x']}-{p['z']}")
 def test_frame_poses_equal_the_reference(robot, point):
-    """The home pose is elsewhere, so this also proves that the parallelograms close."""
+    """The home pose differs, so this also checks that the parallelograms close."""
     posture = place_robot(robot, pose={"tx": point["x"], "tz": point["z"]})
     T = {f.name: posture.transforms[i] for i, f in enumerate(robot.frames)}
     link, elbow = T["leg1.link_a"], T["leg1.elbow_a"]
@@ -54,7 +54,7 @@ def test_frame_poses_equal_the_reference(robot, point):
     assert turned + home == pytest.approx(point["q_leg1"], abs=1e-12)
 
 
-def test_irsbot2_has_two_freedoms_and_an_overconstraint_of_eight(robot):
+def test_irsbot2_has_two_degrees_of_freedom_and_an_overconstraint_of_eight(robot):
     for x, z in [(0, -0.5), (0.4, -0.45), (-0.3, -0.2), (0.0, -0.7)]:
         found = mobility(place_robot(robot, pose={"tx": x, "tz": z}))
         assert (found.freedoms, found.locked_freedoms) == (2, 0)
@@ -63,7 +63,7 @@ def test_irsbot2_has_two_freedoms_and_an_overconstraint_of_eight(robot):
 
 @pytest.mark.parametrize(("case", "point"), CASES)
 def test_energy_pose_and_wrenches_equal_the_reference(case, point):
-    """The reference has a gap of about 1e-9 J; our certificate is below that."""
+    """The reference has a gap of about 1e-9 J, and the certificate is below that."""
     robot = irsbot2_with(case)
     answer = solve_assembly(
         place_robot(robot, pose={"tx": point["x"], "tz": point["z"]})
@@ -72,10 +72,10 @@ def test_energy_pose_and_wrenches_equal_the_reference(case, point):
     assert answer.closure_residual() < 1e-13
     assert answer.clearance_excess() < 1e-12
     assert answer.energy == pytest.approx(point["energy"], rel=1e-9, abs=1e-11)
-    # a gap of 1e-11 J moves the least energy's place by its root, 1e-5 of itself
+    # a gap of 1e-11 J shifts the minimiser by the square root, 1e-5 relative
     scale = np.abs(np.reshape(point["x_opt"], (2, 3))).max(axis=1).repeat(3)
     assert np.abs((answer.platform_screw - point["x_opt"]) / scale).max() < 1e-5
-    # a link holding all of the energy would move by the root of 2 E C_ii
+    # a link that stores all of the energy would deform by sqrt(2 E C_ii)
     size = np.sqrt(2 * answer.energy * np.diag(np.linalg.inv(NUMBERS["K_E"])))
     link = answer.link_screws[robot.index("leg1.link_a")]
     assert np.abs((link - point["e_leg1_frame8"]) / size).max() < 1e-5
@@ -103,7 +103,7 @@ def test_zone_margin_equals_the_reference_for_rigid_and_free_joints(case, point)
 
 
 def test_equation_23_as_printed_counts_the_wrench_twice():
-    """The paper adds w_E and w_B, which both equal the wrench: twice the truth."""
+    """The paper adds w_E and w_B, each of which equals the wrench."""
     point = NUMBERS["cases"][0]["points"][0]
     answer = solve_assembly(
         place_robot(irsbot2_with(NUMBERS["cases"][0]), pose={"tx": 0, "tz": -0.5})
@@ -116,7 +116,7 @@ def test_equation_23_as_printed_counts_the_wrench_twice():
 
 
 def test_euler_and_timoshenko_links_store_the_same_energy():
-    """The distal links carry no shear; the reference differs by 2e-11."""
+    """The distal links carry no shear, and the reference differs by 2e-11."""
     case = NUMBERS["cases"][0]
     energies = []
     for theory in ("euler", "timoshenko"):
@@ -141,7 +141,7 @@ def test_errors_drawn_with_seed_1_equal_the_reference_errors(robot):
 
 
 def test_grid_points_are_reached_exactly_within_the_reach_of_the_links(robot):
-    """One row of the paper's half workspace of 1113 points, by the reach formula."""
+    """One row of the 1113 points of the half workspace, by the reach formula."""
     x = np.arange(-0.7, 0.7001, 0.05)
     poses = np.full((len(x), 6), np.nan)
     poses[:, 0], poses[:, 2] = x, -0.4
@@ -153,6 +153,6 @@ def test_grid_points_are_reached_exactly_within_the_reach_of_the_links(robot):
         assert bool(reason) != within
 
 
-def test_home_pose_out_of_reach_is_refused_with_the_reach():
+def test_home_pose_out_of_reach_is_rejected_with_the_reach():
     with pytest.raises(BadInput, match=r"requires a reach of 0.9\d* m, the links"):
         irsbot2(z=-0.9)

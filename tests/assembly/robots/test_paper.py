@@ -48,9 +48,9 @@ def assert_as_printed(values, printed):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("case", NUMBERS["cases"], ids=lambda c: c["name"])
-def test_maps_have_the_least_median_and_largest_values_of_the_reference(case):
+def test_maps_have_the_smallest_median_and_largest_values_of_the_reference(case):
     data = sweep_poses(irsbot2_with(case), parse_grid(GRID))
-    # the paper counts what home reaches through singularities too
+    # the paper also counts points reached through singularities
     reached = np.isin(data.status.values, ["ok", "beyond_singularity"])
     assert reached.sum() == 1113
     free, share, rigid, energy = TABLE[case["name"]]
@@ -59,7 +59,7 @@ def test_maps_have_the_least_median_and_largest_values_of_the_reference(case):
     assert_as_printed(data.energy.values, energy)
     inside = 100 * assemblable(data).sum() / reached.sum()
     assert inside == pytest.approx(share, abs=0.1)
-    # every point carries its certificate
+    # every point is certified
     floor = 1e-8 * data.energy.values[reached]
     assert np.all(data.duality_gap.values[reached] <= floor + 1e-10)
     assert data.closure_residual.max() < 1e-11
@@ -68,7 +68,7 @@ def test_maps_have_the_least_median_and_largest_values_of_the_reference(case):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("case", NUMBERS["cases"], ids=lambda c: c["name"])
-def test_pose_errors_have_least_median_and_largest_values_of_the_reference(case):
+def test_pose_errors_have_the_smallest_median_and_largest_values_of_the_reference(case):
     x, z = np.meshgrid(*parse_grid(GRID).values(), indexing="ij")
     poses = np.full((x.size, 6), np.nan)
     poses[:, 0], poses[:, 2] = x.ravel(), z.ravel()
@@ -88,7 +88,7 @@ def test_pose_errors_have_least_median_and_largest_values_of_the_reference(case)
 
 @pytest.mark.slow
 def test_pose_errors_by_clearances_alone_are_within_the_reference_range():
-    """A 100 mm grid in x > 0 by symmetry, against the table's least and largest."""
+    """A 100 mm grid in x > 0, by symmetry, within the extremes of the table."""
     x, z = np.meshgrid(np.arange(0, 0.61, 0.1), np.arange(-0.7, -0.05, 0.1))
     poses = np.full((x.size, 6), np.nan)
     poses[:, 0], poses[:, 2] = x.ravel(), z.ravel()

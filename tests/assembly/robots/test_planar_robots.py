@@ -1,4 +1,4 @@
-"""Planar robots: one published or closed-form result for each."""
+"""Planar robots, each compared with a published or closed-form result."""
 
 import math
 from dataclasses import replace
@@ -23,8 +23,8 @@ from tests.built_in_robots_for_tests import (
 )
 
 
-def test_hoekens_crank_turns_fully_and_its_point_has_the_closed_form():
-    """Grashof: 1 + 2.5 < 2 + 2.5, and the shortest is the crank."""
+def test_hoekens_crank_rotates_fully_and_its_point_follows_the_closed_form():
+    """Grashof's criterion: 1 + 2.5 < 2 + 2.5, and the crank is the shortest link."""
     robot = BUILT_IN["four_bar"]()
     foot = np.array([0.2, 0.0])
     for angle in np.linspace(0.0, 2 * math.pi, 13):
@@ -43,7 +43,7 @@ def test_hoekens_crank_turns_fully_and_its_point_has_the_closed_form():
 
 @pytest.mark.parametrize(("degrees", "x"), [(90, 0.4), (180, 0.2), (270, 0.0)])
 def test_hoekens_point_is_on_its_line_at_the_known_crank_angles(degrees, x):
-    """Four crank lengths from the ground link, exactly by Thales' theorem."""
+    """The point is four crank lengths from the ground link, by Thales' theorem."""
     robot = BUILT_IN["four_bar"]()
     posture = place_robot(robot, joints={"crank": math.radians(degrees)})
     assert posture.platform[:2, 3] == pytest.approx([x, 0.4], abs=1e-12)
@@ -67,7 +67,7 @@ def test_five_bar_tip_is_the_intersection_of_two_circles(rng):
 
 
 def half_angle_solutions(foot, tip, near, far):
-    """Both drive angles, by the tangent of the half angle (Gosselin, Angeles 1988)."""
+    """Drive angles from the half-angle tangent (Gosselin, Angeles 1988)."""
     x, y = tip - foot
     # x^2 + y^2 + near^2 - far^2 = 2 near (x cos q + y sin q)
     e = (x * x + y * y + near**2 - far**2) / (2 * near)
@@ -92,7 +92,7 @@ def test_drive_angles_of_the_3rrr_robot_equal_those_of_gosselin_and_angeles(rng)
 
 
 def only_radial(robot):
-    """The robot's clearance, its radial part alone: everything stays in the plane."""
+    """The robot with radial clearance only, so that all motions are planar."""
     bare = (
         replace(f, clearance=f.clearance and Clearance(radial=f.clearance.radial))
         for f in robot.frames
@@ -101,7 +101,7 @@ def only_radial(robot):
 
 
 def test_pose_error_of_the_3rrr_robot_is_the_farthest_corner_of_a_prism(rng):
-    """(27) in closed form: 3 lines with a clearance of 2c each, 8 corners."""
+    """Closed form of (27): three lines with a clearance of 2c each, hence 8 corners."""
     robot = only_radial(BUILT_IN["3rrr"]())
     posture = place_robot(robot, pose=random_pose("3rrr", rng))
     play = robot.frame("leg1.pin").clearance.radial
@@ -132,10 +132,10 @@ def arm_lines(posture):
 
 
 def test_displacement_of_the_3rrr_robot_under_load_equals_its_pin_clearances(rng):
-    """The support of the reachable errors, w.x <= sum of |f| 2c over the legs.
+    """Support function of the reachable errors: w.x <= sum of |f| 2c over the legs.
 
-    A leg's second arm passes a force f along itself; its two pins give by c each.
-    The wrench on the platform is the sum of the arms' forces, f = J^-T w.
+    The second arm of a leg transmits an axial force f, and its two pins move by c each.
+    The wrench on the platform is the sum of the arm forces, f = J^-T w.
     """
     posture = place_robot(only_play(BUILT_IN["3rrr"]()), pose=random_pose("3rrr", rng))
     play = posture.robot.frame("leg1.pin").clearance.radial
@@ -148,6 +148,6 @@ def test_displacement_of_the_3rrr_robot_under_load_equals_its_pin_clearances(rng
         assert answer.energy == 0.0
 
 
-def test_planar_legs_out_of_reach_are_refused_with_the_reach():
+def test_planar_legs_out_of_reach_are_rejected_with_the_reach():
     with pytest.raises(BadInput, match=r"5r: the home pose requires a reach of 3 m"):
         arm_angle("5r", [0, 0], [3, 0], 1.0, 1.0, 1)

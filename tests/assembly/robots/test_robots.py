@@ -27,7 +27,7 @@ from tests.built_in_robots_for_tests import (
     random_pose,
 )
 
-# freedoms, the same with the drives locked, overconstraint: published counts
+# published degrees of freedom with free and with locked drives, and overconstraint
 COUNTS = {
     "irsbot2": (2, 0, 8),  # two loops of a parallelogram, 3 each, and 2 legs
     "four_bar": (1, 0, 3),  # one planar loop
@@ -50,14 +50,16 @@ def robot(name):
     return BUILT_IN[name]()
 
 
-ELASTIC_DRIVES = [n for n in COUNTS if n != "irsbot2"]  # whose own has none
+ELASTIC_DRIVES = [
+    n for n in COUNTS if n != "irsbot2"
+]  # the drives of irsbot2 are rigid
 
 
 WITHOUT_SPRINGY_PASSIVE_JOINTS = sorted(set(COUNTS) - {"irsbot2"})
 
 
 def with_random_errors(robot, rng, rotation=1e-3, translation=2e-4):
-    """The robot with errors that can be closed: on the paper's, at its own frames."""
+    """The robot with errors that can be closed; irsbot2 has them at selected frames."""
     errors = np.zeros((len(robot.frames), 6))
     rows = np.arange(len(robot.frames))
     if robot.name == "irsbot2":
@@ -68,7 +70,7 @@ def with_random_errors(robot, rng, rotation=1e-3, translation=2e-4):
 
 
 def test_beams_extend_from_the_parent_origin_to_the_frame_origin(robot):
-    """In the home pose, also below a slide, where the length is given."""
+    """Checked in the home pose, also for beams below a slide, whose length is given."""
     origins = home_posture(robot).transforms[:, :3, 3]
     beams = [f for f in robot.frames if isinstance(f.link, BeamLink)]
     assert beams
@@ -81,8 +83,8 @@ def test_beams_extend_from_the_parent_origin_to_the_frame_origin(robot):
         assert np.abs(origins[row] - start - length * R @ axis).max() < 1e-12
 
 
-def test_freedoms_and_overconstraint_equal_published_values(name, robot, rng):
-    """In the home pose and elsewhere, as the home pose could be a special one."""
+def test_degrees_of_freedom_and_overconstraint_equal_published_values(name, robot, rng):
+    """Checked at home and elsewhere, because the home pose could be special."""
     postures = [home_posture(robot)]
     postures += [place_robot(robot, pose=random_pose(name, rng)) for _ in range(3)]
     for posture in postures:
@@ -92,7 +94,7 @@ def test_freedoms_and_overconstraint_equal_published_values(name, robot, rng):
 
 
 def test_pose_is_recovered_from_its_joint_positions(name, robot, rng):
-    """Both ends are solved to 1e-10, and no pose here is near a singular one."""
+    """Both postures are solved to 1e-10, and none is near a singularity."""
     for _ in range(4):
         pose = random_pose(name, rng)
         there = place_robot(robot, pose=pose)
@@ -104,8 +106,8 @@ def test_pose_is_recovered_from_its_joint_positions(name, robot, rng):
 
 
 @pytest.mark.parametrize("load", [None, LOAD], ids=["free", "loaded"])
-def test_energies_equal_the_printed_problem_in_cvxpy(name, robot, rng, load):
-    """Energies of 1e-6 J or more; just constrained robots store none without a load."""
+def test_energies_of_built_in_robots_match_the_paper_in_cvxpy(name, robot, rng, load):
+    """Energies are at least 1e-6 J, except for unloaded, exactly constrained robots."""
     faulty = with_random_errors(robot, rng)
     posture = place_robot(faulty, pose=random_pose(name, rng))
     answer = solve_assembly(posture, load)
@@ -117,7 +119,7 @@ def test_energies_equal_the_printed_problem_in_cvxpy(name, robot, rng, load):
 
 
 def test_energy_and_margin_do_not_depend_on_frame_or_closure_order(name, robot, rng):
-    """The same equations in another order, with closures reversed."""
+    """The same equations are solved in another order, with closures reversed."""
     pose = random_pose(name, rng)
     faulty = with_random_errors(robot, rng)
     order = rng.permutation(len(faulty.frames))
@@ -135,9 +137,9 @@ def test_energy_and_margin_do_not_depend_on_frame_or_closure_order(name, robot, 
 
 @pytest.mark.parametrize("name", ELASTIC_DRIVES)
 def test_platform_compliance_of_elastic_drives_equals_j_c_jt(name, rng):
-    """Salisbury (1980): C = J diag(1 / k) J^T; J here by differences of postures.
+    """Salisbury (1980): C = J diag(1 / k) J^T, with J from differences of postures.
 
-    Central differences leave 1e-8 of J times its third derivative over J.
+    Central differences have a relative error of about 1e-8.
     """
     robot = only_drives_give(BUILT_IN[name]())
     posture = place_robot(robot, pose=random_pose(name, rng))
@@ -154,7 +156,7 @@ def test_platform_compliance_of_elastic_drives_equals_j_c_jt(name, rng):
 
 @pytest.mark.parametrize("name", WITHOUT_SPRINGY_PASSIVE_JOINTS)
 def test_error_along_a_drive_moves_the_platform_by_its_jacobian_column(name, rng):
-    """An encoder offset stores no energy; J by differences of postures."""
+    """An encoder offset stores no energy; J comes from differences of postures."""
     robot = BUILT_IN[name]()
     tight = replace(
         robot, frames=tuple(replace(f, clearance=None) for f in robot.frames)
@@ -173,14 +175,14 @@ def test_error_along_a_drive_moves_the_platform_by_its_jacobian_column(name, rng
 
 
 @pytest.mark.parametrize("name", sorted(set(BUILT_IN) - {"hexapod"}))
-def test_pose_out_of_reach_is_refused(name):
+def test_pose_out_of_reach_is_rejected(name):
     """A pose ten metres away; the hexapod is omitted, as its stroke is unlimited."""
     robot = BUILT_IN[name]()
     with pytest.raises(BadInput, match="cannot be reached"):
         place_robot(robot, pose={next(iter(WORKSPACE[name])): 10.0})
 
 
-def test_misspelt_robot_name_is_refused_with_the_nearest_name():
+def test_misspelt_robot_name_is_rejected_with_the_nearest_name():
     assert load_robot("3rrr").name == "3rrr"
     with pytest.raises(BadInput, match="hexapod"):
         load_robot("hexpod")

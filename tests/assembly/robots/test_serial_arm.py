@@ -1,4 +1,4 @@
-"""The serial arm: poses and compliance by Denavit and Hartenberg."""
+"""Serial arm: poses and compliance from Denavit-Hartenberg parameters."""
 
 import math
 
@@ -20,7 +20,7 @@ from tests.built_in_robots_for_tests import (
 
 
 def denavit_hartenberg(theta, d, a, alpha):
-    """(4, 4) element by element, as textbooks print it."""
+    """(4, 4) transform written out as in textbooks."""
     c, s, ca, sa = math.cos(theta), math.sin(theta), math.cos(alpha), math.sin(alpha)
     return np.array([
         [c, -s * ca, s * sa, a * c],
@@ -58,7 +58,7 @@ def test_arm_pose_equals_the_denavit_hartenberg_product(rng):
     ids=["nominal", "zero"],
 )  # fmt: skip
 def test_arm_poses_equal_corkes_printed_values(joints, position, approach):
-    """Printed to four or five digits."""
+    """The published values have four or five digits."""
     named = {f"joint{k + 1}": value for k, value in enumerate(joints)}
     T = place_robot(BUILT_IN["arm6"](), joints=named).platform
     assert np.abs(T[:3, 3] - position).max() < 6e-5
@@ -66,13 +66,13 @@ def test_arm_poses_equal_corkes_printed_values(joints, position, approach):
 
 
 def arm_jacobian(posture):
-    """(6, 6) by the joints' axes, at the flange in base axes."""
+    """(6, 6) Jacobian from the joint axes, at the flange in base axes."""
     z, p = posture.transforms[:6, :3, 2], posture.transforms[:6, :3, 3]
     return np.hstack([z, np.cross(z, posture.platform[:3, 3] - p)]).T
 
 
 def test_arm_compliance_equals_that_of_its_drives(rng):
-    """C = J K^-1 J^T to rounding, with the Jacobian of the axes."""
+    """C = J K^-1 J^T to machine precision, with the Jacobian of the joint axes."""
     robot = only_drives_give(BUILT_IN["arm6"]())
     posture = place_robot(robot, pose=random_pose("arm6", rng))
     J = arm_jacobian(posture)

@@ -1,4 +1,4 @@
-"""Hexapod, Delta and Orthoglide: published or closed-form results."""
+"""Hexapod, Delta and Orthoglide, compared with published or closed-form results."""
 
 import math
 from dataclasses import replace
@@ -48,7 +48,7 @@ def test_hexapod_strut_lengths_equal_the_inverse_kinematics(rng):
 
 
 def test_hexapod_stiffness_is_the_sum_over_its_struts(rng):
-    """Gosselin (1990), K = sum k w w^T, with the drive and the tube in series."""
+    """Gosselin (1990): K = sum k w w^T, with drive and tube in series."""
     P = HexapodParameters()
     robot = BUILT_IN["hexapod"]()
     tight = (replace(f, clearance=None) for f in robot.frames)
@@ -66,7 +66,7 @@ def test_hexapod_stiffness_is_the_sum_over_its_struts(rng):
 
 
 def assert_pose_error_is_of_64_corners(posture, lines, joints):
-    """(27) in closed form: six lines give by their joints' clearance along them.
+    """Closed form of (27): six struts lengthen by their joint clearances.
 
     The platform's errors are J^-1 of a box, the farthest at one of its corners.
     """
@@ -102,7 +102,7 @@ def test_pose_error_of_the_hexapod_is_the_farthest_of_64_corners(rng):
 def test_drive_angles_of_the_delta_robot_equal_the_examples_of_williams(
     position, degrees
 ):
-    """Printed to a tenth of a degree."""
+    """The published angles are given to 0.1 degrees."""
     pose = dict(zip(POSE, position, strict=False))
     posture = place_robot(BUILT_IN["delta"](), pose=pose)
     found = np.degrees(list(joints_of(posture).values()))
@@ -128,7 +128,7 @@ def test_delta_platform_is_the_intersection_of_three_spheres(rng):
 
 
 def lower_meeting_point(centres, radius):
-    """Of three equal spheres: below the circumcentre of their centres."""
+    """The spheres have equal radii, so the point is below their circumcentre."""
     a, b = centres[1] - centres[0], centres[2] - centres[0]
     normal = np.cross(a, b)
     middle = np.cross((a @ a) * b - (b @ b) * a, normal) / (2 * normal @ normal)
@@ -151,8 +151,8 @@ def test_delta_platform_has_constant_orientation_and_parallel_rods(rng):
             assert np.linalg.norm(apart) == pytest.approx(0.131, abs=1e-11)
 
 
-def test_delta_without_the_spins_of_its_rods_has_three_freedoms():
-    """A rod that cannot turn in its upper ball joint still turns in the lower one."""
+def test_delta_without_rod_spins_has_three_degrees_of_freedom():
+    """Without spin in its upper ball joint, a rod still rotates in the lower one."""
     robot = BUILT_IN["delta"]()
     frames = (
         replace(f, joint="fixed") if f.name.endswith("high_3") else f
@@ -162,13 +162,13 @@ def test_delta_without_the_spins_of_its_rods_has_three_freedoms():
     assert (found.freedoms, found.locked_freedoms) == (3, 0)
 
 
-def test_delta_out_of_reach_is_refused_with_the_reach():
+def test_delta_out_of_reach_is_rejected_with_the_reach():
     with pytest.raises(BadInput, match=r"delta: a leg requires a reach of 2\.0\d* m"):
         drive_angle(DeltaParameters(), 0.0, np.array([0.0, 0.0, -2.0]))
 
 
 def test_pose_error_of_the_delta_robot_is_the_farthest_of_64_corners(rng):
-    """Its six rods constrain the platform as six struts do."""
+    """The six rods constrain the platform like six struts."""
     posture = place_robot(BUILT_IN["delta"](), pose=random_pose("delta", rng))
     T, index = posture.transforms, posture.robot.index
     rods = [f"leg{k}.{r}" for k in (1, 2, 3) for r in "ab"]

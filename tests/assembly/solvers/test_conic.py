@@ -1,4 +1,4 @@
-"""Least energies and factors: optimality conditions, proofs and special cases."""
+"""Minimum energies and factors: optimality conditions, proofs, and special cases."""
 
 import numpy as np
 import pytest
@@ -12,11 +12,11 @@ GROUP = np.array([0, 0, 1, 2, 2])
 
 @pytest.fixture
 def rng():
-    """Of problems whose rows the interior-point method closes to 1e-11."""
+    """Problems whose equations the interior-point method satisfies to 1e-11."""
     return np.random.default_rng(3)
 
 
-def test_least_energy_is_zero_without_a_gap_and_largest_without_clearance(rng):
+def test_minimum_energy_is_zero_without_a_gap_and_largest_without_clearance(rng):
     G, H, h = rng.normal(size=(2, 5)), rng.normal(size=(1, 5)), np.array([3.0, 4.0])
     none = minimise_energy(G, 0 * h, np.zeros(5), H, np.zeros(1), GROUP)
     assert (none.value, none.bound, none.feasible) == (0.0, 0.0, True)
@@ -31,7 +31,7 @@ def test_least_energy_is_zero_without_a_gap_and_largest_without_clearance(rng):
 @pytest.mark.parametrize("unit", [1e-6, 1.0, 1e6])
 @pytest.mark.parametrize("scale", [1e-3, 1.0, 30.0])
 def test_solution_within_all_cones_solves_the_linear_equations(rng, unit, scale):
-    """G'(G u + h) - d = H'n, H u = k: in any unit of energy and any length of rows."""
+    """G'(G u + h) - d = H'n and H u = k, for any energy unit and row scaling."""
     G, H = rng.normal(size=(6, 5)), scale * np.array([[1.0], [7.0]]) * np.eye(2, 5)
     u, n = np.array([0.1, 0.2, -0.3, 0.1, 0.2]), np.array([0.4, -0.3]) / scale
     h = 0.2 * rng.normal(size=6)
@@ -50,7 +50,7 @@ def test_solution_within_all_cones_solves_the_linear_equations(rng, unit, scale)
 
 @pytest.mark.parametrize("row", [1e-5, 1.0, 1e4])
 @pytest.mark.parametrize("fixed", [False, True])
-def test_multipliers_prove_the_least_factor(rng, row, fixed):
+def test_multipliers_prove_the_smallest_factor(rng, row, fixed):
     """n.B u = n.right <= t sum_scaled |(B'n)_k| + sum_fixed |(B'n)_k|, equal at t."""
     B, scaled = rng.normal(size=(2, 5)), ~(fixed & (GROUP == 1))
     right = B @ np.array([3.0, 4.0, 0.0, 1.0, 2.0]) + B[:, 2]
@@ -84,8 +84,8 @@ NONE = np.zeros((0, 2))
 
 
 @pytest.mark.parametrize("off", [0.0, 1e-3, 1e-2])
-def test_pressed_disc_moves_to_the_point_nearest_to_the_target(off):
-    """The least |u - a| with |u| <= 1 is at a / |a|, pressed by |a| - 1 = 12."""
+def test_closed_disc_moves_to_the_point_nearest_to_the_target(off):
+    """The minimum of |u - a| over |u| <= 1 is a / |a|, with the force |a| - 1 = 12."""
     a = np.array([5.0, 12.0])
     guess = (1.0 - off) * np.array([np.cos(1.17 + off), np.sin(1.17 + off)])
     problem = (np.eye(2), -a, np.zeros(2), NONE, np.zeros(0), np.zeros(2, np.int64))
@@ -95,7 +95,7 @@ def test_pressed_disc_moves_to_the_point_nearest_to_the_target(off):
     assert len(n) == 0
 
 
-def test_pressed_interval_ends_at_its_bound_and_the_row_moves_the_other():
+def test_closed_interval_stays_at_its_bound_and_the_equation_moves_the_other():
     """Work 3 u_1 + u_2 on u_1 + u_2 = 1 / 2 within +-1: the corner (1, -1 / 2)."""
     H, k = np.array([[1.0, 1.0]]), np.array([0.5])
     problem = (NONE, np.zeros(0), np.array([3.0, 1.0]), H, k, np.array([0, 1]))

@@ -1,4 +1,4 @@
-"""Many cone programmes of the same matrices, against Clarabel and by hand."""
+"""Many cone programs with equal matrices, compared with Clarabel and by hand."""
 
 import numpy as np
 import pytest
@@ -19,10 +19,12 @@ GROUPS = {
 @pytest.mark.parametrize("group", GROUPS.values(), ids=GROUPS.keys())
 @pytest.mark.parametrize("loads", [0.0, 1.0])
 @pytest.mark.parametrize("rigid", [0, 2])
-def test_energies_of_many_programmes_equal_those_of_clarabel(rng, group, loads, rigid):
-    """Both prove a gap of 1e-9 of the energy.
+def test_energies_of_many_cone_programs_equal_those_of_clarabel(
+    rng, group, loads, rigid
+):
+    """Both certify a gap of 1e-9 of the energy.
 
-    Clarabel, which solves the few that are not proved, closes rows to 2e-10.
+    Clarabel, which solves the few that are not certified, satisfies equations to 2e-10.
     """
     n, nu = 23, len(group)
     G, H = rng.normal(size=(4, nu)), rng.normal(size=(rigid, nu))
@@ -39,8 +41,8 @@ def test_energies_of_many_programmes_equal_those_of_clarabel(rng, group, loads, 
     assert found.clearances @ H.T == pytest.approx(k, abs=1e-9)
 
 
-def test_rows_beyond_all_clearances_are_infeasible():
-    """u = 0.5 can be, u = 2 cannot, with |u| <= 1."""
+def test_equations_beyond_all_clearances_are_infeasible():
+    """With |u| <= 1, u = 0.5 is feasible and u = 2 is not."""
     none = np.zeros((2, 0))
     H, k = np.ones((1, 1)), np.array([[0.5], [2.0]])
     found = minimise_energies(
@@ -51,13 +53,13 @@ def test_rows_beyond_all_clearances_are_infeasible():
 
 
 def unloaded(u):
-    """Positions that no energy prefers."""
+    """Positions of equal energy."""
     u = np.array(u, dtype=float)
     return Minima(u, np.zeros((len(u), 0)), np.ones(len(u), dtype=bool))
 
 
 def test_closest_positions_equal_hand_calculation():
-    """On a disc with x held at 0.6, y within +-0.8; on two intervals with held sum."""
+    """A disc with x = 0.6 and y within +-0.8, and two intervals with a given sum."""
     disc, start = np.zeros(2, dtype=int), [[0.6, 0.0]] * 3
     last = np.array([[0.0, 2.0], [0.0, 0.3], [5.0, -1.0]])
     none = np.zeros((0, 2)), np.zeros((3, 0)), np.zeros((3, 2)), np.zeros((0, 2))
@@ -73,7 +75,7 @@ def test_closest_positions_equal_hand_calculation():
 
 
 def test_solving_for_a_loaded_disc_does_not_move_other_discs():
-    """The energy (u_x - 3)^2 / 2 presses the disc to (1, 0); the interval is free."""
+    """The energy (u_x - 3)^2 / 2 moves the disc to (1, 0); the interval is free."""
     G, h = np.array([[1.0, 0.0, 0.0]]), np.array([[-3.0]])
     group, d, H = np.array([0, 0, 1]), np.zeros((1, 3)), np.zeros((0, 3))
     minima = minimise_energies(G, h, d, H, np.zeros((1, 0)), group)

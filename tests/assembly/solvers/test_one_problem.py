@@ -1,4 +1,4 @@
-"""One cone programme, and one farthest screw: closed forms, Clarabel, proofs."""
+"""Single cone programs and farthest screws: closed forms, Clarabel, and proofs."""
 
 import cvxpy as cp
 import numpy as np
@@ -16,7 +16,7 @@ SPRINGS = 4
 
 
 def random_cones(rng, widest):
-    """(nu,) cone of each column, of one to so many columns each."""
+    """(nu,) cone of each column, with one to ``widest`` columns per cone."""
     sizes = rng.integers(1, widest + 1, size=rng.integers(2, 9))
     return np.repeat(np.arange(len(sizes)), sizes)
 
@@ -39,7 +39,7 @@ def programme(seed, rows=1, springs=SPRINGS, group=GROUP):
 
 
 def least(p):
-    """By Clarabel."""
+    """Solve by Clarabel."""
     u = cp.Variable(len(p.d))
     cones = [cp.norm(u[p.group == c]) <= 1 for c in range(p.group.max() + 1)]
     if len(p.k):
@@ -56,8 +56,10 @@ def value(p, u):
 
 @pytest.mark.parametrize("widest", [1, 2, 3, 20])
 @pytest.mark.parametrize("springs", [0, 5])
-def test_least_energies_of_both_methods_are_above_both_bounds(rng, widest, springs):
-    """The certified bound of each method is at most the other's value."""
+def test_minimum_energies_of_both_methods_exceed_both_lower_bounds(
+    rng, widest, springs
+):
+    """The certified bound of each method is at most the value of the other."""
     for _ in range(6):
         group = random_cones(rng, widest)
         p = rng.integers(0, max(1, min(4, len(group) - 2)))
@@ -69,7 +71,7 @@ def test_least_energies_of_both_methods_are_above_both_bounds(rng, widest, sprin
         one = conic.minimise_energy(*given)
         other = conic.minimise_energy(*given, method="reference")
         answers = one, other
-        # what is left open of the rows works at their multipliers
+        # the residual of the equations does work on their multipliers
         open_ = max(
             np.abs(H @ a.clearances - given[4]).max(initial=0.0) for a in answers
         )
@@ -92,7 +94,7 @@ def body_of(rng, group, rows=0, size=1.0):
 
 
 def test_farthest_point_of_a_ball_or_interval_equals_its_closed_form():
-    """|c + r v| with |v| <= 1 is |c| + r; of a ball of three and one more column."""
+    """The maximum of |c + r v| over |v| <= 1 is |c| + r, for a ball and an interval."""
     centre = np.array([0.0, 0.0, 0.0, 3e-3, 0.0, 4e-3])
     X = np.zeros((6, 4))
     X[3:, :3], X[0, 3] = 2e-3 * np.eye(3), 5e-3
@@ -110,7 +112,7 @@ def test_farthest_point_of_a_ball_or_interval_equals_its_closed_form():
 
 @pytest.mark.parametrize("widest", [2, 12])
 def test_farthest_distance_bounds_the_support_in_every_direction(rng, widest):
-    """Supports by Clarabel in many directions; with rows, and cones of many columns."""
+    """Support functions by Clarabel in many directions, for cones of many columns."""
     for _ in range(4):
         group = random_cones(rng, widest)
         rows = int(rng.integers(0, max(1, min(4, len(group) - 2))))
@@ -127,7 +129,7 @@ def test_farthest_distance_bounds_the_support_in_every_direction(rng, widest):
 
 
 def height(body, part, direction):
-    """The support function of a body, by Clarabel."""
+    """Support function of a set, evaluated by Clarabel."""
     v = cp.Variable(len(body.start))
     step = body.map[part : part + 3].T @ direction
     size = np.linalg.norm(step)
@@ -163,7 +165,7 @@ def test_multipliers_prove_that_no_point_is_farther(rng, rows):
     H, d = rows_of(rng, rows), directions_of(rng, 20)
     start = rng.uniform(-0.4, 0.4, size=(20, 6))
     points, multipliers, solved = found(H, CONES, d, start @ H.T)
-    # rounding of several rows may end some a little before
+    # round-off in several equations may stop some slightly earlier
     assert solved.all() if rows == 1 else solved.sum() > 12
     assert np.abs((points - start)[solved] @ H.T).max() < 1e-12
     for i in np.flatnonzero(solved).tolist():
@@ -174,7 +176,7 @@ def test_multipliers_prove_that_no_point_is_farther(rng, rows):
         assert d[i] @ points[i] >= d[i] @ start[i] - 1e-9
 
 
-def test_farthest_points_of_intervals_equal_a_linear_programme(rng):
+def test_farthest_points_of_intervals_equal_a_linear_program(rng):
     H, d = rows_of(rng, 2), directions_of(rng, 8)
     start = rng.uniform(-0.5, 0.5, size=(8, 6))
     points, _, solved = found(H, np.arange(6), d, start @ H.T)
@@ -184,7 +186,7 @@ def test_farthest_points_of_intervals_equal_a_linear_programme(rng):
         assert d[i] @ points[i] == pytest.approx(-least.fun, abs=1e-8)
 
 
-def test_infeasible_rows_are_reported_as_not_solved(rng):
+def test_infeasible_equations_are_reported_as_unsolved(rng):
     H, d = rows_of(rng, 1), directions_of(rng, 3)
     _, _, solved = found(H, CONES, d, np.array([[0.1], [10.0], [-0.2]]))
     assert solved.tolist() == [True, False, True]

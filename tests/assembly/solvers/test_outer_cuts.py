@@ -7,7 +7,7 @@ from forcefit.assembly.solvers.outer_cuts import farthest
 
 
 def screw(point, half):
-    """(6,) with the point in one half, and something in the other."""
+    """(6,) screw with the point in one half and arbitrary numbers in the other."""
     return np.concatenate([point, [9.0] * 3] if half == 0 else [[9.0] * 3, point])
 
 
@@ -39,7 +39,7 @@ def box(sides, half):
     "sides", [[1e-3, 2e-3, 3e-3], [1e-3, 0.0, 2e-3], [0.0, 0.0, 3e-3], [0.0] * 3]
 )
 def test_farthest_point_of_a_box_is_its_corner(half, sides):
-    """Also of flat boxes, a segment and a point."""
+    """Includes flat boxes, a segment and a point."""
     sides = np.array(sides)
     (low, high), best, _ = farthest(np.zeros(6), half, 1e-7, box(sides, half))
     corner = np.linalg.norm(sides)

@@ -73,8 +73,8 @@ def test_remark_names_the_joining_steps_that_move_a_slot():
     plan = Plan((*pins, join(3), slot))
     remarks = steps_of(plan, moved)["remarks"]
     assert "order matters" in remarks[0]
-    assert remarks[1].endswith("as it lies: join 1, join 2, join 3 moves it")
+    assert remarks[1].endswith("position, moved by join 1, join 2, join 3")
     look = Measure("look", "platform")
     remarks = steps_of(Plan((*pins, look, join(3), slot)), still)["remarks"]
     assert "does not change the assembled machine" in remarks[0]
-    assert "join 4 finds (influence coefficients zero)" in remarks[0]
+    assert "found by join 4 (zero influence coefficients)" in remarks[0]

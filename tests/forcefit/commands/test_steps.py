@@ -86,7 +86,7 @@ def test_best_order_is_printed_with_its_bound(run, files):
     assert status == 0
     assert order["value"] == order["bound"] <= order["given"]
     assert sorted(order["steps"]) == [f"join platform - leg{i}" for i in (1, 2, 3)]
-    assert "least force" in run(*words)[1]
+    assert "minimum force" in run(*words)[1]
 
 
 def test_quantiles_of_draws_equal_those_of_the_springs(run, files, tmp_path):
