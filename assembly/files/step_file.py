@@ -46,21 +46,20 @@ _MOST_STEPS = 1000
 _PART = Either((text("frame"), text("the two frames of a closure", "frame")))
 _NAMES = Listed(Words(_COMPONENTS))
 _POSITION = Each(number("displacement", "rad or m"))
-PLAN_FILE = record(
-    step=Listed(WithUnits(record(
-        name_=text("name of the step"),
-        fix_=text("frame that a fixture holds"), join_=_PART,
-        clamp_=text("frame that is clamped"), preload_=text("frame that is loaded"),
-        release_=Either((text("name of a step"), text("names of steps", "step"))),
-        measure_=_PART, adjust_=text("frame whose geometric error is changed"),
-        at_=_POSITION, stiffness_=Each(number("stiffness", "N m/rad or N/m")),
-        locked_=Either((flag("bolted as it lies"), _NAMES)),
-        force_limit_=number("largest closing force", "N"),
-        leave_open_=flag("leave the opening that the limit does not close"),
-        load_=Each(number("load", "N m or N")), components_=_NAMES,
-        reading_=_PART, of_=_NAMES, increment_=number("increment", "rad or m"),
-    ))),
+_STEP = record(
+    name_=text("name of the step"),
+    fix_=text("frame that a fixture holds"), join_=_PART,
+    clamp_=text("frame that is clamped"), preload_=text("frame that is loaded"),
+    release_=Either((text("name of a step"), text("names of steps", "step"))),
+    measure_=_PART, adjust_=text("frame whose geometric error is changed"),
+    at_=_POSITION, stiffness_=Each(number("stiffness", "N m/rad or N/m")),
+    locked_=Either((flag("bolted as it lies"), _NAMES)),
+    force_limit_=number("largest closing force", "N"),
+    leave_open_=flag("leave the opening that the limit does not close"),
+    load_=Each(number("load", "N m or N")), components_=_NAMES,
+    reading_=_PART, of_=_NAMES, increment_=number("increment", "rad or m"),
 )  # fmt: skip
+PLAN_FILE = record(step=Listed(WithUnits(_STEP)))
 
 
 def assemble_in_steps(
@@ -134,6 +133,10 @@ def _named(steps: list[Step], tables: list[Table]) -> tuple[Step, ...]:
 def _step(table: Table, robot: Robot) -> Step:
     """Read a ``[[step]]`` table."""
     given = [kind for kind in KINDS if table.has(kind)]
+    if not given:
+        for key in _STEP.content:
+            table.has(key)  # so that finish refuses only misspelt keys
+        table.finish()
     if len(given) != 1:
         found = f"found {' and '.join(given)}" if given else "found no type of step"
         fault = f"{found}, expected one of {', '.join(KINDS)}"

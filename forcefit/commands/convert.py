@@ -56,7 +56,7 @@ def convert(
     mismatch: MismatchOption = None,
     json: JsonOption = None,
 ) -> None:
-    """Convert a robot from or to URDF, MJCF and SDF.
+    """Convert a robot from URDF, MJCF or SDF, or to URDF or MJCF.
 
     If the loops are not closed in the home pose of the file, a new home pose is
     computed.  The output file is read back and compared with the original robot in 100

@@ -132,5 +132,6 @@ def checked(
         f">= {least:g}" if least > -math.inf else "",
         f"< {below:g}" if below < math.inf else "",
     ]
-    expected = " ".join(["a finite number", *filter(None, limits), f"[{unit}]"])
+    range_ = " and ".join(filter(None, limits))
+    expected = " ".join(filter(None, ["a finite number", range_, f"[{unit}]"]))
     raise BadInput(f"{option}: found {value:g}, expected {expected}")

@@ -150,6 +150,12 @@ def triangles_on(surface: Surface, interface: Interface, name: str) -> NDArray:
     on = (interface.distance(corners) < near).all(axis=1)
     along = np.abs(normals @ interface.direction)
     on &= along < 0.5 if interface.kind == "bore" else along > 0.9
+    if interface.kind == "bore":
+        # a flat face with all corners on the cylinder, such as a bar's end, is no bore
+        middle = corners.mean(axis=1) - interface.point
+        middle -= (middle @ interface.direction)[:, None] * interface.direction
+        radial = np.abs((normals * middle).sum(axis=1))
+        on &= radial > 0.5 * np.linalg.norm(middle, axis=1)
     if interface.kind == "disc":
         out = np.linalg.norm(corners - interface.point, axis=2) / interface.radius
         cut = on & (out < 0.99).any(axis=1) & (out > 1.01).any(axis=1)

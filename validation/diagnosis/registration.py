@@ -77,11 +77,13 @@ def coarse_frame(campaign: Campaign, conditions: Conditions) -> dict[str, float]
     seen = (nominal + campaign.measured[:, 3:])[full]
     thought = (nominal + model[:, 3:])[full]
     if not turned.any() and not off_one_line(thought):
+        known = campaign.registration == "known"  # then a command asked for the fit
+        found = "a fit of the registration" if known else "an unknown registration"
+        instead = "--fit zeros" if known else 'registration = "known" in campaign.toml'
         raise BadInput(
-            f"{campaign.name}: found an unknown registration, but neither rotations "
-            f"nor {_FEWEST_POINTS} measured points that are not on one line, each in "
-            'x, y and z; expected one of the two, or registration = "known" in '
-            "campaign.toml"
+            f"{campaign.name}: found {found}, but neither rotations nor "
+            f"{_FEWEST_POINTS} measured points that are not on one line, each in x, y "
+            f"and z; expected one of the two, or {instead}"
         )
     parts = campaign.measured[turned, :3], model[turned, :3]
     turns = [rotation_matrix(vectors) for vectors in parts]

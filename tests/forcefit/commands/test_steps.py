@@ -110,6 +110,7 @@ def test_quantiles_of_draws_equal_those_of_the_springs(run, files, tmp_path):
     (2 * '[[step]]\nname = "a"\nmeasure = "leg1"\n', "the name of an earlier"),
     ('[[step]]\nfix = "leg1"\njoin = "leg2"\n', "found fix and join"),
     ('[[step]]\nname = "a"\n', "found no type of step"),
+    ('[[step]]\njion = "leg1"\n', 'step[1]: unknown key "jion"; did you mean "join"?'),
     ('[[step]]\nfix = "lge1"\n', 'did you mean "leg1"'),
     ('[[step]]\npreload = "leg1"\n', "load: missing"),
     ('[[step]]\npreload = "leg1"\nload = { fz = "5 N" }\n', "load.fz"),

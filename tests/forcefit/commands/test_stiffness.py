@@ -57,7 +57,8 @@ def test_beam_options_are_passed_to_the_formula(options, section, axis, theory):
 REFUSED = {
     "beam": (["beam", "--length", "0.452", *MATERIAL], [
         (["--radius", "nan"], "--radius: found nan, expected a finite number > 0 [m]"),
-        (["--radius", "1", "--inner-radius", "1"], "--inner-radius: found 1"),
+        (["--radius", "1", "--inner-radius", "1"],
+         "--inner-radius: found 1, expected a finite number >= 0 and < 1 [m]"),
         (["--radius", "1", "--width", "1"], "either --radius, or --width"),
         ([], "either --radius, or --width"),
         (["--width", "1"], "--height: missing"),

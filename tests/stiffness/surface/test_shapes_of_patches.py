@@ -78,6 +78,14 @@ def test_triangles_on_a_bore_have_all_corners_on_it_and_face_across_its_axis(uni
     assert triangles_on(surface, bore, "tip").tolist() == [0, 1, 4, 5]
 
 
+def test_flat_end_whose_corners_lie_on_a_cylinder_is_not_a_bore():
+    """The end of a square bar: all its corners are one half width from the y axis."""
+    corners = [[-1, -1.5, 0], [1, -1.5, 0], [1, 1.5, 0], [-1, 1.5, 0]]
+    end = np.array([[corners[i] for i in (0, 2, 1)], [corners[i] for i in (0, 3, 2)]])
+    with pytest.raises(BadInput, match="no face of the surface lies on the base"):
+        triangles_on(loose(*end), parse_interface("bore=0,0,0/0,1,0/1"), "base")
+
+
 def spoke(low, high):
     """A flat triangle between two distances from the origin."""
     return [[low, 0, 0], [high, 0, 0], [low, 0.01, 0]]

@@ -201,3 +201,19 @@ def test_wrong_set_up_rows_are_refused(words, message, machine, run):
     assert code == 2
     assert message in error
     assert "\n" not in error.strip()
+
+
+def test_known_registration_that_the_rows_do_not_determine_is_refused(machine, run):
+    """The rows contain one reading each; campaign.toml states a known registration."""
+    folder = measured(machine, 6, 0.8)
+    file = folder / "campaign.toml"
+    file.write_text(file.read_text().replace('"unknown"', '"known"'))
+    table = folder / "measurements.csv"
+    head, *rows = table.read_text().splitlines()
+    lines = [row.rsplit(",", 3)[0] + ",1e-4" for row in rows]
+    table.write_text("\n".join([head.rsplit(",", 2)[0], *lines]) + "\n")
+    saved = str(machine / "saved.toml")
+    code, _, error = run("validation", "carry", saved, str(folder), "--setup", "3")
+    assert code == 2
+    assert "found a fit of the registration" in error
+    assert error.strip().endswith("or --fit zeros")
