@@ -58,3 +58,17 @@ def test_noise_that_differs_from_the_stated_sigma_is_reported(tau, repeats, told
     found = findings(tau, 0.03, repeats, memory=False)
     assert len(found) == len(told)
     assert all(word in one for word, one in zip(told, found, strict=True))
+
+
+@pytest.mark.parametrize(("common", "words"), [
+    ((1.2e-5, 5e-6), "5 um, 12 urad"), ((0.0, 2.54e-5), "25.4 um"), ((0.0, 0.0), ""),
+])  # fmt: skip
+def test_common_noise_is_reported_with_its_sizes(common, words):
+    told = findings(1.0, 0.03, (1.0, 40), memory=False, common=common)
+    head = "noise common to the points of a row: "
+    assert told == ((head + words,) if words else ())
+
+
+def test_common_noise_without_repeats_is_reported_as_uncertain():
+    (told,) = findings(1.0, 0.03, (0.0, 0), memory=False, common=(0.0, 5e-6))
+    assert "an unrecorded cause has the same effect" in told

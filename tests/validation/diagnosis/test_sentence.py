@@ -1,9 +1,12 @@
 """Learned functions and tallies as readable text."""
 
+from dataclasses import replace
+
 import pytest
 
 from forcefit.assembly.model.function import Function
-from forcefit.validation.diagnosis.sentence import formula
+from forcefit.validation.diagnosis.calibration import Calibration
+from forcefit.validation.diagnosis.sentence import calibration_text, formula
 
 
 def test_formula_of_a_product_names_both_variables():
@@ -32,6 +35,20 @@ def test_formula_of_a_product_names_both_variables():
 def test_formula_has_each_coefficient_before_its_factor(form, parameters, expected):
     function = Function("drive", ("rz",), ("q.drive",), form, parameters)
     assert formula(function) == expected
+
+
+def test_calibration_text_states_counts_and_shares():
+    tally = Calibration(
+        20, {"none_needed": 19, "explained": 1}, {"explained": 18, "ambiguous": 2},
+        0.85, 0.025,
+    )  # fmt: skip
+    assert calibration_text(tally) == (
+        "simulated on this design, 20 campaigns each: with noise alone explained 1, "
+        "none_needed 19; with the effects found ambiguous 2, explained 18; "
+        "85 % named the effects; false claims 2.5 %"
+    )
+    unnamed = calibration_text(replace(tally, right=float("nan")))
+    assert "named the" not in unnamed
 
 
 def test_formula_of_a_compliance_states_the_factor_of_the_wrench():

@@ -80,6 +80,17 @@ def test_diagnosis_text_omits_absent_sections(shown):
     ]
 
 
+def test_errors_with_outliers_are_printed_only_for_held_out_outliers(shown):
+    """An outlier among the fitted rows is named all the same."""
+    fitted = shown(outliers=["m1"])
+    assert "left out as outliers: m1" in fitted
+    assert not any(line.startswith("with outliers") for line in fitted)
+    aside = shown(outliers=["m1", "m3"])
+    assert "left out as outliers: m1, m3" in aside
+    (more,) = [line for line in aside if line.startswith("with outliers")]
+    assert more.split() == ["with", "outliers", "8", "2.25", "1.2"]
+
+
 def test_text_ends_with_residual_trends_and_the_next_measurement(shown):
     following = {
         "why": "a and b differ", "configuration": {"q.one": 0.5},
@@ -97,3 +108,27 @@ def test_text_ends_with_residual_trends_and_the_next_measurement(shown):
         "  a and b differ",
     ]
     assert load_text((0.0,) * 6) == "none"
+
+
+def test_text_lists_effects_and_functions_with_their_values(shown):
+    """Geometry has lines of its own; a long formula is cut at 160 characters."""
+    number = {"name": "one", "value": 2e-5, "std": 1e-6, "unit": "rad"}
+    effect = {"name": "encoder_offset", "probability": 0.98, "parameters": [number]}
+    function = {
+        "label": "tool tx, ty of q.one",
+        "formula": "x" * 200, "equivalent_places": [[], []],
+        "parts_of_range": {"variable": "q.j1", "without": 5.0, "after": 1.25},
+    }  # fmt: skip
+    geometry = {"name": "geometric_errors", "combinations": 2.0, "parameters": []}
+    said = shown(effects=[effect, geometry], learned=[function])[3:9]
+    assert [line.split() for line in said[:2]] == [
+        ["encoder_offset", "(probability", "0.980)"],
+        ["one", "2e-05", "+-", "1e-06", "rad"],
+    ]
+    assert said[2:] == [
+        "learned: tool tx, ty of q.one",
+        f"  {'x' * 157}...",
+        "  error in left-out parts of the range of q.j1: 1.25 sigma, "
+        "without the function 5",
+        "  2 other places fit equally well",
+    ]
