@@ -145,6 +145,15 @@ def _limits(node: Node) -> tuple[float, float] | None:
     return None if ends == (None, None) else limit.limits(lower, upper)
 
 
+def _is_reversed(limit: Node) -> bool:
+    """Return whether the lower limit exceeds the upper one, so that it is omitted."""
+    lower, upper = (limit.optional(end) or "0" for end in ("lower", "upper"))
+    try:
+        return float(lower) > float(upper)
+    except ValueError:  # of a joint whose limits are not read
+        return False
+
+
 def _couplings(nodes: list[Node], joints: dict[str, Joint]) -> Iterator[Coupling]:
     """Yield the couplings of joints that follow another joint (``<mimic>``)."""
     for node in nodes:
@@ -175,6 +184,10 @@ def _left_out(
     for joint in joints:
         for inner in joint.children():
             if inner.tag == "limit":
+                if _is_reversed(inner):
+                    extra.setdefault("joint range, lower above upper", []).append(
+                        joint.text("name")
+                    )
                 for what in sorted(set(inner.element.keys()) - {"lower", "upper"}):
                     extra.setdefault(f"joint limit {what}", []).append(
                         joint.text("name")

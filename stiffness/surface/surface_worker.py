@@ -122,11 +122,29 @@ def _check_points(path: Path, mesh: Any) -> None:
             )
 
 
+def _volume(mesh: Any) -> Any:
+    """Return the cells with a volume; all cells if none has a volume.
+
+    Gmsh writes the triangles of the surface together with the tetrahedra.
+    """
+    kinds, first = np.unique(mesh.celltypes, return_index=True)
+    solid = [
+        kind
+        for kind, i in zip(kinds, first.tolist(), strict=True)
+        if mesh.GetCell(i).GetCellDimension() == 3
+    ]
+    if len(solid) in (0, len(kinds)):
+        return mesh
+    return mesh.extract_cells(np.isin(mesh.celltypes, solid))
+
+
 def _boundary(path: Path, mesh: Any) -> tuple[NDArray, NDArray]:
     """Return points and triangles of a VTK mesh, or of the boundary of its volume."""
     import pyvista
 
     _check_points(path, mesh)
+    if isinstance(mesh, pyvista.UnstructuredGrid):
+        mesh = _volume(mesh)
     if not isinstance(mesh, pyvista.PolyData):
         mesh = mesh.extract_surface(algorithm="dataset_surface")
     mesh = mesh.triangulate()

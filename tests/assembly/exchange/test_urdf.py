@@ -63,6 +63,14 @@ def test_urdf_with_bytes_of_another_encoding_is_refused(tmp_path):
         read_urdf(path)
 
 
+def test_range_whose_lower_end_exceeds_the_upper_is_listed_as_omitted(tmp_path):
+    limit = '<limit lower="1" upper="-1"/>'
+    path = file_of(tmp_path, joint("j", "a", "b", Z + limit, "revolute"), "ab")
+    mechanism = read_urdf(path)
+    assert mechanism.joints[0].limits is None
+    assert "joint range, lower above upper: 1 (j)" in mechanism.left_out
+
+
 @pytest.mark.parametrize("name", ["base", "base.joint", "b", "world"])
 def test_joint_named_base_is_renamed(name, tmp_path):
     """The frame has the name of the joint, except "base", which is the fixed frame."""

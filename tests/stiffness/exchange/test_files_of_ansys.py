@@ -176,11 +176,11 @@ def test_matrix_market_file_of_every_kind_is_read(head, numbers, tmp_path):
 @pytest.mark.parametrize(("text", "message"), [
     ("coordinate pattern general\n2 2 1\n1 1\n", "expected a matrix, coordinate"),
     ("coordinate real general\n2 2 3\n1 1 1\n2 2 1\n",
-     "of each entry that this line states"),
+     "expected row, column and value of each entry"),
     ("coordinate real general\n2 2 2\n1 1 1\n3 2 1\n", "row or column outside 1 to 2"),
     ("coordinate real general\n2 2 2\n1 1 1\n2 1.5 1\n", "a row or column outside"),
     ("coordinate real general\n", "expected a square"),
-    ("coordinate real general\n2 2\n", "of each entry that this line states"),
+    ("coordinate real general\n2 2\n", "expected row, column and value of each entry"),
     ("coordinate real general\n1e9 1e9 0\n", "expected a square"),
     ("array real general\n1000000 1000000\n1\n", "expected 1000000000000"),
     ("array real general\n2 3\n1 1 1 1 1 1\n", "found 2 by 3 numbers"),

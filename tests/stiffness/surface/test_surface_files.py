@@ -37,6 +37,24 @@ def msh2(elements, kind):
     ])  # fmt: skip
 
 
+def test_vtk_file_of_tetrahedra_and_their_surface_is_read(tmp_path):
+    """Gmsh writes tetrahedra (10), triangles (5) and edges (3) into one grid."""
+    kinds = [(3, [(1, 2)]), (5, TRIANGLES), (10, TETRAHEDRA)]
+    cells = [(kind, cell) for kind, some in kinds for cell in some]
+    size = sum(len(cell) + 1 for _, cell in cells)
+    path = tmp_path / "cube.vtk"
+    path.write_text("\n".join([
+        "# vtk DataFile Version 2.0", "cube", "ASCII", "DATASET UNSTRUCTURED_GRID",
+        "POINTS 8 double", *(f"{x} {y} {z}" for x, y, z in CORNERS),
+        f"CELLS {len(cells)} {size}",
+        *(" ".join(map(str, [len(c), *(k - 1 for k in c)])) for _, c in cells),
+        f"CELL_TYPES {len(cells)}", *(str(kind) for kind, _ in cells), "",
+    ]))  # fmt: skip
+    surface = read_surface(path)
+    assert surface.volume == pytest.approx(1e-3, rel=1e-12)
+    assert len(surface.triangles) == 12
+
+
 @pytest.mark.parametrize(
     "content", [msh2(TRIANGLES, 2), msh2(TETRAHEDRA, 4), msh2(SIDES, 3)],
     ids=["triangles", "solid", "quads"],
@@ -56,6 +74,7 @@ def test_msh_file_of_a_cube_is_read(tmp_path, content, capfd):
 @pytest.mark.parametrize(("content", "message"), [
     ("no mesh at all", "not a readable MSH file"),
     (msh2(TRIANGLES, 2)[:300], "not a readable MSH file"),
+    (msh2(TRIANGLES, 2).replace("2.2 0 8", "9.9 0 8"), "MSH 2.2 or 4.1"),
     (msh2([(1, 2)], 1), "contains neither triangles nor tetrahedra"),
     (msh2(TRIANGLES[:-1], 2), "the surface is open"),
 ])  # fmt: skip
