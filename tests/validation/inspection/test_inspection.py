@@ -111,7 +111,7 @@ SAYINGS = {
     "stuck": ({"measured": STILL}, "readings careful: rx reads the same in every row"),
     "nothing twice": ({"repeat": np.arange(60)}, "repeats lost: Nothing was measured"),
     "in a row": ({"repeat": np.repeat(np.arange(20), 3)},
-        "repeats careful: Repeats were measured in a row"),
+        "repeats careful: Repeats were measured consecutively"),
     "in one go": ({"repeat": np.repeat(np.arange(20), 3)},
         "configurations lost: Every configuration was measured without a break"),
     "one configuration": ({"repeat": np.zeros(60, dtype=int)},
@@ -139,9 +139,8 @@ def test_design_without_weaknesses_has_one_remark(rng):
     """The only remark is that each configuration has one load."""
     found = [t for t in texts(sound(rng)) if " fine: " not in t]
     assert found == [
-        "load careful: No configuration was measured under two loads: effects of "
-        "the load and effects of the configuration are distinguished by the model "
-        "alone."
+        "load careful: No configuration was measured under two loads: only the model "
+        "separates effects of the load from effects of the configuration."
     ]
 
 
