@@ -73,7 +73,7 @@ def test_numbers_on_the_page_of_a_drawn_study_equal_its_results(results):
     for key in ("rotation", "translation"):
         assert drawn["pose"][key] == worst[key]["bound"]
     text = verdict(found)
-    begin = "For all parts within the tolerances of the drawing and all positions"
+    begin = "For all parts within the drawing tolerances and all positions"
     assert f"{begin} within the clearances its platform is at most" in text
     turn, shift = (1e3 * worst[key]["bound"] for key in ("rotation", "translation"))
     assert f"{turn:.3g} mrad and {shift:.3g} mm from the nominal pose" in text
@@ -136,7 +136,7 @@ def test_bound_of_the_rotation_in_the_map_of_a_study_equals_hand_calculation(tmp
     turn, shift = (1e3 * over[key] for key in ("rotation", "translation"))
     assert f"{turn:.3g} mrad and {shift:.3g} mm over the 4 poses" in verdict(found)
     page = (tmp_path / "out" / "report.html").read_text()
-    assert "largest rotation over all parts within the tolerances" in page
+    assert "largest rotation over all parts within tolerance" in page
     # a four-bar closes one loop; this one has no description
     assert ">four_bar. " in page
     assert " frames, 1 closure; " in page

@@ -169,9 +169,9 @@ def test_study_of_a_robot_without_errors_reports_that_nothing_was_checked(
     write_study(results)
     assert results.verdicts == {"reference": "no signal", "crosscheck": "no signal"}
     assert not results.passed
-    assert "No independent check of these numbers could be made" in verdict(results)
+    assert "No independent check of these results was possible" in verdict(results)
     page = (tmp_path / "out" / "report.html").read_text()
-    assert "Checks that could not be made" in page
+    assert "Checks that were not possible" in page
     assert "the robot has no geometric errors" in page
     table = json.loads((tmp_path / "out" / "results.json").read_text())
     assert table["passed"] is False
@@ -251,11 +251,11 @@ def test_headline_of_a_study_is_the_worst_clearance_over_the_map(tmp_path):
     assert f" and {1e3 * bound:.3g} mm from the nominal pose" in sentences
     assert f" and {1e3 * np.nanmax(upper):.3g} mm over" in sentences
     assert "certified bounds of (27), assumption frozen" in sentences
-    assert "in the least-energy solution it is 0 mrad and 0 mm" in sentences
+    assert "in the minimum-energy solution it is 0 mrad and 0 mm" in sentences
     lost = verdict(replace(results, error={}, maps=None))
-    assert "was found; in the least-energy solution" in lost
+    assert "was found; in the minimum-energy solution" in lost
     page = report_page(results)
-    assert page.count("least energy") >= 6  # a row for each component
+    assert page.count("minimum energy") >= 6  # a row for each component
     assert "any position without a change of deformation" in page
     assert "largest translation, eq. (27), over all clearances" in page
 
@@ -266,7 +266,9 @@ def test_study_reports_a_manipulator_that_cannot_be_assembled(tmp_path):
     results = run_study(read_study(study_file(tmp_path, 'robot = "stuck.toml"\n')))
     assert results.solution["status"] == "cannot assemble"
     assert not results.passed
-    assert verdict(results).startswith("No answer at this pose: cannot assemble, a ri")
+    assert verdict(results).startswith(
+        "No solution at this pose: cannot assemble, a ri"
+    )
 
 
 def test_message_about_a_robot_file_given_as_a_study_states_the_missing_line(tmp_path):
