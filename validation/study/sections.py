@@ -216,7 +216,7 @@ def reference_section(results: StudyResults) -> str:
         paragraph(
             "Every screw of every frame is a variable and every constraint is an "
             "equation of the paper; differences must be below "
-            "{reference['tolerance']:g}."
+            f"{reference['tolerance']:g}."
         ),
         table(["quantity", "reduced problem", "cvxpy", "relative difference"], rows),
     )

@@ -31,7 +31,7 @@ def shown(*errors):
 def test_error_above_20_um_or_1_per_cent_makes_the_verdict_amber(second, kind):
     text = shown(Cost(2e-3, 1e-6, 0.0), second)
     assert f"<p class='verdict {kind}'>" in text
-    assert "(1 further errors are not known)" in text
+    assert "(1 more errors are unknown)" in text
 
 
 def test_report_page_shows_the_largest_error_over_the_poses():
