@@ -1,4 +1,4 @@
-"""Studies of robots with tolerances of a drawing: statistics and worst case."""
+"""Studies of robots with drawing tolerances: statistics and worst case."""
 
 import json
 
@@ -43,7 +43,7 @@ def test_worst_case_of_a_drawing_in_a_study_equals_hand_calculation(results):
     assert worst["attained"] <= worst["bound"] <= 1.001 * worst["attained"]
 
 
-def test_shares_of_callouts_in_a_study_equal_hand_calculation(results):
+def test_contributions_of_callouts_in_a_study_equal_hand_calculation(results):
     """Errors add linearly, so a share is c^2 over the sum; intervals hold 95 %."""
     _, _, table = results
     shares = table["statistics"]["importance"]["quantities"]["rotation"]["total_index"]
@@ -82,7 +82,7 @@ def test_numbers_on_the_page_of_a_drawn_study_equal_its_results(results):
 
 
 def test_study_of_fits_states_that_bounds_use_their_mean(tmp_path):
-    """The largest radial clearance of 12 H7/g6 is 1.71 of its mean."""
+    """The largest radial clearance of 12 H7/g6 is 1.71 times its mean."""
     study = study_of(tmp_path, 'fit = "12 H7/g6"', STATISTICS.format(draws=20, base=0))
     found = run_study(study)
     assert (

@@ -1,4 +1,4 @@
-"""Study files, the folder that a study writes, and the messages for wrong files."""
+"""Study files, the output folder of a study, and messages for invalid files."""
 
 import json
 from dataclasses import replace
@@ -117,7 +117,7 @@ def test_numbers_on_the_study_page_equal_the_results(results):
     assert solution["energy, eq. (22)"] == table["solution"]["energy"]
     for name, *wrench in seen.table("link")[1:]:
         expected = table["solution"]["frames"][name.text]["wrench"]
-        # what is rounding of the largest is shown as 0
+        # Values at the round-off of the largest are shown as 0.
         shown = [cell.value for cell in wrench]
         assert shown == pytest.approx(expected, rel=0.0, abs=1e-5)
     (scene,) = (one for one in seen.figures if "bodies" in one)
@@ -219,7 +219,7 @@ def test_study_without_a_reachable_point_in_its_map_does_not_pass(tmp_path):
     assert "No point has a solution" in (tmp_path / "out" / "report.html").read_text()
 
 
-def test_study_whose_reference_has_no_answer_does_not_pass(tmp_path, monkeypatch):
+def test_study_whose_reference_has_no_solution_does_not_pass(tmp_path, monkeypatch):
     def lost(*_):
         raise RuntimeError("cvxpy: the problem is unbounded")
 
@@ -304,7 +304,7 @@ def test_message_about_a_robot_file_given_as_a_study_states_the_missing_line(tmp
     ("title", "scales = [1, -1]\ntitle", "expected at least two different fact"),
     ("title", "title = 1 #", "title: found 1, expected a string"),
 ])  # fmt: skip
-def test_wrong_study_file_is_refused_in_one_line(tmp_path, old, new, message):
+def test_invalid_study_file_is_rejected_in_one_line(tmp_path, old, new, message):
     path = study_file(tmp_path, SMALL.replace(old, new, 1))
     with pytest.raises(BadInput) as error:
         read_study(path)
@@ -315,14 +315,14 @@ def test_wrong_study_file_is_refused_in_one_line(tmp_path, old, new, message):
     assert [p.name for p in tmp_path.iterdir()] == ["study.toml"]
 
 
-def test_study_output_that_is_a_file_is_refused_before_computation(tmp_path):
+def test_study_output_that_is_a_file_is_rejected_before_computation(tmp_path):
     (tmp_path / "taken").write_text("mine")
     path = study_file(tmp_path, SMALL)
     with pytest.raises(BadInput, match="found a file, expected a folder or nothing"):
         read_study(path, tmp_path / "taken")
 
 
-def test_study_pose_out_of_reach_is_refused_before_computation(tmp_path):
+def test_unreachable_study_pose_is_rejected_before_computation(tmp_path):
     path = study_file(tmp_path, SMALL.replace("tz = -0.5", "tz = -0.9"))
     seen = []
     with pytest.raises(BadInput, match="cannot be reached"):
