@@ -2,11 +2,11 @@
 
 Steps:
 
-1. Score adding every library effect and function to each model of the beam. 2. Add the
-best candidates, and optimise the prior standard deviations. 3. Try all forms of an
-added function; relinearise effects at their estimates. 4. Repeat until no added element
-increases the log posterior. 5. Exchange elements of the best model for others until the
-model is stable.
+1. Score adding every library effect and function to each model of the beam.
+2. Add the best candidates, and optimise the prior standard deviations.
+3. Try all forms of an added function; relinearise effects at their estimates.
+4. Repeat until no added element increases the log posterior.
+5. Exchange elements of the best model for others until the model is stable.
 """
 
 from collections.abc import Callable, Iterable, Sequence

@@ -2,10 +2,10 @@
 
 Steps:
 
-1. the pose of the measuring frame is estimated if it is unknown; 2. effects and
-functions are searched for together (:mod:`.select`); 3. the machine with these effects
-is fitted (:mod:`.fit`), second-order terms of its geometric errors are added to the
-model, and step 2 is repeated until they converge.
+1. the pose of the measuring frame is estimated if it is unknown;
+2. effects and functions are searched for together (:mod:`.select`);
+3. the machine with these effects is fitted (:mod:`.fit`), second-order terms of its
+   geometric errors are added to the model, and step 2 is repeated until they converge.
 
 The search uses only the rows to be fitted.
 """

@@ -1,6 +1,8 @@
-"""Complete diagnoses of data that do not come from the model under test. Quick tests
-use a planar arm calculated by hand, slow ones simulated campaigns of this project and,
-if available, of another program."""
+"""Complete diagnoses of data that do not come from the model under test.
+
+Quick tests use a planar arm calculated by hand, slow ones simulated campaigns of this
+project and, if available, of another program.
+"""
 
 import html
 import json

@@ -1,6 +1,8 @@
 """Effects of real machines that are hidden in simulated ones and must be identified.
-The simulation shares no code with the effects.  Fresh rows belong to the same machine
-at configurations unknown to the diagnosis."""
+
+The simulation shares no code with the effects. Fresh rows belong to the same machine at
+configurations unknown to the diagnosis.
+"""
 
 from dataclasses import replace
 

@@ -1,6 +1,8 @@
-"""Exports of device programs, all with the same exact readings. The readings come from
-the closed form of a planar arm, so campaigns imported from any of these files have
-deviations of the order of round-off."""
+"""Exports of device programs, all with the same exact readings.
+
+The readings come from the closed form of a planar arm, so campaigns imported from any
+of these files have deviations of the order of round-off.
+"""
 
 import json
 
@@ -296,7 +298,7 @@ def test_duplicate_commands_are_reported(lab, run):
     assert 'found column "q.one" twice' in refused(lab, run, body)
 
 
-# -- lengths and axes with a wrong interpretation ---------------------------
+# -- lengths and axes with a wrong interpretation -------------------------------------
 
 
 def changed(change):
