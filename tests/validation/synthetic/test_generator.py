@@ -1,8 +1,8 @@
 """Synthetic campaigns: each effect compared with a closed form derived beforehand.
 
 The robot of most tests is one drive that turns a beam about z: L = 0.5 m, tip at
-(L cos q, L sin q, 0).  Each test states the expected value, to first order in small quantities
-unless marked as exact.
+(L cos q, L sin q, 0).  Each test states the expected value, to first order in small
+quantities unless marked as exact.
 """
 
 import math
