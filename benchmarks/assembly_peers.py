@@ -1,4 +1,4 @@
-"""Problems (22) and (21) solved by cvxpy, Clarabel and moreau, for assembly_speed."""
+"""Solve problems (22) and (21) by cvxpy, Clarabel and moreau, for assembly_speed."""
 
 import time
 import warnings
@@ -38,7 +38,7 @@ def closure_matrices(
 
 
 def loaded_matrices(posture: Posture) -> tuple[NDArray, ...]:
-    """Return the closure matrices and the loads on their columns, equally scaled."""
+    """Return the closure matrices and the loads on their columns, scaled alike."""
     lin, joints = linearise(posture), virtual_joints(posture.robot)
     loads = all_loads(posture, LOAD, None, GRAVITY)
     small = np.abs(lin.rows @ joints.cones).max()
@@ -53,7 +53,7 @@ def loaded_matrices(posture: Posture) -> tuple[NDArray, ...]:
 
 
 class Dpp:
-    """Problem (22) or (21) with cvxpy parameters, canonicalised only once.
+    """Problem (22) or (21) with cvxpy parameters, which is canonicalised only once.
 
     Entries that are zero at every posture are not made parameters, because cvxpy would
     pass them to the solver as explicit zeros, which doubles the time.
@@ -87,7 +87,7 @@ class Dpp:
         self(data[0])
 
     def __call__(self, data: tuple) -> float:
-        """Return the least value for the closure matrices of another posture."""
+        """Return the minimum for the closure matrices of a new posture."""
         for parameter, value, at in zip(
             self.parameters, data, self.entries, strict=True
         ):
@@ -120,7 +120,7 @@ def clarabel_full(posture: Posture) -> object:
 
 
 def clarabel_reduced(posture: Posture) -> object:
-    """Reduce the problem and solve it by Clarabel; the reduction is timed too."""
+    """Reduce the problem and solve it by Clarabel; timings include the reduction."""
     joints = virtual_joints(posture.robot)
     small = reduce_problem(linearise(posture), joints)
     size = max(np.linalg.norm(small.h), np.linalg.norm(small.G, axis=0).max())
@@ -130,10 +130,10 @@ def clarabel_reduced(posture: Posture) -> object:
 
 
 def moreau_batched(postures: list[Posture]) -> float:
-    """Return the processor time [us] per point of moreau, for one batch of problems.
+    """Return the processor time [us] per point of moreau for one batch of problems.
 
-    The matrices are prepared in advance, but passing them is timed.  NaN without
-    moreau.
+    Matrices are prepared in advance, but passing them is timed.  NaN if moreau is not
+    installed.
     """
     try:
         import moreau
@@ -168,6 +168,6 @@ def moreau_batched(postures: list[Posture]) -> float:
 
 
 def cvxpy_rebuilt(posture: Posture) -> object:
-    """Solve the problem as printed, in SI units, with a new model for each posture."""
+    """Solve the problem as printed, in SI units, with a new model per posture."""
     as_printed._UNIT = 1.0
     return as_printed.energy_as_printed(posture)

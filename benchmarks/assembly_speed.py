@@ -11,16 +11,17 @@ The postures are a 25 mm grid of its workspace.  The program prints:
   (reduction included); a batch of moreau on the full problem (to its tolerance of 1e-8,
   without a certificate); the reference method in numpy; and ``solve_assembly`` for one
   posture and for many (linearisation, reduction and certificate included).  The ratio
-  of cvxpy's DPP time to each time is printed too; - the same for the energy under a
-  force, a moment and weight, with the errors times 1, 0.2 and 0, and for draws of the
-  errors at one posture under these loads; - the same for the margin (21), with
-  compliant joints rigid and free; - the time of other single calls, and of placing many
-  poses; - the share of points with a certified energy at six multiples of the errors,
-  and under four sizes of the load at three of them; and how many points the reference
-  solved.
+  of cvxpy's DPP time to each time is also printed;
+- the same for the energy under a force, a moment and weight, with the errors times 1,
+  0.2 and 0, and for draws of the errors at one posture under these loads;
+- the same for the margin (21), with compliant joints rigid and free;
+- the time of other single calls, and of placing many poses;
+- the fraction of points with a certified energy at six multiples of the errors, and
+  under four load levels at three of them; and the number of points solved by the
+  reference.
 
-The slow methods are run on a sample of the grid, and those of forcefit on the whole
-grid.  Only the batches of forcefit are repeated to select the shortest time.
+Slow methods run on a sample of the grid, those of forcefit on the whole grid.  Only the
+batches of forcefit are repeated to select the shortest time.
 """
 
 # ruff: noqa: E402  one thread must be asked for before numpy is imported
@@ -87,10 +88,10 @@ def workspace(robot: Robot, step: float = 0.025) -> list[Posture]:
 
 
 def timed(solve: Callable[..., object], postures: Iterable) -> float:
-    """Return the processor time [us] per point; count failures, which are included."""
+    """Return the processor time [us] per point, including and counting failures."""
     failed = count = 0
     gc.collect()
-    gc.disable()  # like timeit; a collection takes as long as a thousand calls
+    gc.disable()  # as timeit does; a collection takes as long as a thousand calls
     start = time.process_time()
     for one in postures:
         count += 1
@@ -220,7 +221,7 @@ def print_calls(robot: Robot, postures: list[Posture]) -> None:
 
 
 def print_certified(robot: Robot, postures: list[Posture]) -> None:
-    """Print the shares of certified points and of points solved by the reference."""
+    """Print the fractions of certified points and of points solved by the reference."""
     at = together(postures)
     print(f"\ncertified energies of {len(postures)} points")
     for kappa in (0.0, 0.05, 0.1, 0.2, 0.5, 1.0):

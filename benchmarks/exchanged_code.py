@@ -1,10 +1,10 @@
-"""Faults in functions that are already loaded: their code is exchanged in a fork.
+"""Inject faults into loaded functions by exchanging their code in a fork.
 
 All tests are collected once, and all modules are imported.  For each fault the process
 forks, exchanges the code of the functions with the fault, and runs the tests that
-execute its line.  This takes hundredths of a second in addition to the tests, instead
-of the seconds that a new process needs.  Only a statement within a function can be
-exchanged in this way, because values computed by an import are already in use.
+execute its line.  This adds hundredths of a second to the tests, instead of the seconds
+that starting a new process takes.  Only statements within functions can be exchanged in
+this way, because values computed at import are already in use.
 """
 
 import functools
@@ -63,7 +63,7 @@ class Session:
                 self.functions[found.__code__.co_filename].append(found)
             elif type(found) is functools._lru_cache_wrapper:
                 found.cache_clear()
-        # the forks share the memory of objects that they do not change
+        # Forks share the memory of objects that they do not modify.
         gc.collect()
         gc.freeze()
 

@@ -1,4 +1,4 @@
-"""Random faults: wrong expressions of one line in the numerical modules.
+"""Generate random faults: wrong one-line expressions in the numerical modules.
 
 The probability of a file is proportional to its length.  Pages and pictures
 (``report.py``, ``plot.py``, ``figures.py``, ``scene.py``) are excluded, because their
@@ -7,7 +7,7 @@ numbers are tested where they are computed.
 An operator is replaced by its opposite (``+`` and ``-``, ``<`` and ``>=``, ``and`` and
 ``or``), a sign or a ``not`` is removed, or a number is increased by one, as mutmut and
 cosmic-ray do; a tolerance of 1e-9 becomes 1.  A number above ten becomes one, because
-401 instead of 400 steps would not be a fault.  Sizes that ``reshape`` has to find are
+401 steps instead of 400 would not be a fault.  Sizes that ``reshape`` infers are
 excluded, because any negative number has the same effect.
 """
 
@@ -88,12 +88,12 @@ def places(tree: ast.Module) -> Iterator[ast.AST]:
 
 
 def is_left_open(node: ast.AST) -> bool:
-    """Return whether a node is a size that numpy computes, given as -1."""
+    """Return whether a node is -1, a size that numpy infers."""
     return isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub)
 
 
 def wrong(node: ast.AST) -> list[ast.AST]:
-    """Return the variants of a node with one fault each."""
+    """Return variants of a node that contain one fault each."""
     if isinstance(node, ast.Constant):
         value = node.value
         assert isinstance(value, int | float)
@@ -177,7 +177,7 @@ def statement(tree: ast.Module, row: int) -> tuple[range, str | None, bool]:
         return rows, classes[-1], False
     targets = getattr(last, "targets", None) or [getattr(last, "target", None)]
     names = [n.id for n in targets if isinstance(n, ast.Name)]
-    # the body of a lambda is executed after the import
+    # A lambda body is executed after the import.
     return rows, names[0] if names else path_name(last), False
 
 

@@ -1,13 +1,12 @@
-"""Give every reader and the options of every command invalid input; count failures.
+"""Feed invalid input to every reader and command option, and count failures.
 
 Run from the repository's root: ``python benchmarks/fuzz.py [COUNT] [--seed N]
 [--every-option]``.  Each input is a valid command of ``fuzz_seeds.py``,
 ``fuzz_foreign.py`` or ``fuzz_machines.py`` whose files or words are changed by
 ``fuzz_mutations.py``.  The command runs in a fork of a process that has imported and
-compiled everything.  ``fuzz_faults.py`` checks the result.  The seed and the number of
-an input determine it; ``--only I`` runs the input with number I.
-With ``--every-option``, no input is random: each option with a value, of each command,
-is given each value of EXTREMES once.
+compiled everything.  ``fuzz_faults.py`` checks the result.  Seed and number determine
+an input; ``--only I`` runs input number I. With ``--every-option``, nothing is random:
+each option of each command that takes a value receives each value of EXTREMES once.
 
 Requirements on each command: the exit status is 0, 1, 2 or 130; with status 2, stderr
 contains one line that begins with ``forcefit: ``, and no new file exists; stderr
@@ -57,7 +56,7 @@ _HEAD = struct.Struct("<Q")
 
 
 class Asked(NamedTuple):
-    """Settings of a run; with equal settings, each number has the same input."""
+    """Settings of a run, which determine the input of each number."""
 
     seed: int
     options: dict[str, list[tuple[str, bool]]]
@@ -141,7 +140,7 @@ def prepare(folder: Path, commands: list[str]) -> None:
             took = time.process_time() - began
             if took > 0.5:
                 print(f"{took:6.1f} s  {command[:90]}", flush=True)
-            # a wrong word makes some of the commands stop early, which saves time
+            # An invalid word makes some commands stop early, which saves time.
             if status not in {0, 1} and ",x" not in command and "solid" not in command:
                 print(f"not sound, {status}: {command}\n   {err[-300:]}")
     os.chdir(folder)

@@ -1,10 +1,10 @@
-"""Checks of the result of a command that was run with invalid input."""
+"""Check the result of a command that was run with invalid input."""
 
 import json
 import re
 from pathlib import Path
 
-# lines of progress, verdicts, and messages of the mesher
+# Lines of progress, verdicts, and messages of the mesher.
 _OURS = re.compile(
     r"forcefit: |warning: |[^\n]*[━╸╺]|\s*$|[^\n]*: not written, |mesh \d"
     r"|([a-z -]+|\S+) *\d+/\d+|\S+ +\d+% |\d[\d,]* unknowns|[a-z -]+: \d+ of \d+"
@@ -12,7 +12,7 @@ _OURS = re.compile(
 
 
 def faults(words, status, out, err, before, after, left) -> list[str]:
-    """Return the faults of a result; an empty list if it is correct."""
+    """Return the faults of a result, an empty list if it is correct."""
     faults = []
     if status not in {0, 1, 2, 130}:
         faults.append(f"status {status}")

@@ -1,7 +1,7 @@
-"""Valid files of other programs and commands that read them: ``fuzz.py --foreign``.
+"""Provide valid files of other programs and commands that read them.
 
-Commands of forcefit write the robots and matrices.  This file creates the exports of
-measuring devices.
+They are used by ``fuzz.py --foreign``.  Commands of forcefit write the robots and
+matrices; this file creates the exports of measuring devices.
 """
 
 from pathlib import Path

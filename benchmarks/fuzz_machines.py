@@ -1,4 +1,4 @@
-"""Valid files of robots with loops and of measured robots, and their commands.
+"""Provide valid files of robots with loops and of measured robots, with commands.
 
 The files are: robots with loops, one of them with loops that rounded dimensions leave
 open; a campaign, with the robot and the covariance that its diagnosis saves; exports of
@@ -10,7 +10,7 @@ from pathlib import Path
 
 from fuzz_seeds import BAR, OBJECT
 
-# a parallelogram linkage with a pin 20 um out of its plane, so that no loop closes
+# A parallelogram linkage with a pin 20 um out of plane, so that no loop closes.
 ROUNDED = BAR.replace(
     "translation = [0.5, 0.0, 0.0]", "translation = [0.5, 0.0, 2e-5]", 1
 )
@@ -61,7 +61,7 @@ MACHINES = [
     (3, "stiffness fea solid.msh --base z=0 --tip z=7 --young 7e10 --poisson 0.3"),
 ]  # fmt: skip
 
-# the optional package gmsh reads STEP files; without it these commands are left out
+# the optional package gmsh reads STEP files; without it, these commands are omitted
 STEP = [
     (4, "stiffness fea two.step --part list --json -"),
     (3, "stiffness fea two.step#solid1 --base z=0 --tip z=7 --young 7e10 --poisson "

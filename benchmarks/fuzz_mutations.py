@@ -1,4 +1,4 @@
-"""Random changes of the files and the words of a command, for ``fuzz.py``."""
+"""Mutate the files and the words of a command at random, for ``fuzz.py``."""
 
 import csv
 import io
@@ -100,7 +100,7 @@ def _coded(text: str) -> bytes:
 
 
 def _token(content: bytes, random: Random, _: str) -> bytes:
-    """Replace a number, string or name by another one of the file or an unusual one."""
+    """Replace a number, string or name by one of the file or an unusual one."""
     text = _text(content)
     tokens = list(_TOKEN.finditer(text))
     if not tokens:
@@ -283,7 +283,7 @@ def change_words(
         random: generator of random numbers.
 
     Returns:
-        The changed words; the first two, which name the command, are not changed.
+        The changed words; the first two, which name the command, stay unchanged.
     """
     words = list(words)
     for _ in range(random.choice([1, 1, 1, 2, 3])):

@@ -1,4 +1,4 @@
-"""Valid files of every kind, and valid commands that read them, for ``fuzz.py``."""
+"""Provide valid files of every kind and commands that read them, for ``fuzz.py``."""
 
 from pathlib import Path
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from tests.robot_files_for_tests import FOUR_BAR
 
-# the parallelogram linkage of the tests; its loop does not close if it has errors
+# The parallelogram linkage of the tests, whose loop does not close with errors.
 BAR = FOUR_BAR.replace(
     "mass = 1.2", "mass = 1.2\ngeometric_error = [1e-4, 1e-4, 1e-4, 1e-5, 1e-5, 1e-5]"
 )
@@ -146,7 +146,7 @@ f 2 3 4
 f 1 4 3
 """
 
-# share of the inputs and words of each command; names of output files begin with "new"
+# Relative frequency and words of each command; names of output files begin with "new".
 COMMANDS = [
     (9, "assembly solve bar.toml --quantities margin"),
     (9, "assembly solve bar.toml --load fx=10,mz=1 --gravity y=-9.81 --json -"),
@@ -256,8 +256,7 @@ MADE = [
     "assembly sweep bar.toml --grid q.crank=1:1.2:0.1 -o swept.nc --near 0.1",
     "assembly statistics bar.toml --errors errors.toml --draws 40 -o draws.nc",
 ]
-# commands that are killed after the solution and before the output, so that their
-# journals remain
+# Commands that are killed between solution and output, so that their journals remain.
 KILLED = [
     "assembly sweep bar.toml --grid q.crank=1:1.2:0.1 -o kept.nc --near 0.1",
     "assembly statistics bar.toml --errors errors.toml --draws 40 -o drawn.nc",

@@ -1,16 +1,16 @@
-"""Interrupt commands at random moments, and count the results that are lost.
+"""Interrupt commands at random moments and count lost results.
 
 Run from the repository's root: ``python benchmarks/kills.py [KILLS] [--seed N]``.  The
 four commands are ``assembly sweep``, ``statistics``, ``tolerances`` and ``validation
 diagnose``.  They run in forks of a process that has imported and compiled everything.
-They are stopped by SIGKILL, SIGTERM or Ctrl-C, or by a full disk.  A limit on the size
-of files simulates the full disk, or a small tmpfs if one may be mounted.  Between two
-runs, a journal is cut or one of its bits is flipped.  Finally the same command runs to
-its end, and its files are compared with those of an undisturbed run.
+They are stopped by SIGKILL, SIGTERM, Ctrl-C or a full disk, which is simulated by a
+limit on file sizes or, where one may be mounted, by a small tmpfs.  Between runs, a
+journal is truncated or one of its bits is flipped.  Finally, the same command runs to
+completion, and its files are compared with those of an undisturbed run.
 
-A point is lost if a child had written it to the journal, no cut or flipped bit affected
-it, and it is missing or solved again.  A file is half-written if it exists under its
-final name but differs from that of the undisturbed run.
+A point is lost if it had been written to the journal, was not affected by a truncation
+or flipped bit, and is nevertheless missing or solved again.  A file is half-written if
+it exists under its final name but differs from that of the undisturbed run.
 """
 
 import argparse
@@ -53,17 +53,17 @@ shared = mmap.mmap(-1, 16)
 
 
 def count(place: int, more: int) -> None:
-    """Add to a number that the parent reads after the child's death."""
+    """Increase a counter that the parent reads after the child has died."""
     struct.pack_into("<q", shared, place, counted(place) + more)
 
 
 def counted(place: int) -> int:
-    """Return a number that the last child has counted."""
+    """Read a counter of the last child."""
     return struct.unpack_from("<q", shared, place)[0]
 
 
 def watch() -> None:
-    """Count points that are solved, and points that the journal confirmed."""
+    """Count the points solved and the points confirmed by the journal."""
     solve, draw, add = (
         sweeps.solve_points,
         monte_carlo.Experiment.solve,
@@ -117,7 +117,7 @@ def start(words: list[str], limit: int | None = None) -> int:
 
 
 def run_here(words: list[str]) -> None:
-    """Run a command in this process, so that its code is compiled for children."""
+    """Run a command in this process, so that its code is compiled for the children."""
     before = sys.argv, sys.stdout, sys.stderr
     sys.argv, sys.stdout, sys.stderr = (
         ["forcefit", *words],
@@ -192,7 +192,7 @@ def points_in_all(case: Case) -> int:
 
 
 def spoil(path: Path, case: Case, random: Random, counts: Counter) -> int:
-    """Cut a journal, flip a bit or do nothing; return the points that must remain."""
+    """Truncate a journal, flip a bit or do nothing; return the intact points."""
     content = bytearray(path.read_bytes())
     sound = records(bytes(content), case)
     everything = sum(points for *_, points in sound)
@@ -214,7 +214,7 @@ def spoil(path: Path, case: Case, random: Random, counts: Counter) -> int:
 
 
 def trial(case: Case, random: Random, counts: Counter, small: bool) -> None:
-    """Disturb a command several times, let it end, and compare its files."""
+    """Disturb a command several times, let it finish, and compare its files."""
     path, standing = Path("out.nc.journal"), 0
     while random.random() < 0.75:
         (way,) = random.choices(list(WAYS), list(WAYS.values()))
@@ -272,7 +272,7 @@ def removed(case: Case, standing: int) -> bool:
 
 
 def solved_again(case: Case, standing: int) -> int:
-    """Return the points that the last child solved although the journal had them."""
+    """Return the points that the last child solved despite the journal."""
     return max(0, counted(SOLVED) - (case.points - standing)) if case.header else 0
 
 

@@ -1,4 +1,4 @@
-"""The commands that ``kills.py`` disturbs, and the files that they read."""
+"""Define the commands that ``kills.py`` disturbs and their input files."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -33,7 +33,7 @@ SHARES = {"sweep": 6, "statistics": 5, "tolerances": 3, "diagnose": 3}
 
 @dataclass
 class Case:
-    """A command and the results of its undisturbed run.
+    """A command together with the results of its undisturbed run.
 
     Attributes:
         words: words of the command.

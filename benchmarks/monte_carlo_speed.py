@@ -1,12 +1,11 @@
-"""Rate of certified energy problems at one posture, for several sizes of the errors.
+"""Measure the rate of certified energy problems at one posture.
 
-The robot is that of the paper.  All its errors delta l of section IV are drawn
-uniformly with random signs, up to a share of their size in the paper.  For each share,
-the program prints how many draws need no energy, how many were certified, and how many
-the reference solved.  It also prints the draws per second of processor time, the time
-for 1e7 draws on two cores at this rate, and the draws per second of wall time on two
-threads.
-``python benchmarks/monte_carlo_speed.py [DRAWS]``.
+All errors delta l of section IV of the paper's robot are drawn uniformly with random
+signs, up to a fraction of their size in the paper.  For each fraction, the program
+prints how many draws store no energy, how many are certified, and how many the
+reference solved.  It also prints the draws per second of processor time, the time for
+1e7 draws on two cores at this rate, and the draws per second of wall time on two
+threads. ``python benchmarks/monte_carlo_speed.py [DRAWS]``.
 """
 
 import sys
@@ -26,7 +25,7 @@ from forcefit.assembly.statistics.linear_response import LinearResponse, linear_
 FRAMES = ("elbow_a", "link_a", "elbow_b", "link_b", "loop2_platform", "tip")
 PAPER = np.array([2e-2] * 3 + [2e-4] * 3)  # [rad, m]
 SHARES = (1.0, 0.5, 0.2, 0.1, 0.05, 0.02)
-# number of draws in a block; number of draws and time [s] that are to be reached
+# Number of draws per block; target number of draws and target time [s].
 BLOCK, TARGET, GOAL = 4096, 1e7, 600.0
 
 
@@ -44,7 +43,7 @@ def paper_sources(share: float) -> ErrorSources:
 
 
 def solve_block(one: LinearResponse, sources: ErrorSources, block: int) -> NDArray:
-    """Return numbers of draws in a block: no energy, certified, by the reference."""
+    """Count the draws of a block: no energy, certified, solved by the reference."""
     errors = sources.errors(sources.draw(block * BLOCK, BLOCK, seed=1))
     draws = one.solve(errors)
     reference = draws.method == "reference"
@@ -53,7 +52,7 @@ def solve_block(one: LinearResponse, sources: ErrorSources, block: int) -> NDArr
 
 
 def run(one: LinearResponse, sources: ErrorSources, blocks: int, threads: int) -> tuple:
-    """Return draws per second of processor and wall time, and shares of the draws."""
+    """Return draws per second of processor and wall time, and fractions of draws."""
     clock, processor = time.perf_counter(), time.process_time()
     with threadpool_limits(1), ThreadPoolExecutor(threads) as pool:
         counts = list(pool.map(lambda b: solve_block(one, sources, b), range(blocks)))

@@ -1,4 +1,4 @@
-"""Random one-line faults in the numerical modules, and the tests that detect them.
+"""Inject random one-line faults in the numerical modules and find detecting tests.
 
     python -m benchmarks.mutants [COUNT] [--seed N] [--only FOLDER] [--files PATH ...]
         [--seconds S] [--traced FOLDER]
@@ -7,16 +7,16 @@ The default tests of all folders and ``tests/test_answers.py`` are run once and 
 which test executes which line, and how long it takes.  The trace is stored in the
 folder after --traced.  It is repeated for folders with changed tests, and ignored for
 changed files.  Then the tests that execute the line of a fault are run, nearest and
-shortest first, for up to S seconds.  The first failure is sufficient.  A fault that
-only longer or other tests would detect counts as survived.
+shortest first, for up to S seconds or until the first failure.  A fault that only
+longer or other tests would detect counts as surviving.
 
-Faults within functions are exchanged in a process that has loaded everything
-(``exchanged_code.py``).  Other faults are written into a copy of the source tree.
-Their tests run in a fork of this process, which has imported all libraries, at first
-for an eighth of S seconds.  C++ code is excluded.
+Faults within functions are injected into a process that has loaded everything
+(``exchanged_code.py``).  Other faults are written into a copy of the source tree. Their
+tests run in a fork of this process, which has imported all libraries, at first for an
+eighth of S seconds.  C++ code is excluded.
 
 With --files, every fault of these files is tested instead of COUNT random ones.  The
-program prints the share of detected faults and lists all others.
+program prints the fraction of detected faults and lists all others.
 """
 
 import argparse
@@ -122,7 +122,7 @@ def asked_for(asked: argparse.Namespace) -> list[Fault]:
 
 
 def main() -> None:
-    """Test the faults, print the share of detected ones, and list the others."""
+    """Test the faults, print the fraction detected, and list the others."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("count", nargs="?", type=int, default=300)
     parser.add_argument("--seed", type=int, default=1)
@@ -136,7 +136,7 @@ def main() -> None:
     began, survived = time.monotonic(), 0
     with tempfile.TemporaryDirectory() as scratch:
         tree = Path(scratch) / "forcefit"
-        # the copy contains the compiled modules
+        # The copy includes the compiled modules.
         left_out = shutil.ignore_patterns(".git", ".venv", ".*_cache", "*_study")
         shutil.copytree(ROOT, tree, symlinks=True, ignore=left_out)
         kept = asked.traced or Path(scratch)

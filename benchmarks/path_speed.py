@@ -1,12 +1,12 @@
-"""Time of a path of 1000 points with inertial loads, compared with single points.
+"""Time a path of 1000 points with inertial loads, compared with single points.
 
 Three built-in robots, whose beams and platform have mass, move over 0.1 m with the
 quintic profile at 20 G.  Both methods compute motion, loads, problem (22) with and
 without acceleration, and K_C.  ``point by point`` calls the same public functions for
 each instant in a loop.  Stress, verdicts on the postures, and the first natural
 frequency at five postures are computed only for the whole path.  The table shows the
-least wall and processor time of several runs, and the ratio of processor times.
-Run ``python -m benchmarks.path_speed``.
+minimum wall and processor times of several runs, and the ratio of processor times. Run
+``python -m benchmarks.path_speed``.
 """
 
 import time
@@ -92,7 +92,7 @@ def solve_some(robot: Robot, path: Trajectory) -> None:
 
 
 def least(run: Callable[[], object], runs: int) -> tuple[float, float]:
-    """Return the least wall time and processor time [s] of several runs."""
+    """Return the minimum wall and processor times [s] of several runs."""
     spent = []
     for _ in range(runs):
         start = time.perf_counter(), time.process_time()

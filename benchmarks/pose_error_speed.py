@@ -12,14 +12,15 @@ The program prints the processor time [ms] per point until the bounds differ by 
 or 1e-6 m, for SCIP, Gurobi, a simple branch and bound in this file (secants above the
 squares, Clarabel at every node), ``bound_pose_error`` for single points, and
 ``bound_pose_error`` for all points together; and the ratios to the last.  Then it
-prints the time [s] of a whole study: four quantities, two assumptions, 1113 points.
+prints the time [s] of a complete study with four quantities, two assumptions and 1113
+points.
 
 The other solvers receive the reduced problem with unit cones and with poses in mrad or
-mm, so their times include no modelling except their own objects.  The times of forcefit
-include everything after the frames are placed: problem (22), the loaded clearances, the
-reduction and the search.  A solver that is not installed, or whose licence does not
-allow the size, is reported in its line.  ``pip install forcefit[benchmarks]`` installs
-both.
+mm, so their times include no modelling except creating their own objects.  The times of
+forcefit include everything after the frames are placed: problem (22), the loaded
+clearances, the reduction and the search.  A solver that is not installed, or whose
+licence does not allow the size, is reported in its line.  ``pip install
+forcefit[benchmarks]`` installs both.
 """
 
 # ruff: noqa: E402  one thread must be asked for before numpy is imported
@@ -193,7 +194,7 @@ def _secant_node(
     if v is None:
         return None
     x = c + X @ v
-    # the dual value is an upper bound for every status of the solver
+    # The dual value is an upper bound for any solver status.
     dual = X.T @ slope - H.T @ z[: len(k)] - sides.T @ z[len(k) : len(k) + 6]
     value = b[: len(k) + 6] @ z[: len(k) + 6] + cone_sizes(dual, group).sum()
     return float(value + slope @ c - low @ high), x
@@ -216,7 +217,7 @@ def sampled(
             raise
         return np.nan, [], f"refused: {error}"
     late = sum(a.upper - a.lower > 1.01 * TOLERANCE for a in answers)
-    note = f"{late} of {len(answers)} wider than asked" if late else ""
+    note = f"{late} of {len(answers)} wider than requested" if late else ""
     return float(np.mean([a.taken for a in answers])) * 1e3, answers, note
 
 

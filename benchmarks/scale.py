@@ -1,13 +1,13 @@
-"""Time and memory for a thousand to a million points, and for ten million energies.
+"""Measure time and memory for up to a million points and ten million energies.
 
     python -m benchmarks.scale [LARGEST]
 
 A sweep of the four-bar linkage with twelve errors computes energy, margins and bounds
 of the pose error over 1000 crank angles and 1, 10, 100, ... draws, up to LARGEST points
 (default 10^6).  Then 10^7 energies of the paper's robot at one posture are computed in
-blocks.  Each case runs in a separate process.  Printed are points, processor seconds,
-microseconds of processor time per point (without start-up), largest memory and file
-size.
+blocks.  Each case runs in a separate process.  The table lists points, processor
+seconds, microseconds of processor time per point (without start-up), peak memory and
+file size.
 """
 
 import resource
@@ -45,7 +45,7 @@ def sweep(draws: int, path: Path) -> int:
 
 
 def energies(count: int) -> int:
-    """Compute least energies at one posture, each with different errors."""
+    """Compute minimum energies at one posture, each with different errors."""
     from forcefit.assembly.kinematics.posture import place_robot
     from forcefit.assembly.linear.energy import solve_assembly
     from forcefit.assembly.robots import load_robot

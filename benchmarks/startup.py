@@ -1,10 +1,10 @@
-"""Start-up time of commands: processor times relative to an import of numpy and scipy.
+"""Measure the start-up time of commands relative to importing numpy and scipy.
 
 Run ``python benchmarks/startup.py [RUNS]``.  The user and system time of each command,
 summed over its threads, is divided by that of ``import numpy, scipy.linalg``.  The
-table shows medians of RUNS (7) runs.  The commands alternate, so that other work on the
-machine slows all of them equally.  Each command runs once before, so that compiled code
-is on disk.  The exit status is 1 if a ratio exceeds its limit.
+table shows medians of RUNS (7) runs.  The commands alternate, so that other load on the
+machine affects all of them equally. Each command runs once beforehand, so that compiled
+code is on disk.  The exit status is 1 if a ratio exceeds its limit.
 """
 
 import os

@@ -1,4 +1,4 @@
-"""Time to assemble 100 000 machines in steps, with clearances, on one core.
+"""Time the stepwise assembly of 100 000 machines with clearances on one core.
 
 Two built-in robots are assembled with random errors of 50 um and 0.1 mrad.  A fixture
 holds the platform, the five closures are joined one after another, and the fixture is
@@ -23,7 +23,7 @@ SPREAD = np.repeat([1e-4, 5e-5], 3)  # [rad, m] standard deviation of the errors
 
 
 def plan_of(robot: Robot) -> Plan:
-    """Return the plan: hold the platform, join all closures, release the platform."""
+    """Return a plan that holds the platform, joins all closures and releases it."""
     fixture = Fix("fixture", robot.platform, dict.fromkeys(SCREW, 0.0))
     joins = [Join(f"join {i}", part) for i, part in enumerate(robot.closures, 1)]
     return Plan((fixture, *joins, Release("release", ("fixture",))))

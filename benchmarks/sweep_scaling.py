@@ -1,4 +1,4 @@
-"""Print the times of a sweep in this process, on one worker process, and on two.
+"""Time a sweep in this process, on one worker process, and on two.
 
 Run ``python -m benchmarks.sweep_scaling [DRAWS]`` from the root of the repository.  The
 sweep is that of the five-bar robot at 100 postures with DRAWS draws of errors each.
@@ -7,9 +7,9 @@ first ratio, one worker to this process, shows the overhead of Dask.  The second
 two workers to one, shows how the sweep scales.  The files are compared byte by byte.
 
 For comparison, the scaling of the machine itself is measured with the same workers,
-alternating with the sweeps.  Two programs run on one worker and on two at once: a loop
-of sums and products, and the points of the sweep without sending, storing or writing.
-The best of five times is used.  If other programs run, as the printed load shows,
+alternating with the sweeps.  A loop of sums and products, and the points of the sweep
+without sending, storing or writing, run on one worker and on two simultaneously.  The
+best of five times is used.  If other programs are running, as the printed load shows,
 processor seconds are more reliable.
 """
 
@@ -64,7 +64,7 @@ def points(draws):
 
 
 def at_once(client, workers, work, draws):
-    """Return the longest time [s] of the same work on all given workers at once."""
+    """Return the longest time [s] of equal work on all given workers simultaneously."""
     asked = [
         client.submit(work, draws, workers=[worker], pure=False) for worker in workers
     ]

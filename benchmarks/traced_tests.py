@@ -1,4 +1,4 @@
-"""Run tests in forks of one process, and record which test executes which line."""
+"""Run tests in forks of one process and record which test executes which line."""
 
 import json
 import os
@@ -114,7 +114,7 @@ class Tracer:
             self.took = time.process_time() - began
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        """Only a test that passes can see a fault."""
+        """Only a passing test can detect a fault."""
         if report.when == "call" and report.passed:
             self.seconds[report.nodeid] = self.took
 
@@ -128,7 +128,7 @@ class Trace:
 
     def of(self, path: Path, rows: range | set[int]) -> set[str]:
         """Return the tests that execute one of the given rows of a file."""
-        # the trace may contain paths of another copy of the source tree
+        # The trace may contain paths of a different copy of the source tree.
         files = [f for f in self.lines.measured_files() if f.endswith(f"/{path}")]
         tests = {
             test.partition("|")[0]
@@ -187,7 +187,7 @@ def importers(path: Path) -> list[Path]:
 
 
 def traced(tree: Path, kept: Path) -> Trace:
-    """Return the trace of the default tests of each folder; use a stored trace.
+    """Return the trace of the default tests of each folder, from storage if possible.
 
     A folder is traced again if one of its tests has changed since the stored trace.
     """

@@ -1,4 +1,4 @@
-"""Store the results of every command, and compare them after a change of the code.
+"""Store the results of every command and compare them after a code change.
 
     python benchmarks/unchanged.py store FOLDER     # before the change
     python benchmarks/unchanged.py compare FOLDER   # after it
@@ -7,8 +7,7 @@ All built-in robots receive random errors and are stored as robot files.  For ea
 them, the program runs ``solve``, its margins, its exact state and ``error``.  It also
 runs one sweep, one statistics run, one diagnosis, one cross-check, and one K_E by
 finite elements and by beams.  If numbers are not bit-identical, the largest relative
-difference is printed.  Times, versions and the rounding errors in certificates are not
-compared.
+difference is printed.  Times, versions and round-off in certificates are not compared.
 """
 
 import json
@@ -22,9 +21,9 @@ import numpy as np
 
 ROOT = Path(__file__).parents[1]
 ROBOTS = ("irsbot2", "four_bar", "five_bar", "3rrr", "hexapod", "delta", "orthoglide")
-# keys whose values differ between equal runs
+# Keys whose values differ between identical runs.
 PASSING = ("seconds", "time", "version", "sha256", "created", "path", "file", "output")
-# keys of certificates, whose values are rounding errors
+# Keys of certificates, whose values are round-off.
 CERTIFICATES = ("certificate", "residual", "gap", "excess", "linearisation_error")
 SMALLEST = 1e-9  # [SI] an array with only smaller numbers counts as rounded zeros
 
@@ -134,7 +133,7 @@ def leaves(value: Any, place: str = "") -> dict[str, Any]:
 
 
 def difference(was: Any, now: Any) -> tuple[float, list[str]]:
-    """Return the largest difference over its array's largest number, and other ones."""
+    """Return the largest difference relative to its array's maximum, and others."""
     before, after = leaves(was), leaves(now)
     gap, other = 0.0, sorted(before.keys() ^ after.keys())
     sizes: dict[str, float] = {}
@@ -155,7 +154,7 @@ def difference(was: Any, now: Any) -> tuple[float, list[str]]:
 
 
 def main() -> None:
-    """Store or compare results; return status 1 for more than rounding differences."""
+    """Store or compare results; return status 1 if differences exceed round-off."""
     what, folder = sys.argv[1], Path(sys.argv[2]).resolve()
     if what == "store":
         write_robots(folder)

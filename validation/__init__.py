@@ -1,6 +1,6 @@
-"""Comparisons of the model with a multibody simulation and with measured data.
+"""Compare the model with a multibody simulation and with measured data.
 
-Start with ``crosscheck/crosscheck.py`` for the simulation, and with
+Start with ``crosscheck/crosscheck.py`` for simulations, or with
 ``diagnosis/diagnose.py`` for measured data.
 """
 

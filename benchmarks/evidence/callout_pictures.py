@@ -39,7 +39,7 @@ SIZES = 0.040, 0.030  # [m] sides of the rectangular face; first is the diameter
 ALONG = np.array([1.0, 0.0])
 GREY, BLUE, RED = "0.85", "tab:blue", "tab:red"
 _CORNERS = ((1.0, 0.0), (0.0, 1.0), (1.0, 1.0), (-1.0, 1.0))
-# factor to the unit in the pictures, and label, for each component of a screw
+# Factor to the unit in the pictures, and label, for each screw component.
 UNITS = {0: (1e3, "tilt RX [mrad]"), 1: (1e3, "tilt RY [mrad]"),
          3: (1e6, "shift TX [µm]"), 4: (1e6, "shift TY [µm]"),
          5: (1e6, "shift TZ [µm]")}  # fmt: skip
@@ -49,7 +49,7 @@ def outline(zone: Zone, first: int, second: int) -> np.ndarray:
     """Return (k, 2) the outline of a zone projected on two components, in their units.
 
     Args:
-        zone: of a feature.
+        zone: zone of a feature.
         first: component along x, 0 to 5 for RX to TZ.
         second: component along y.
     """
@@ -83,7 +83,7 @@ def extremes(zone: Zone, first: int, second: int, arm: float) -> list[np.ndarray
 
 
 def bore(panel: Axes, zone: Zone, width: float | None) -> None:
-    """Draw the axis of a bore in its farthest positions, from the side."""
+    """Draw the axis of a bore in its extreme positions, from the side."""
     z = np.array([-LENGTH / 2, LENGTH / 2])
     if width is not None:
         panel.fill_betweenx(z * 1e3, -width * 5e5, width * 5e5, color=GREY)
@@ -96,7 +96,7 @@ def bore(panel: Axes, zone: Zone, width: float | None) -> None:
 
 
 def face(panel: Axes, zone: Zone, width: float | None) -> None:
-    """Draw a face in its farthest positions, from the side."""
+    """Draw a face in its extreme positions, from the side."""
     x = np.array([-SIZES[0] / 2, SIZES[0] / 2])
     if width is not None:
         panel.fill_between(x * 1e3, -width * 5e5, width * 5e5, color=GREY)
@@ -147,7 +147,7 @@ def length(left: Axes, right: Axes) -> None:
 
 
 def maximum_material(left: Axes, right: Axes) -> None:
-    """Draw the zones of the least and of the largest hole 12 H7."""
+    """Draw the zones of the smallest and the largest hole 12 H7."""
     for hole, colour in ((18e-6, RED), (0.0, BLUE)):
         width = 50e-6 + hole
         ends = outline(axis_position(width, LENGTH), 3, 4)

@@ -1,4 +1,4 @@
-"""Position error of simulated robots before and after compensation.
+"""Evaluate the position error of simulated robots before and after compensation.
 
     python benchmarks/evidence/compensation.py OUT.json --count 20 [--first 0]
         [--robots arm6]
@@ -8,9 +8,8 @@ with one or two hidden effects from the library or outside it, each five times a
 as the noise.  Readings of the robot are simulated and diagnosed, and the identified
 robot is used to correct commands at configurations that were not measured.  The robot
 is then simulated with the corrected commands.  The error is the distance from the
-required position, without noise and without the measuring device.  The error is also
-given as the reading of a device with this noise over the noise; it is 1 for a perfect
-robot.
+target position, without noise and device errors.  It is also given as the reading of a
+device with this noise, divided by the noise, which is 1 for a perfect robot.
 """
 
 import argparse

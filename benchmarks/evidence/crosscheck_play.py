@@ -1,4 +1,4 @@
-"""Cross-checks with clearances: rate of convergence, time and agreement.
+"""Evaluate cross-checks with clearances: convergence rate, time and agreement.
 
 Run ``python benchmarks/evidence/crosscheck_play.py [draws [robot ...]]``; 120 draws of
 each robot take several minutes and print a table of ``docs/crosscheck.md``.

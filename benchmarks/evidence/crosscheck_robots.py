@@ -1,4 +1,4 @@
-"""Additional robots on which the cross-check is evaluated.
+"""Define additional robots on which the cross-check is evaluated.
 
 ``hexapod`` is a Gough-Stewart platform with six legs of steel tubes.  ``three_rrr`` is
 a planar 3-RRR robot, which has an overconstraint of six in space.

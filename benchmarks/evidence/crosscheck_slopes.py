@@ -1,4 +1,4 @@
-"""Slopes, limits and residuals of the cross-check over poses and draws.
+"""Evaluate slopes, limits and residuals of the cross-check over poses and draws.
 
 Run ``python benchmarks/evidence/crosscheck_slopes.py [robot ...]``; it takes a minute
 or two and prints the tables of ``docs/crosscheck.md``.

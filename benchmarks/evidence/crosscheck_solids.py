@@ -1,4 +1,4 @@
-"""Cross-check of the paper's robot with its distal links as finite-element solids.
+"""Cross-check the paper's robot with its distal links as finite-element solids.
 
 Run ``python benchmarks/evidence/crosscheck_solids.py``.  It takes one or two minutes,
 mainly to condense the mesh, and prints a table of ``docs/crosscheck.md``.

@@ -1,4 +1,4 @@
-"""Errors due to the assumptions of the virtual-joint model, above 1 % or 20 um.
+"""Find where assumptions of the virtual-joint model cause errors above 1 % or 20 um.
 
 Run ``python benchmarks/evidence/crosscheck_validity.py``; it takes five minutes.  It
 prints the tables of ``docs/validity.md``, and writes the figures and ``validity.json``

@@ -1,4 +1,4 @@
-"""Confusion matrix of the diagnosis over random campaigns with hidden effects.
+"""Compute the confusion matrix of the diagnosis over random synthetic campaigns.
 
     python benchmarks/evidence/diagnosis_confusion.py FOLDER --count 200  # make
     python benchmarks/evidence/diagnosis_confusion.py FOLDER --score      # count
@@ -56,8 +56,8 @@ from forcefit.validation.synthetic.truth import truth_of
 MIX = {"single": 0.52, "none": 0.12, "pair": 0.16, "outside": 0.12, "confounded": 0.08}
 STRENGTHS = (2.0, 5.0, 9.0)
 TRIES = 12  # largest number of draws per case
-FINE = 2e-7  # [m] noise below that of any device, as a lower limit
-VISIBLE = 200.0  # least chi square not explained by public effects
+FINE = 2e-7  # [m] lower limit of the noise, below that of any device
+VISIBLE = 200.0  # minimum chi-square not explained by public effects
 SMALL = 1e-2  # scale of errors and load at which the machine is linear
 
 
@@ -96,7 +96,7 @@ def _measure(kind: str, rng: np.random.Generator) -> Synthetic:
     kinds |= dict.fromkeys(("joint_clearance", "_torque_backlash"), "arm")
     drawn = draw_robot(rng, next((kinds[n] for n in names if n in kinds), None))
     robot, load = drawn.robot, drawn.load
-    # robots with many legs are slow, so half as many rows are simulated
+    # Robots with many legs are slow, so half as many rows are simulated.
     many = len(robot.frames) > 20
     design = CampaignDesign(
         configurations=12 if many else 24,
@@ -114,7 +114,7 @@ def _measure(kind: str, rng: np.random.Generator) -> Synthetic:
         return generate_campaign(
             robot, wanted, design, Noise(), int(rng.integers(2**31)), "springs"
         )
-    # a longer beam cannot be distinguished from a beam that is always warmer
+    # A longer beam cannot be distinguished from a permanently warmer one.
     hidden = Hidden(names[0], _one_beam(names[0], robot, rng))
     fixed = replace(design, temperature="constant")
     return generate_campaign(
@@ -156,7 +156,7 @@ def truth_with_rivals(kind: str, campaign: Synthetic) -> dict[str, Any]:
         for one in rivals
         if one.residual < SAME and tuple(sorted(_plain(one))) != tuple(names)
     }
-    # if the hidden effects are hardly visible, the empty set explains the data too
+    # If the hidden effects are hardly visible, the empty set also explains the data.
     unseen = float(np.nansum((campaign.added / campaign.sigma) ** 2)) < SAME
     accept = [list(one) for one in sorted(same)] + ([[]] if unseen else [])
     if kind == "none":  # near a singularity, declared errors may cause finite motions

@@ -1,4 +1,4 @@
-"""Diagnosis of random robots with three points measured at the same time.
+"""Diagnose random robots with three points measured simultaneously.
 
     python -m benchmarks.evidence.diagnosis_points [--first 710000] [--count 10]
         [--hidden library|outside] [--common 1.0] [--device 5e-6]
@@ -34,7 +34,7 @@ from tests.points_for_tests import DEVICE, MACHINE, simulated, write_points
 sys.path.insert(0, str(Path(__file__).parent))
 from random_robots import draw_robot
 
-# effects that are not drawn, because their size cannot be scaled
+# Effects that are not drawn, because their size cannot be scaled.
 LEFT_OUT = {"joint_clearance", "geometric_stiffening", "self_weight"}
 TRIES = 12
 

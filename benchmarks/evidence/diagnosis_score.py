@@ -1,4 +1,4 @@
-"""Score of the results of ``diagnosis_confusion.py``.
+"""Score the results of ``diagnosis_confusion.py``.
 
 A result is correct if its verdict is definite and names the hidden effects, or a set
 that explains the data equally well.  A definite verdict with any other set is a false
@@ -146,7 +146,7 @@ def _place_and_variable(truth: dict, diagnosis: dict) -> tuple[bool, bool]:
 
 
 def _told(diagnosis: dict) -> str:
-    """Return what was reported, in a few words."""
+    """Summarise a reported result in a few words."""
     if diagnosis["verdict"] == "explained":
         return "+".join(_claimed(diagnosis)) or "geometry or springs"
     return str(diagnosis["verdict"])
@@ -182,7 +182,7 @@ def _inside(truth: dict, diagnosis: dict) -> list[bool]:
 
 
 def _share(right: list[bool]) -> list[float | int | None]:
-    """Return the share of correct results, and their number."""
+    """Return the fraction of correct results, and their number."""
     return [float(np.mean(right)) if right else None, len(right)]
 
 

@@ -1,4 +1,4 @@
-"""Exact equilibrium of the paper's robot at its full errors, over the workspace.
+"""Compute exact equilibria of the paper's robot at full errors over its workspace.
 
 Run ``python -m benchmarks.evidence.exact_irsbot2 [STEP_MM]``.  It prints the tables of
 ``docs/exact.md``: convergence, residuals of the solutions, errors of the linear model,

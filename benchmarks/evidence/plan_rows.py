@@ -1,4 +1,4 @@
-"""Number of rows that a planned campaign saves compared with random rows.
+"""Determine how many rows a planned campaign saves compared with random rows.
 
     python benchmarks/evidence/plan_rows.py OUT.json --count 50 [--first 0]
 
@@ -6,7 +6,7 @@ Case k is drawn from seed k: a robot and one effect of the library.  The effect 
 scaled so that its rms in the readings of random rows is STRENGTH sigma.  Campaigns of
 increasing size are simulated from the model with this effect and noise.  The rows are
 either planned, or random within the same ranges.  Each campaign is diagnosed.  The
-required number of rows is the smallest from which on all results name only this effect.
+required number of rows is the smallest beyond which all results name only this effect.
 """
 
 import argparse
@@ -96,7 +96,7 @@ def is_right(campaign: Campaign, name: str, values: dict[str, float],
 
 
 def needed(right: list[bool]) -> int:
-    """Return the least number of rows from which on every result is right."""
+    """Return the smallest number of rows beyond which every result is right."""
     wrong = [k for k, good in enumerate(right) if not good]
     first = wrong[-1] + 1 if wrong else 0
     return ROWS[first] if first < len(ROWS) else 2 * ROWS[-1]
@@ -125,7 +125,7 @@ def run_case(seed: int) -> dict[str, Any]:
 
 
 def summary(answers: list[dict[str, Any]]) -> str:
-    """Return the medians, and the share of right results at every number of rows."""
+    """Return the medians and the fraction of right results at every number of rows."""
     rows = {h: np.array([a[h] for a in answers]) for h in ("planned", "random")}
     lines = [
         f"{how}: median {np.median(count):g} rows, mean {count.mean():.1f}"

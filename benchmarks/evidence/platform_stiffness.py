@@ -1,7 +1,8 @@
-"""Time of K_C of the paper's robot over its half workspace, compared with (22).
+"""Time K_C of the paper's robot over half of its workspace, compared with (22).
 
 ``python -m benchmarks.evidence.platform_stiffness`` prints the time [us] per posture,
-the least of several alternating runs, and the difference of K_C from single postures.
+the minimum over several alternating runs, and the difference of K_C from single
+postures.
 """
 
 import time
@@ -71,7 +72,7 @@ def main() -> None:
 
 
 def everything(postures: Posture) -> None:
-    """Compute everything that a sweep stores for a stiffness."""
+    """Compute everything that a sweep stores about the stiffness."""
     found: Any = platform_stiffness(postures)
     _ = found.eigen_stiffnesses, found.eigen_screws
     for axis in np.eye(6):

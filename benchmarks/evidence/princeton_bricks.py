@@ -1,8 +1,8 @@
-"""Reproduction of the published solids of the Princeton beam: 500 x 12 x 4 bricks.
+"""Reproduce the published solids of the Princeton beam with 500 x 12 x 4 bricks.
 
-``python -m benchmarks.evidence.princeton_bricks`` takes two minutes.  With angles such
-as ``90 75``, the bricks are also bent with large rotations under these angles, which
-takes ten minutes for each.
+``python -m benchmarks.evidence.princeton_bricks`` takes two minutes.  If angles are
+given, for example ``90 75``, the bricks are also bent with large rotations at these
+angles, which takes ten minutes each.
 
 The published results were computed with 500 x 12 x 4 bricks in Ansys.  Bricks of eight
 nodes with B-bar (mean dilatation) are too stiff across the thickness, where only four

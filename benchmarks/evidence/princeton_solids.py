@@ -1,4 +1,4 @@
-"""The Princeton beam as a solid of finite elements with large rotations.
+"""Solve the Princeton beam as a finite-element solid with large rotations.
 
 ``python -m benchmarks.evidence.princeton_solids`` (half an hour)
 

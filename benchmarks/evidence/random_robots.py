@@ -1,8 +1,8 @@
-"""Robots of random dimensions with declared geometric errors, for simulated campaigns.
+"""Draw robots of random dimensions with declared geometric errors.
 
-There are serial arms of 3 to 6 joints, planar 3-RRR and five-bar robots, hexapods and
-delta robots.  Joints have no clearance, some drives are elastic, and bodies have
-masses.
+Simulated campaigns use serial arms of 3 to 6 joints, planar 3-RRR and five-bar robots,
+hexapods and delta robots.  Joints have no clearance, some drives are elastic, and
+bodies have masses.
 """
 
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""Size of a report, and the time that a browser needs to open it.
+"""Measure the size of a report and the time a browser takes to open it.
 
     python benchmarks/evidence/report_opening.py my_study/report.html
 
@@ -6,7 +6,7 @@ The browser is headless Chromium, driven by selenium, which draws without a grap
 card; a desktop browser is faster.  Times count from the start of loading until the
 headline is readable, the first screen is drawn, and all figures are drawn.  The
 processor time of the page's thread is printed too.  Each page is opened in a browser
-that has shown an empty page before, and in a newly started browser, which still has to
+that has already shown an empty page, and in a newly started one, which must still
 initialise its graphics.
 """
 

@@ -2,8 +2,8 @@
 
 ``python benchmarks/evidence/stiffness_accuracy.py [link ...] [--kind rigid]``
 
-The errors are those of the K of each mesh, which is the upper end of the interval whose
-middle is returned.  Each link of ``meshes/`` is refined up to 430 k unknowns or seven
+Errors refer to the K of each mesh, which is the upper end of the interval whose
+midpoint is returned.  Each link of ``meshes/`` is refined up to 430 k unknowns or seven
 meshes.  Below, the ratio of true error to estimate [%] is printed for each significant
 entry of the last K.  For rigid interfaces, the true K is that of NGSolve in
 ``stiffness_references.json``, if it is accurate to a third of the judged error.  For

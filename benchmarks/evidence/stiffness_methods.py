@@ -1,9 +1,9 @@
-"""K_C of three robots by every method, side by side.
+"""Compare K_C of three robots by every method.
 
 ``python -m benchmarks.evidence.stiffness_methods`` prints 1 / C_ii along each axis at
 the platform's origin, and the difference of each method from the first (entries over
 sqrt(C_ii C_jj)).  The methods are: virtual joints; the same compiled; the displacement
-method over all bodies; the tangent of the exact equilibrium; differences of the least
+method over all bodies; the tangent of the exact equilibrium; differences of the minimum
 energy (22); load steps in Exudyn with links as springs and as beams; and Exudyn's
 linearised system.
 """

@@ -1,4 +1,4 @@
-"""K_E of the L-bracket and of the link with forks, from a half and an eighth of them.
+"""Compute K_E of the L-bracket and the forked link from a half and an eighth of them.
 
 ``python benchmarks/evidence/stiffness_part_references.py [link ...]`` (``pip install
 ngsolve``)
@@ -146,7 +146,7 @@ def bracket(order, layers):
     mesh, motions = half_bracket(layers), unit_screws((0.15, 0, 0.2))
     K = np.zeros((6, 6))
     for even, group in ((True, [1, 3, 5]), (False, [0, 2, 4])):
-        # there are no cuts across x and z
+        # There are no cuts across x and z.
         work, unknowns = mode_stiffness(
             mesh, order, (True, even, True), [motions[i] for i in group], "base"
         )

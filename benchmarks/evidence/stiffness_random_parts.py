@@ -1,4 +1,4 @@
-"""Evaluation of the error estimate of K_E on random parts, against other solvers.
+"""Evaluate the error estimate of K_E on random parts, compared with other solvers.
 
 ``python benchmarks/evidence/stiffness_random_parts.py [--set test] [--parts 0:33]``
 (``pip install ngsolve`` for parts whose reference is not in the JSON file of this name)
@@ -12,8 +12,8 @@ meshes, true error with the uncertainty of the reference, estimated error, effec
 (estimated / true), and the true error of the mesh's K.  All are largest entries scaled
 by sqrt(K_ii K_jj).  Their distributions and means follow.  A part counts as covered if
 the estimated error is at least the true error.  References and results are stored in
-JSON files, so that an interrupted run continues.  Delete the file of results after a
-change of the code.
+JSON files, so that an interrupted run continues.  Delete the results file after a code
+change.
 """
 
 import argparse
@@ -169,7 +169,7 @@ def surface_of(part: Part) -> Surface:
     """Return the surface of a part; curved sides consist of plane facets.
 
     Args:
-        part: any.
+        part: part of any kind.
 
     Returns:
         The closed surface.

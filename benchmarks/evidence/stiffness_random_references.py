@@ -1,4 +1,4 @@
-"""K_E of the parts of ``stiffness_random_parts.py`` by NGSolve.
+"""Compute K_E of the parts of ``stiffness_random_parts.py`` by NGSolve.
 
 Bodies of revolution are solved by Fourier modes in their half section, with polynomials
 of order 8.  Parts that consist of bricks are meshed by bricks that become geometrically
@@ -29,12 +29,12 @@ def independent_stiffness(part, young):
     """Return K_E of a part at the centre of its tip; the base is held.
 
     Args:
-        part: of ``stiffness_random_parts``.
-        young: [Pa].
+        part: part of ``stiffness_random_parts``.
+        young: [Pa] Young's modulus.
 
     Returns:
-        ``stiffness`` (6, 6), extrapolated by what the last order changed, and how
-        ``unsure`` it is [1], all that was added.
+        ``stiffness`` (6, 6), extrapolated by the change of the last order, and its
+        uncertainty ``unsure`` [1], the total of this extrapolation.
     """
     nu = part.nu
     lame = young * nu / ((1 + nu) * (1 - 2 * nu)), young / (2 * (1 + nu))
@@ -74,7 +74,8 @@ def bricks(part, lame):
     arm = x[1] - x[0]
     wide = max(arm if part.kind == "fork" else x[-1] - x[0], y[-1] - y[0])
     wide = 2 * arm if part.kind == "bracket" else wide
-    # the re-entrant edge of a bracket governs its K, so one more layer is used there
+    # The re-entrant edge of a bracket governs its K, so an additional layer is used
+    # there.
     least = 2 if part.kind == "bracket" else 1
     lines, kept = [], part.full
     for axis, places in zip("xyz", part.planes, strict=True):

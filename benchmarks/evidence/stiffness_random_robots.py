@@ -1,4 +1,4 @@
-"""K_C of random robots by several methods.
+"""Compare K_C of random robots by several methods.
 
 ``python -m benchmarks.evidence.stiffness_random_robots``
 
@@ -9,8 +9,9 @@ sizes of their errors.  ``--seed 10000 --robots 100`` draws other robots.  The
 comparisons are:
 
 - the exact tangent with finite differences of the exact equilibrium;
-- the classical matrix with the least energy (22) without clearances, with the compiled
-  matrix, and with Exudyn (links as springs; load steps, and its linearised system);
+- the classical matrix with the minimum energy (22) without clearances, with the
+  compiled matrix, and with Exudyn (links as springs; load steps, and its linearised
+  system);
 - the exact tangent with errors and a load with Exudyn's linearised system.
 
 For each robot, the program prints the differences of the matrices, as entries over

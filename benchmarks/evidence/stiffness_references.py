@@ -1,14 +1,15 @@
-"""K_E of the links of ``meshes/`` by NGSolve, whole and from their exact geometry.
+"""Compute K_E of the whole links of ``meshes/`` by NGSolve, from exact geometry.
 
 ``python benchmarks/evidence/stiffness_references.py [link ...]`` (``pip install
 ngsolve``)
 
-The solids are built again from the dimensions in ``meshes/make.py``, meshed by
-Netgen with thin layers of elements along the singular edges of the interfaces, curved,
-and solved with polynomials of rising order; nothing is shared with our elements, meshes
-or estimates.  Printed beside each K is its distance from the sharper references of
-``stiffness_references.json``, which ``stiffness_round_references.py`` and
-``stiffness_part_references.py`` make; the speed benchmark runs these solids.
+The solids are built again from the dimensions in ``meshes/make.py``, meshed by Netgen
+with thin layers of elements along the singular edges of the interfaces, curved, and
+solved with polynomials of rising order; the program shares no code with forcefit's
+elements, meshes or estimates.  Each K is printed together with its distance from the
+more accurate references of ``stiffness_references.json``, which
+``stiffness_round_references.py`` and ``stiffness_part_references.py`` make; the speed
+benchmark runs these solids.
 """
 
 import argparse

@@ -1,4 +1,4 @@
-"""K_E of the round links of ``meshes/`` by Fourier modes in their half section.
+"""Compute K_E of the round links of ``meshes/`` by Fourier modes.
 
 ``python benchmarks/evidence/stiffness_round_references.py`` (``pip install ngsolve``)
 
@@ -10,9 +10,9 @@ polynomials of rising order, which converges exponentially.  The displacements a
     u_r = U cos(m a), u_t = V sin(m a), u_z = W cos(m a),
 
 and in mode 1 the unknowns are U + V, U - V and W, of which the first and the last
-vanish on the axis.  K of the last order goes to ``stiffness_references.json`` with what
-the last two orders differ by; nothing is shared with our elements or the solid ones of
-``stiffness_references.py``.
+vanish on the axis.  K of the last order and its difference from the previous order are
+written to ``stiffness_references.json``.  The program shares no code with forcefit's
+elements or the solid ones of ``stiffness_references.py``.
 """
 
 import argparse

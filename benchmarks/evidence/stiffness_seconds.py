@@ -1,4 +1,4 @@
-"""Longest time of K_E for random parts whose surfaces consist of many triangles.
+"""Measure the longest time of K_E for random parts with finely triangulated surfaces.
 
     python -m benchmarks.evidence.stiffness_seconds OUT.json [--count 50] [--seed 3]
         [--accuracy 0.005]
@@ -6,8 +6,8 @@
 The parts are those of ``stiffness_random_parts.py`` with another seed.  Each triangle
 of their surfaces is divided into four, until there are 10 000 to 40 000 triangles.  The
 parts are solved as ``forcefit stiffness fea`` does, without stored meshes.  Each result
-is written at once, so that an interrupted run continues.  Printed are triangles,
-unknowns, estimated error, and wall and processor time including the mesher.
+is written immediately, so that an interrupted run can continue.  The table lists
+triangles, unknowns, estimated error, and wall and processor time including the mesher.
 """
 
 import argparse

@@ -1,4 +1,4 @@
-"""Cost of K_E compared with NGSolve and CalculiX, as a function of the true error.
+"""Compare the cost of K_E with NGSolve and CalculiX as a function of true error.
 
 ``python benchmarks/evidence/stiffness_speed.py`` (``pip install ngsolve``; ``ccx`` on
 the path)
@@ -7,13 +7,15 @@ Each case runs in a separate process.  The operating system reports its processo
 (including child processes and imports) and its largest memory.  Wall times are
 meaningful only on an idle machine.  True errors refer to ``stiffness_references.json``.
 
-- ours: from the STL surface to K with its error estimate, including the mesher,
-  without stored meshes; and separately assembly, factorisation and six load cases on
-  the last mesh. - NGSolve: from the exact geometry with curved elements; order and mesh
-  are chosen by hand, and there is no error estimate. - CalculiX: one load case of six
-  on a given mesh of forcefit, by its own solver.  The elements are quadratic (it has no
-  cubic ones), with forcefit's layers, and are bisected as forcefit's indicator requests
-  until the true error is small enough.  The time to find this mesh is not included.
+- ours: from the STL surface to K with its error estimate, including the mesher, without
+  stored meshes; and separately assembly, factorisation and six load cases on the last
+  mesh.
+- NGSolve: from the exact geometry with curved elements; order and mesh are chosen by
+  hand, and there is no error estimate.
+- CalculiX: one load case of six on a given mesh of forcefit, by its own solver.  The
+  elements are quadratic (it has no cubic ones), with forcefit's layers, and are
+  bisected as forcefit's indicator requests until the true error is small enough.  The
+  time to find this mesh is not included.
 """
 
 import argparse
@@ -137,7 +139,7 @@ def ccx(name, accuracy):
         points = mesh.nodes[mesh.cells[:, :4]]
         turned = np.linalg.det(points[:, 1:] - points[:, :1]) < 0
         cells = mesh.cells[:, [0, 1, 2, 3, 4, 7, 5, 6, 8, 9]]
-        # corners 0 and 1 change places, and with them the edges at 2 and at 3
+        # Corners 0 and 1 are swapped, and with them the edges at 2 and at 3.
         cells[turned] = cells[turned][:, [1, 0, 2, 3, 4, 6, 5, 8, 7, 9]]
         tip = np.unique(mesh.faces[mesh.patch == 1])
         base = np.unique(mesh.faces[mesh.patch == 0])

@@ -1,4 +1,4 @@
-"""Evaluation of the estimated error of peak stresses on shafts with notches.
+"""Evaluate the estimated error of peak stresses on notched shafts.
 
 ``python benchmarks/evidence/stress_of_notches.py [--accuracy 0.02] [--parts 0:20]``
 

@@ -1,4 +1,4 @@
-"""Evaluation of the estimated error of peak stresses against Peterson's charts.
+"""Evaluate the estimated error of peak stresses against Peterson's charts.
 
 ``python -m benchmarks.evidence.stress_of_peterson [--parts 0:10] [--accuracy 0.02]``
 

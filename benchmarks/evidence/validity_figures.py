@@ -1,4 +1,4 @@
-"""Figures of ``crosscheck_validity.py``: errors due to assumptions over parameters."""
+"""Plot the results of ``crosscheck_validity.py`` over the varied parameters."""
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -14,7 +14,7 @@ STYLES = {"position": "o-", "energy": "s--"}
 
 
 def validity_figure(rows: list[dict]) -> Figure:
-    """Plot errors over their limits (20 um or 1 %): medians, and largest as thin lines.
+    """Plot errors relative to their limits (20 um or 1 %): medians and, thin, maxima.
 
     Args:
         rows: rows of the results of the benchmark.
@@ -59,7 +59,8 @@ def pose_figure(maps: dict[str, dict]) -> Figure:
     """Plot the errors over the workspace for the paper's geometric errors.
 
     Args:
-        maps: by robot ``x``, ``z`` [m] and by assumption (z, x, 2) [m], [-].
+        maps: for each robot ``x``, ``z`` [m], and (z, x, 2) [m], [-] for each
+            assumption.
 
     Returns:
         A figure with position and energy errors of two assumptions for each robot.

@@ -1,4 +1,4 @@
-"""Models with one assumption less or more, for the tables of ``docs/validity.md``."""
+"""Define models with one assumption less or more, for ``docs/validity.md``."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -26,9 +26,9 @@ def with_bars(robot: Robot, slenderness: float, density: float | None = None) ->
     """Return the robot with its beams replaced by round bars of one slenderness.
 
     Args:
-        robot: any.
+        robot: robot with beams.
         slenderness: [-] length over radius.
-        density: [kg/m^3] of the bars; their own if absent.
+        density: [kg/m^3] density of the bars; by default that of the beams.
 
     Returns:
         The robot.
@@ -48,15 +48,15 @@ def bush_margin(posture: Posture, compliant: Compliant = "rigid") -> float:
     """Return the factor on all clearances at which a robot on bushes just assembles.
 
     Args:
-        posture: where the robot stands.
+        posture: configuration of the robot.
         compliant: ``"rigid"`` or ``"free"``, as for
             ``forcefit.assembly.linear.zone.zone_margin``.
 
     Returns:
-        The margin; inf if no factor does.
+        The margin, or inf if no factor suffices.
 
     Raises:
-        SolverFailed: the cone solver gave up.
+        SolverFailed: the cone solver found no solution.
     """
     joints = bush_joints(virtual_joints(posture.robot, False, compliant == "free"))
     return margin_with(linearise(posture), joints)[0]
@@ -66,7 +66,7 @@ def half_weights(posture: Posture, gravity: ArrayLike) -> tuple[NDArray, NDArray
     """Return the loads of half of each beam's weight at each end, without moments.
 
     Args:
-        posture: where the robot stands, of n frames.
+        posture: configuration of a robot with n frames.
         gravity: (3,) [m/s^2] base axes.
 
     Returns:
@@ -89,15 +89,15 @@ def halves_cost(
     """Return the error due to half of each weight at each end, without moments.
 
     Args:
-        posture: where the robot stands.
+        posture: configuration of the robot.
         gravity: (3,) [m/s^2] base axes.
         load: (6,) [N m, N] on the platform at its origin, base axes.
 
     Returns:
-        The cost, against the weight spread over the links.
+        The error relative to a weight distributed over the links.
 
     Raises:
-        CannotAssemble: it cannot be assembled.
+        CannotAssemble: the robot cannot be assembled.
         SolverFailed: no solution was found.
     """
     wrench = np.zeros(6) if load is None else np.array(load, dtype=float)

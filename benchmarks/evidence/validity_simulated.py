@@ -1,4 +1,4 @@
-"""Errors of ``crosscheck_validity.py``, computed by the multibody simulation instead.
+"""Recompute errors of ``crosscheck_validity.py`` by the multibody simulation.
 
 Run ``python benchmarks/evidence/validity_simulated.py``; it takes two minutes and
 prints the last table of ``docs/validity.md``.  Beams are geometrically exact, weight
@@ -47,7 +47,7 @@ def weights(at: Posture) -> tuple[float, ...]:
 
 
 def discs(at: Posture) -> tuple[float, ...]:
-    """Return the additional energy [%] of bushes by cones and by contacts."""
+    """Return the additional energy [%] of bushes, by cones and by contacts."""
     by_cones = solve_bushes(at).energy / solve_assembly(at).energy
     disc, bushes = (
         simulate_assembly(

@@ -1,4 +1,4 @@
-"""Errors of the platform's pose and stiffness that each assumption of the model causes.
+"""Estimate the errors in pose and stiffness caused by each modelling assumption.
 
 Start with ``assumptions.py``.
 """

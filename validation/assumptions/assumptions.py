@@ -1,4 +1,4 @@
-"""Compute the errors of all assumptions of ``validity.py`` at one posture."""
+"""Compute the errors caused by the assumptions of ``validity.py`` at one posture."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -31,7 +31,7 @@ from forcefit.validation.crosscheck.spread_weight import energy_between_ends
 from forcefit.validation.multibody.simulation import without_clearance
 
 _NOT_MESHED = "not computed, because it needs meshes of the links; add --solids"
-NOTHING = "nothing to compare: without errors and load no model deforms"
+NOTHING = "nothing to compare: without errors and loads, neither model deforms"
 
 
 def assumption_costs(
@@ -40,21 +40,21 @@ def assumption_costs(
     gravity: ArrayLike | None = None,
     solids: bool = False,
 ) -> dict[str, Cost | str]:
-    """Return the error that each assumption of the model causes at one posture.
+    """Return the error caused by each modelling assumption at one posture.
 
-    The error of linear closures is computed without clearances, because the pose of the
-    platform is unique only then.
+    The error of linearised closures is computed without clearances, because only then
+    is the platform pose unique.
 
     Args:
         posture: the robot's configuration.
         load: (6,) [N m, N] load on the platform at its origin, in base axes, or a
             mapping from component to value such as ``{"fz": -50}``.
         gravity: (3,) [m/s^2] gravity in base axes; None for no gravity.
-        solids: whether beams are compared with meshed solids.  Meshing takes some
-            seconds for each cross-section.
+        solids: whether to compare beams with meshed solids.  Meshing takes a few
+            seconds per cross-section.
 
     Returns:
-        Mapping from each assumption to its error, or to the reason why it is not known.
+        Mapping from each assumption to its error, or to the reason why it is unknown.
     """
     load = None if load is None else given_load(load)
     tight = replace(posture, robot=without_clearance(posture.robot))
@@ -76,7 +76,7 @@ def assumption_costs(
 
 
 class _NotApplicable(Exception):
-    """Exception: an assumption does not apply to the robot, or its error is unknown."""
+    """Exception raised if an assumption does not apply or its error is unknown."""
 
 
 def _pieces_cost(
@@ -94,14 +94,14 @@ def _pieces_cost(
 def _weight_cost(
     posture: Posture, gravity: ArrayLike | None, load: ArrayLike | None
 ) -> Cost:
-    """Return the error of replacing the weight of a link by forces at its two ends."""
+    """Return the error of lumping the weight of a link at its two ends."""
     if gravity is None or not energy_between_ends(posture, gravity):
         raise _NotApplicable("there is no gravity, or no beam has a density")
     return spread_cost(posture, gravity, load)
 
 
 def _solid_cost(posture: Posture, load: ArrayLike | None, solids: bool) -> Cost:
-    """Return the error of beam theory, compared with solid finite elements."""
+    """Return the error of beam theory relative to solid finite elements."""
     beams = [f for f in posture.robot.frames if isinstance(f.link, BeamLink)]
     if beams and not solids:
         raise _NotApplicable(_NOT_MESHED)
@@ -115,17 +115,17 @@ def _solid_cost(posture: Posture, load: ArrayLike | None, solids: bool) -> Cost:
 def stiffness_costs(
     postures: Sequence[Posture], solids: bool = False
 ) -> PlatformCosts | str:
-    """Return the errors of the platform's stiffness that beam theory causes.
+    """Return the errors in platform stiffness caused by beam theory.
 
     Args:
         postures: configurations of one robot, at least one.
-        solids: whether the links are meshed.
+        solids: whether to mesh the links.
 
     Returns:
-        The errors, or the reason why they are not known.
+        The errors, or the reason why they are unknown.
 
     Raises:
-        BadInput: a surface or an interface is not usable.
+        BadInput: a surface or an interface is unusable.
     """
     if not solids:
         return _NOT_MESHED

@@ -1,4 +1,4 @@
-"""Model a pin in two bushes instead of independent bounds of translation and tilt.
+"""Model a pin in two bushes instead of bounding translation and tilt independently.
 
 The paper bounds a pin's radial clearance |(TX, TY)| <= c and its tilt |(RX, RY)| <= t
 independently.  A pin in two bushes of clearance c, at z = +-h with h = c / t, is
@@ -6,13 +6,12 @@ bounded by the position of its axis there:
 
     |(TX + h RY, TY - h RX)| <= c   and   |(TX - h RY, TY + h RX)| <= c,
 
-Each bound limits the position of the pin's axis in one bush to a circle.  A pin that is
-translated by c cannot tilt.  A motion that satisfies the paper's bounds with half the
-clearances also satisfies the bounds of the bushes.  A motion that satisfies the bounds
-of the bushes also satisfies the paper's bounds.  Therefore the energy with bushes is at
-least the energy with the paper's bounds, and at most the energy with half the
-clearances.  The zone margin with bushes is at most twice the margin with the paper's
-bounds.
+Each bound confines the pin's axis to a circle in one bush, so that a pin translated by
+c cannot tilt.  A motion that satisfies the paper's bounds with half the clearances also
+satisfies the bounds of the bushes.  A motion that satisfies the bounds of the bushes
+also satisfies the paper's bounds.  Therefore the energy with bushes is at least the
+energy with the paper's bounds, and at most the energy with half the clearances.  The
+zone margin with bushes is at most twice the margin with the paper's bounds.
 """
 
 from dataclasses import replace
@@ -28,14 +27,13 @@ from forcefit.assembly.linear.reference.energy import solve_with
 
 
 def bush_joints(joints: VirtualJoints) -> VirtualJoints:
-    """Replace each pin with radial and tilt clearance by a pin in two bushes.
+    """Return virtual joints with each radially loose, tilting pin held in two bushes.
 
     Args:
         joints: virtual joints with the paper's bounds.
 
     Returns:
-        The virtual joints, with the columns of the bushes instead of the paper's
-        columns.
+        The virtual joints, with bush columns in place of the paper's columns.
     """
     cones = joints.cones.copy()
     # Each column of a bounded clearance contains one nonzero entry, the inverse of its
@@ -56,10 +54,10 @@ def bush_joints(joints: VirtualJoints) -> VirtualJoints:
 
 
 def solve_bushes(posture: Posture, load: ArrayLike | None = None) -> Assembly:
-    """Return the assembly of least energy if each pin is held in two bushes.
+    """Return the minimum-energy assembly with each pin held in two bushes.
 
     Args:
-        posture: the robot's configuration; the limits of passive joints are ignored.
+        posture: the robot's configuration; limits of passive joints are ignored.
         load: (6,) [N m, N] on the platform at its origin, base axes.
 
     Returns:

@@ -16,7 +16,7 @@ from forcefit.validation.assumptions.validity import ENERGY_LIMIT, POSITION_LIMI
 _LIMITS = f"{1e6 * POSITION_LIMIT:g} µm or {100 * ENERGY_LIMIT:g} %"
 _ASSUMED = (
     "Each assumption is compared alone with a model that does not make it.",
-    "Poses are compared at the solution of least energy.",
+    "Poses are compared at the minimum-energy solution.",
     f"An error is significant above {_LIMITS} of the energy, the accuracy required of "
     "the paper's robot.",
 )
@@ -59,7 +59,7 @@ def costs_page(
 
 
 def _known(costs: CostsOverPoses) -> dict[str, list[tuple[Mapping[str, float], Cost]]]:
-    """Return the poses and errors of each assumption with a known error."""
+    """Return the poses and errors of each assumption whose error is known."""
     pairs = {
         name: [
             (pose, cost)
@@ -72,7 +72,7 @@ def _known(costs: CostsOverPoses) -> dict[str, list[tuple[Mapping[str, float], C
 
 
 def _significant(costs: CostsOverPoses) -> list[str]:
-    """Return the assumptions whose error is significant at one or more poses."""
+    """Return the assumptions with a significant error at one or more poses."""
     return [
         name for name, found in _known(costs).items()
         if any(cost.matters for _, cost in found)
@@ -80,12 +80,12 @@ def _significant(costs: CostsOverPoses) -> list[str]:
 
 
 def _verdict(costs: CostsOverPoses) -> str:
-    """Return a sentence that lists the assumptions with significant errors."""
+    """State which assumptions cause significant errors."""
     known, found = len(_known(costs)), _significant(costs)
     if not known:
-        return "No error of an assumption is known: there is nothing to compare."
+        return "No error is known: there is nothing to compare."
     unknown = len(costs.assumptions) - known
-    last = f" ({unknown} further errors are not known)." if unknown else "."
+    last = f" ({unknown} more errors are unknown)." if unknown else "."
     if not found:
         return f"All {known} known errors are at most {_LIMITS} of the energy{last}"
     return (
@@ -102,7 +102,7 @@ def _good(costs: CostsOverPoses) -> bool | None:
 
 
 def _tiles(costs: CostsOverPoses) -> list[Tile]:
-    """Return tiles with the largest pose errors and the platform's stiffness error."""
+    """Return tiles with the largest pose errors and the error in platform stiffness."""
     tiles = []
     for half, unit in _HALVES:
         largest = {
@@ -122,7 +122,7 @@ def _tiles(costs: CostsOverPoses) -> list[Tile]:
 
 
 def _assumptions(costs: CostsOverPoses) -> list[str]:
-    """Return a table of the largest error of each assumption, or why it is unknown."""
+    """Tabulate the largest error of each assumption, or why it is unknown."""
     known = _known(costs)
     rows: Cells = []
     for name, found in known.items():
@@ -163,7 +163,7 @@ def _assumptions(costs: CostsOverPoses) -> list[str]:
 
 
 def _platform(costs: CostsOverPoses) -> list[str]:
-    """Return a table of the relative differences of the platform's compliance."""
+    """Tabulate the relative differences in platform compliance."""
     platform = costs.platform
     if isinstance(platform, str):
         return [paragraph(f"Not known: {platform}.")]
@@ -178,8 +178,8 @@ def _platform(costs: CostsOverPoses) -> list[str]:
         "at [m, rad]",
     ]  # fmt: skip
     pieces = [
-        paragraph("Largest relative difference of the compliance over all wrenches; "
-                  f"error of the meshes {100 * platform.mesh_error:.2g} %."),
+        paragraph("Largest relative difference in compliance over all wrenches; "
+                  f"mesh error {100 * platform.mesh_error:.2g} %."),
         table(head, rows, "platform"),
     ]  # fmt: skip
     if links:
@@ -190,7 +190,7 @@ def _platform(costs: CostsOverPoses) -> list[str]:
 
 
 def _poses(costs: CostsOverPoses) -> str:
-    """Return a table of the errors at every pose, or an empty text for one pose."""
+    """Tabulate the errors at every pose; return an empty text for a single pose."""
     if len(costs.asked) < 2:
         return ""
     head = ["pose [m, rad]", *(f"{name}, position" for name in costs.assumptions)]
@@ -202,16 +202,16 @@ def _poses(costs: CostsOverPoses) -> str:
 
 
 def _position(cost: Cost | str) -> Cell:
-    """Return the position error as text; a dash if the error is unknown."""
+    """Format the position error, or return a dash if it is unknown."""
     return "-" if isinstance(cost, str) else Value(cost.position, "m", 3)
 
 
 def _unreached(costs: CostsOverPoses) -> Sequence[str]:
-    """Return a table of the unreachable poses, with the reason for each pose."""
+    """Tabulate the unreachable poses and the reasons."""
     rows = [
         [pose_text(pose), why]
         for pose, why in zip(costs.asked, costs.unreached, strict=True) if why
     ]  # fmt: skip
     if not rows:
         return []
-    return [table(["pose that is not reached", "reason"], rows, "unreached poses")]
+    return [table(["unreachable pose", "reason"], rows, "unreached poses")]

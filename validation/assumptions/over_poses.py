@@ -1,4 +1,4 @@
-"""Compute the errors that the model's assumptions cause at many poses of a robot."""
+"""Compute the errors caused by the modelling assumptions at many poses."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -21,17 +21,17 @@ from forcefit.validation.assumptions.validity import Cost
 
 @dataclass(frozen=True, eq=False)
 class CostsOverPoses:
-    """Errors that all assumptions cause at the reachable poses of a list.
+    """Errors caused by all assumptions at the reachable poses of a list.
 
     Attributes:
         robot: robot with its geometric errors.
         asked: for each of the k requested poses, the prescribed pose components [m or
             rad].
-        unreached: (k,) reason why the robot cannot reach a pose; empty if it can.
-        costs: for each of the r reached poses, the error of each assumption, or the
-            reason why the error is unknown.
-        platform: errors of the platform's stiffness at the reached poses, or the reason
-            why these errors are unknown.
+        unreached: (k,) reason why a pose is unreachable; empty if it is reachable.
+        costs: error of each assumption at each of the r reached poses, or the reason
+            why it is unknown.
+        platform: errors in platform stiffness at the reached poses, or the reason why
+            they are unknown.
     """
 
     robot: Robot
@@ -58,7 +58,7 @@ class CostsOverPoses:
 
     @property
     def known(self) -> bool:
-        """Whether the error of at least one assumption was computed at a pose."""
+        """Whether any error was computed at any pose."""
         return isinstance(self.platform, PlatformCosts) or any(
             isinstance(cost, Cost) for at in self.costs for cost in at.values()
         )
@@ -79,17 +79,17 @@ def costs_over_poses(
         targets: the requested poses or joint coordinates.
         load: (6,) [N m, N] load on the platform at its origin, in base axes.
         gravity: (3,) [m/s^2] gravity in base axes; None for no gravity.
-        solids: whether the links are compared with meshed solids.  The meshes are
-            computed once for all poses.
+        solids: whether to compare the links with meshed solids.  Meshes are computed
+            once for all poses.
         progress: function called after each pose with the number of finished poses and
-            the total number.
+            the total.
 
     Returns:
         The errors of all assumptions at every pose.
 
     Raises:
-        BadInput: the kinematic loops are not closed in the home pose, or a surface
-            cannot be meshed.
+        BadInput: the kinematic loops do not close in the home pose, or a surface cannot
+            be meshed.
     """
     rows = targets.at(np.arange(int(np.prod(targets.shape))))
     place = place_many_joints if of_joints(targets.names) else place_many

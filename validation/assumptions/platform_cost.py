@@ -1,4 +1,4 @@
-r"""Compute the error of the platform's stiffness caused by modelling links as beams.
+r"""Compute the error in platform stiffness caused by modelling links as beams.
 
 Four models of one robot are compared at many postures.  All clearances and geometric
 errors are zero:
@@ -13,13 +13,13 @@ solids          the finite elements themselves, both ends free to move: the
 spread          virtual joints with K_E of the same mesh, wrenches spread over ends
 ==============  ==================================================================
 
-The models ``meshed`` and ``solids`` must agree except for rounding errors, because
-static condensation is exact if joints hold the ends rigidly.  The difference between
-``spread`` and ``meshed`` is the error of assuming rigid ends.  A real seat is between
-these two models.  Each difference is the largest relative difference of the compliance
-over all directions of the wrench.  This measure does not depend on a reference point or
-a reference length.  Links do not change with the pose, so each link is meshed once.
-The computation for one pose then takes milliseconds.
+The models ``meshed`` and ``solids`` must agree up to round-off, because static
+condensation is exact if joints hold the ends rigidly.  The difference between
+``spread`` and ``meshed`` is the error of assuming rigid ends.  A real interface lies
+between these two models.  Each difference is the largest relative difference of the
+compliance over all directions of the wrench.  This measure is independent of reference
+point and reference length.  The stiffness of a link does not depend on the pose, so
+each link is meshed once, and computing one pose then takes milliseconds.
 """
 
 from collections.abc import Mapping, Sequence
@@ -43,28 +43,28 @@ _RANK = 1e-9
 
 
 class NoSolids(Exception):
-    """Exception: no link of the robot has a shape that can be meshed."""
+    """Exception raised if no link of the robot has a shape that can be meshed."""
 
 
 @dataclass(frozen=True, eq=False)
 class PlatformCosts:
     """Relative errors of the platform's compliance at k poses.
 
-    The values are NaN at poses where the platform has a motion without stiffness.
+    Values are NaN at poses where the platform has an unresisted motion.
 
     Attributes:
         beams: (k,) [-] difference between the models ``beams`` and ``solids``.
         meshed: (k,) [-] difference between the models ``meshed`` and ``solids``, caused
-            by rounding.
+            by round-off.
         ends: (k,) [-] difference between the models ``meshed`` (rigid ends) and
             ``spread`` (wrenches distributed over the ends).
         by_link: for each link, (k,) [-] difference between two robots: one with only
             this link modelled as a beam, and one with all links as solids.  The link
             with the largest difference is first.
-        left: names of the links without a known shape.  All four models use the
-            declared stiffness of these links.
-        mesh_error: [-] estimate of the largest error of a solid's K_E, each entry
-            divided by sqrt(K_ii K_jj).  The mesh can cause differences up to this size.
+        left: names of links without a known shape, whose declared stiffness is used in
+            all four models.
+        mesh_error: [-] estimated largest error of a solid's K_E, each entry divided by
+            sqrt(K_ii K_jj).  Discretisation can cause differences up to this size.
     """
 
     beams: NDArray
@@ -76,7 +76,7 @@ class PlatformCosts:
 
 
 def platform_costs(postures: Sequence[Posture]) -> PlatformCosts:
-    """Compare the platform's stiffness for links modelled as beams and as solids.
+    """Compare the platform stiffness for links modelled as beams and as solids.
 
     Args:
         postures: configurations of one robot, at least one.
@@ -86,7 +86,7 @@ def platform_costs(postures: Sequence[Posture]) -> PlatformCosts:
 
     Raises:
         BadInput: a link cannot be meshed.
-        FreeMotion: at every pose the platform has a motion without stiffness.
+        FreeMotion: the platform has an unresisted motion at every pose.
         NoSolids: no link has a shape that can be meshed.
     """
     robot, declared = postures[0].robot, _compliances(postures, {})
@@ -121,7 +121,7 @@ def platform_costs(postures: Sequence[Posture]) -> PlatformCosts:
 def _compliances(
     postures: Sequence[Posture], stiffness: Mapping[str, NDArray]
 ) -> NDArray:
-    """Return (k, 6, 6) compliances; ``stiffness`` replaces K_E of some links."""
+    """Return compliances (k, 6, 6); ``stiffness`` overrides K_E of some links."""
     links = {name: MatrixLink(K) for name, K in stiffness.items()}
     robot = postures[0].robot.with_links({**links})
     linked = [replace(posture, robot=robot) for posture in postures]
@@ -129,7 +129,7 @@ def _compliances(
 
 
 def _differences(C: NDArray, other: NDArray) -> NDArray:
-    """Return (k,) largest relative differences; NaN where a compliance is unknown."""
+    """Return the largest relative differences (k,); NaN where unknown."""
     known = np.isfinite(C).all(axis=(1, 2)) & np.isfinite(other).all(axis=(1, 2))
     values = np.full(len(C), np.nan)
     for i in np.flatnonzero(known):
@@ -157,16 +157,16 @@ def difference(C: NDArray, other: NDArray) -> float:
 
 
 def solid_compliance(posture: Posture, solids: Mapping[str, SolidLink]) -> NDArray:
-    """Return the platform's compliance with links as solids (displacement method).
+    """Return the platform compliance with solid links, by the displacement method.
 
-    There are three kinds of unknowns: the displacement of each link's tip relative to
-    its base, the deformations of joint springs, and the motions of free joints.  The
-    elastic energy of a solid depends on the displacements of both of its ends.
+    The unknowns are the displacement of each link's tip relative to its base, the
+    deformations of joint springs, and the motions of free joints.  The elastic energy
+    of a solid depends on the displacements of both its ends.
 
     Args:
-        posture: the robot's configuration; its clearances count as zero.
-        solids: solids by name of the frame; the links of all other frames are springs
-            with stiffness K_E.
+        posture: the robot's configuration; clearances are taken as zero.
+        solids: solids by frame name; the links of all other frames are springs with
+            stiffness K_E.
 
     Returns:
         (6, 6) [rad/(N m) .. m/N] compliance at the platform's origin, in base axes.
@@ -179,8 +179,7 @@ def solid_compliance(posture: Posture, solids: Mapping[str, SolidLink]) -> NDArr
     other = np.ones(joints.elastic.shape[1], dtype=bool)
     owner = np.abs(joints.elastic).argmax(axis=0) // 6
     other[joints.links & np.isin(owner, rows)] = False
-    # The columns belong to three kinds of motions, in this order: springs other than
-    # solids, free joints, and the ends of solids.
+    # Columns are ordered as: springs other than solids, free joints, ends of solids.
     columns = np.hstack([joints.elastic[:, other], joints.free])
     steps = columns.reshape(count, 6, columns.shape[1])
     first = steps.shape[2]
@@ -214,7 +213,7 @@ def solid_compliance(posture: Posture, solids: Mapping[str, SolidLink]) -> NDArr
 
 
 def _closed(robot: Robot, ends: NDArray) -> NDArray:
-    """Return an orthonormal basis of the motions that keep the loops closed."""
+    """Return an orthonormal basis of the motions that preserve loop closure."""
     pairs = [
         ends[robot.index(one)] - ends[robot.index(two)] for one, two in robot.closures
     ]
@@ -229,7 +228,7 @@ def _closed(robot: Robot, ends: NDArray) -> NDArray:
 
 
 def _loaded(K: NDArray, basis: NDArray, platform: NDArray) -> NDArray:
-    """Return the platform's (6, 6) compliance, ignoring motions without stiffness."""
+    """Return the platform compliance (6, 6), ignoring unresisted motions."""
     H, moved = basis.T @ K @ basis, platform @ basis
     size = np.sqrt(np.diag(H))
     size[size == 0.0] = 1.0

@@ -1,4 +1,4 @@
-"""Plot the errors of the model's assumptions."""
+"""Plot the errors caused by modelling assumptions."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
@@ -18,7 +18,7 @@ _BARS = 12  # largest number of links shown; links with smaller errors are omitt
 def platform_cost_figure(
     costs: PlatformCosts, asked: Sequence[Mapping[str, float]], robot: str
 ) -> "Figure":
-    """Return a figure of the platform's stiffness errors and of each link's part.
+    """Return a figure of the platform stiffness errors and each link's contribution.
 
     Args:
         costs: errors at k poses.
@@ -27,8 +27,8 @@ def platform_cost_figure(
 
     Returns:
         The figure.  Curves show the errors over the varied pose component, or over the
-        index of the pose.  Bars show the median and the largest error of each link.
-        For one pose, the figure contains only the bars.
+        pose index.  Bars show the median and the largest error of each link.  For a
+        single pose, the figure contains only the bars.
     """
     from matplotlib.figure import Figure
 

@@ -1,4 +1,4 @@
-"""Convert the errors of the model's assumptions to plain values and to text."""
+"""Convert the errors caused by modelling assumptions to plain values and text."""
 
 import math
 from collections import Counter
@@ -13,7 +13,7 @@ from forcefit.validation.assumptions.over_poses import CostsOverPoses
 from forcefit.validation.assumptions.platform_cost import PlatformCosts
 from forcefit.validation.assumptions.validity import ENERGY_LIMIT, POSITION_LIMIT, Cost
 
-# Each error of the platform's compliance is the difference between these two models.
+# Each error in platform compliance is the difference between these two models.
 COMPARED = {
     "beams": "beams, not solids",
     "meshed": "meshed K_E, not solids",
@@ -25,7 +25,7 @@ _Pose = Mapping[str, float]
 
 
 def costs_table(costs: CostsOverPoses) -> dict[str, Any]:
-    """Return each error at one pose in rad, m and [-], or why the error is unknown."""
+    """Return each error at one pose in rad, m and [-], or why it is unknown."""
     return {
         "robot": costs.robot.name, "pose": costs.asked[0], "limits": _LIMITS,
         **_at(costs, 0),
@@ -33,7 +33,7 @@ def costs_table(costs: CostsOverPoses) -> dict[str, Any]:
 
 
 def over_poses_table(costs: CostsOverPoses) -> dict[str, Any]:
-    """Return the errors at every pose, and their median and largest value."""
+    """Return the errors at every pose, with their median and maximum."""
     poses: list[dict[str, Any]] = []
     for asked, why in zip(costs.asked, costs.unreached, strict=True):
         row: dict[str, Any] = {"asked": asked, "status": "ok"}
@@ -72,7 +72,7 @@ def _values(cost: Cost | str) -> dict[str, Any]:
 
 
 def _platform(costs: PlatformCosts, shown: Callable[[NDArray], Any]) -> dict[str, Any]:
-    """Return the errors [-] of the platform's compliance, maximum over all wrenches."""
+    """Return the errors [-] in platform compliance, maximised over all wrenches."""
     return {
         "compliance": {name: shown(getattr(costs, name)) for name in COMPARED},
         "by_link": {name: shown(values) for name, values in costs.by_link.items()},
@@ -81,7 +81,7 @@ def _platform(costs: PlatformCosts, shown: Callable[[NDArray], Any]) -> dict[str
 
 
 def spread(values: NDArray, where: Sequence[_Pose]) -> dict[str, Any]:
-    """Return the median and the largest finite value, and the pose of the largest."""
+    """Return median and maximum of the finite values, and the pose of the maximum."""
     known = np.isfinite(values)
     if not known.any():
         return {"median": np.nan, "largest": np.nan, "at": None}
@@ -92,7 +92,7 @@ def spread(values: NDArray, where: Sequence[_Pose]) -> dict[str, Any]:
 
 
 def _summary(costs: CostsOverPoses, name: str) -> dict[str, Any]:
-    """Return the errors of one assumption over all poses, and why some are unknown."""
+    """Summarise the errors of one assumption over all poses."""
     pairs = [
         (asked, at[name]) for asked, at in zip(costs.reached, costs.costs, strict=True)
     ]
@@ -107,7 +107,7 @@ def _summary(costs: CostsOverPoses, name: str) -> dict[str, Any]:
 
 
 def costs_text(costs: CostsOverPoses) -> str:
-    """Return the errors at one pose as text, one line for each assumption."""
+    """Format the errors at one pose as text, one line per assumption."""
     lines = [f"{costs.robot.name}: errors due to the model's assumptions"]
     for name, cost in costs.costs[0].items():
         if isinstance(cost, str):
@@ -127,7 +127,7 @@ def costs_text(costs: CostsOverPoses) -> str:
 
 
 def over_poses_text(costs: CostsOverPoses) -> str:
-    """Return a text line for each assumption: median and largest error, its pose."""
+    """Format median and largest error of each assumption, one line each."""
     count = len(costs.reached)
     lines = [
         f"{costs.robot.name}: errors due to the model's assumptions over {count} of "
@@ -151,14 +151,14 @@ def over_poses_text(costs: CostsOverPoses) -> str:
 
 
 def _energy_text(share: float) -> str:
-    """Return the text of a relative difference of energies."""
+    """Format a relative energy difference."""
     if math.isnan(share):
         return "no energy is stored"
     return f"{100 * share:8.3g} % of the energy"
 
 
 def _platform_lines(over: CostsOverPoses) -> list[str]:
-    """Return text lines about the platform's compliance, at one pose or at many."""
+    """Format the errors in platform compliance at one or many poses."""
     costs = over.platform
     if isinstance(costs, str):
         return [f"{'stiffness by solids':>30}: {costs}"]
@@ -187,7 +187,7 @@ def _platform_lines(over: CostsOverPoses) -> list[str]:
 
 
 def pose_text(asked: _Pose | None) -> str:
-    """Return a pose as text, such as ``tx=0.1, tz=-0.5``; ``-`` if there is no pose."""
+    """Format a pose, for example ``tx=0.1, tz=-0.5``, or ``-`` if there is none."""
     if asked is None:
         return "-"
     return ", ".join(f"{name}={value:.6g}" for name, value in asked.items())

@@ -1,10 +1,10 @@
 """Model links as solids of cubic finite elements whose two rigid ends can move.
 
 The solid of a beam is a straight bar with the cross-section of the beam.  The stiffness
-of a bar with unit length and unit modulus depends only on the proportions of the
-cross-section and on Poisson's ratio.  Therefore links of the same proportions are
-solved once.  K_E does not change with the pose.  Two versions of K_E are computed: with
-rigidly held ends, as for virtual joints, and with wrenches distributed over the ends.
+of a bar of unit length and unit modulus depends only on the proportions of the
+cross-section and on Poisson's ratio, so links of equal proportions are solved only
+once.  Two versions of K_E are computed: with rigidly held ends, as for virtual joints,
+and with wrenches distributed over the ends.
 """
 
 from collections.abc import Mapping
@@ -25,7 +25,7 @@ from forcefit.stiffness.link import scaled
 
 _KEPT = 32  # largest number of cross-section shapes in the cache
 _OPTIONS = FemOptions(
-    # At this accuracy, the error of the mesh's K_E is below 1e-3 of sqrt(K_ii K_jj).
+    # At this accuracy, the error of K_E is below 1e-3 of sqrt(K_ii K_jj).
     accuracy=5e-4,
     budget=Budget(seconds=40.0, unknowns=250_000),
 )
@@ -42,8 +42,8 @@ class SolidLink:
             distributed over both ends.
         span: (3,) [m] vector from base to tip.
         turn: (3, 3) rotation from the axes of the mesh to the axes of the frame.
-        error: [-] estimate of the largest error of the mesh's K_E, each entry divided
-            by sqrt(K_ii K_jj).
+        error: [-] estimated largest error of the mesh's K_E, each entry divided by
+            sqrt(K_ii K_jj).
     """
 
     ends: NDArray
@@ -74,9 +74,8 @@ def solid_link(frame: Frame) -> SolidLink | None:
         frame: frame of a robot.
 
     Returns:
-        The solid.  None if the frame has no link, or if the shape of the link is
-        unknown: a stiffness matrix, a library link, or a beam given by section
-        constants.
+        The solid.  None if the frame has no link or the link has no known shape, as for
+        a stiffness matrix, a library link, or a beam given by section constants.
 
     Raises:
         BadInput: the link cannot be meshed, or its mesh was not solved when the robot
@@ -128,7 +127,7 @@ def solid_links(robot: Robot) -> Mapping[str, SolidLink]:
 
 
 def _mesh_error(solved: MeshedLink) -> float:
-    """Return the [-] estimate of the largest error of the mesh's own K_E."""
+    """Return the estimated largest error [-] of the mesh's own K_E."""
     # link.stiffness is the middle of an error interval; the mesh's K_E is its upper
     # end.
     K = solved.link.stiffness

@@ -1,6 +1,6 @@
-"""Compute the error of each assumption of the virtual-joint model at a posture.
+"""Compute the errors caused by the assumptions of the virtual-joint model.
 
-Each of five assumptions is compared with a model that does not make it:
+Each of five assumptions is tested against a model that does not make it:
 
 ==================  ==================================================================
 assumption          compared with
@@ -18,8 +18,8 @@ energy differs by more than one per cent.  It is also significant if the positio
 differs by more than 20 um, the required accuracy of the paper's robot.  If no energy is
 stored and the platform does not move in either model, the error is unknown.
 
-The poses of the solutions of least energy are compared.  This pose is not unique if no
-load acts on a clearance, see ``docs/validity.md``.
+Poses are taken from the minimum-energy solutions.  Such a pose is not unique if a
+clearance carries no load, see ``docs/validity.md``.
 """
 
 import math

@@ -1,4 +1,4 @@
-"""Read and check measured data (campaigns).
+"""Read measurement campaigns and check their content.
 
-Start with ``campaign.py``.  The format is described in ``docs/campaigns.md``.
+Start with ``campaign.py``.  The file format is described in ``docs/campaigns.md``.
 """

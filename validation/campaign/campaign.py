@@ -1,4 +1,4 @@
-"""Measured deviations of a machine's platform, one row for each measurement."""
+"""Represent the measured pose deviations of a platform, one row per measurement."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -15,18 +15,17 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-# names of the six components of a deviation, rotations before translations
+# Names of the six components of a pose deviation; rotations come first.
 READING = ("rx", "ry", "rz", "tx", "ty", "tz")
 LOAD = ("mx", "my", "mz", "fx", "fy", "fz")
 
 
 @dataclass(frozen=True, eq=False)
 class Campaign:
-    """Measured deviations of a machine's platform, in the order of the file.
+    """Measured pose deviations of a machine's platform, in file order.
 
-    The campaign contains R rows, one for each measurement.  The robot consists of n
-    frames.  A campaign is created only if the nominal robot can reach every commanded
-    configuration.
+    A campaign of R measurements consists of R rows.  Its robot has n frames, and the
+    nominal robot must be able to reach every commanded configuration.
 
     Attributes:
         name: name of the campaign's folder.
@@ -37,8 +36,8 @@ class Campaign:
         transforms: (R, n, 4, 4) poses of the frames in the base frame, without
             imperfections.
         mismatch: (R,) [rad, m] closure error of the nominal robot that is caused by
-            rounded numbers in robot files.  This error is neglected.
-        commanded: kind of the commands in the file, ``"joints"`` or ``"pose"``.
+            rounded numbers in robot files.  It is neglected.
+        commanded: how the file specifies commands, ``"joints"`` or ``"pose"``.
         loads: (R, 6) [N m, N] loads on the platform at the reference point, base axes.
         measured: (R, 6) [rad, m] measured deviations rx ry rz tx ty tz at the reference
             point, base axes; NaN for components that were not measured.
@@ -50,14 +49,14 @@ class Campaign:
         reference_point: (3,) [m] measured point, platform axes.
         registration: ``"known"``, or ``"unknown"`` if the pose of the measuring device
             is unknown.
-        configuration: (R,) number of the commanded configuration, counted from 0 by
-            first use.
-        repeat: (R,) number of the pair of configuration and load, counted from 0 by
-            first use; rows with the same number are repeats.
+        configuration: (R,) index of the commanded configuration, numbered from 0 in
+            order of first use.
+        repeat: (R,) index of the combination of configuration and load, numbered from 0
+            in order of first use; rows with the same index are repeats.
         session: (R,) name of each row's session; None if the file has none.
         motion_units: mapping from the name of each covariate that is a measured motion
             to its unit, ``rad`` or ``m``.
-        points: mapping from the name of each further measured point to its position
+        points: mapping from the name of each additional measured point to its position
             (3,) [m], platform axes.
         per_session: names of additional effects that may differ between sessions.
         partial: mapping from the name of each covariate that only some sessions
@@ -97,7 +96,7 @@ class Campaign:
     __repr__, _repr_html_, summary = short_repr, html_table, short_repr
 
     def _figures(self) -> Figures:
-        """Return text lines about the number of rows and the noise of the campaign."""
+        """Return the number of rows, the noise and other figures for display."""
         cells, sizes = self.cells, []
         for unit, part in (("urad", slice(3)), ("um", slice(3, 6))):
             sigma = self.sigma[:, part][cells[:, part]]
@@ -137,13 +136,13 @@ class Campaign:
         object.__setattr__(self, "covariates", covariates)
 
     def to_xarray(self) -> "xarray.Dataset":
-        """Return an xarray data set over ``row``; see :mod:`.tables`."""
+        """Convert to an xarray data set over ``row``; see :mod:`.tables`."""
         from forcefit.validation.campaign.tables import campaign_dataset
 
         return campaign_dataset(self)
 
     def to_pandas(self) -> "pandas.DataFrame":
-        """Return a pandas table, one row per measurement (variable, component)."""
+        """Convert to a pandas table with one row per measurement."""
         from forcefit.assembly.model.tables import frame_table
 
         return frame_table(self.to_xarray(), "row")
@@ -153,7 +152,7 @@ class Campaign:
 
     @property
     def cells(self) -> NDArray:
-        """(R, 6) bool, True for a measured component."""
+        """(R, 6) bool, True where a component was measured."""
         return np.isfinite(self.measured)
 
     @property
@@ -164,7 +163,7 @@ class Campaign:
 
     @property
     def sessions(self) -> tuple[str, ...]:
-        """Names of the sessions in the order of first use; empty without sessions."""
+        """Names of the sessions in order of first use; empty if there are none."""
         return (
             () if self.session is None else tuple(dict.fromkeys(self.session.tolist()))
         )
@@ -187,24 +186,24 @@ class Campaign:
 
     @property
     def measured_at_once(self) -> NDArray:
-        """(R,) int, equal for all points of one row of the file."""
+        """(R,) int index of the file row, shared by all points measured in it."""
         number = dict[str, int]()
         rows = [number.setdefault(label, len(number)) for label in self.labels]
         return np.array(rows, dtype=int)
 
     def in_session(self, session: str | None) -> NDArray:
-        """Return (R,) bool, True for rows of the session.  For None, all are True."""
+        """Return a mask (R,) of the rows of a session; None selects all rows."""
         every = np.ones(len(self), dtype=bool)
         return every if session is None else np.asarray(self.session == session)
 
     def take(self, rows: ArrayLike | slice) -> "Campaign":
-        """Return selected rows; ``configuration`` and ``repeat`` are not renumbered.
+        """Select rows without renumbering ``configuration`` and ``repeat``.
 
         Args:
-            rows: numbers of rows, a mask (R,), or a slice.
+            rows: row indices, a mask (R,), or a slice.
 
         Returns:
-            A campaign of the selected rows, in the given order.
+            A campaign that contains the selected rows in the given order.
         """
         chosen = np.arange(len(self))[rows if isinstance(rows, slice) else _index(rows)]
         names = (
@@ -224,11 +223,11 @@ class Campaign:
 
 
 def number_rows(*columns: ArrayLike, step: float = 1e-9) -> NDArray:
-    """Number the rows, counted from 0; equal rows get the same number.
+    """Number rows from 0 in order of first occurrence; equal rows share a number.
 
     Args:
-        columns: (R,) or (R, k) arrays to compare; NaN equals NaN.
-        step: largest difference between equal values, in the unit of the columns.
+        columns: (R,) or (R, k) arrays to compare, where NaN equals NaN.
+        step: rounding step of the comparison, in the unit of the columns.
 
     Returns:
         (R,) int, the number of each row.
@@ -244,13 +243,13 @@ def number_rows(*columns: ArrayLike, step: float = 1e-9) -> NDArray:
 
 
 def _index(rows: ArrayLike) -> NDArray:
-    """Convert row numbers or a mask to an index array; an empty list selects no row."""
+    """Convert row indices or a mask to an index array; an empty list selects no row."""
     index = np.asarray(rows)
     return index.astype(int) if index.size == 0 else index
 
 
 def _locked(campaign: Campaign, name: str, shape: tuple[int, ...]) -> NDArray:
-    """Return a read-only copy of a campaign's array after a check of its shape."""
+    """Check the shape of a campaign's array and return a read-only copy."""
     array = np.array(getattr(campaign, name))
     if array.shape != shape:
         whose = f"campaign '{campaign.name}': {name}"
@@ -260,7 +259,7 @@ def _locked(campaign: Campaign, name: str, shape: tuple[int, ...]) -> NDArray:
 
 
 def _column(values: ArrayLike, rows: int, name: str) -> NDArray:
-    """Return a read-only copy of a covariate after a check of its length and values."""
+    """Check the length and values of a covariate and return a read-only copy."""
     array = np.array(values, dtype=float)
     if array.shape != (rows,) or not np.isfinite(array).all():
         raise ValueError(f"covariate '{name}': expected {rows} finite numbers")

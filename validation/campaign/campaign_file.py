@@ -1,4 +1,4 @@
-"""Read campaign folders: ``campaign.toml`` and its table, with all checks."""
+"""Read campaign folders, that is, ``campaign.toml`` and the table it names."""
 
 import os.path
 from collections.abc import Sequence
@@ -42,14 +42,14 @@ from forcefit.validation.campaign.measurement_table import (
     read_table,
 )
 
-# [rad, m] Largest accepted closure error; rounded numbers in robot files cause such
+# [rad, m] Largest accepted closure error.  Rounded numbers in robot files cause such
 # errors.
 _CLOSED = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
 class _Declared:
-    """Content of ``campaign.toml``, or the defaults for a table without that file."""
+    """Content of ``campaign.toml``, or defaults for a table without this file."""
 
     root: Table
     name: str
@@ -65,24 +65,25 @@ class _Declared:
 def read_campaign(
     folder: Path | str, robot: Robot | None = None, *, links: bool = True
 ) -> Campaign:
-    """Return the campaign of a folder, or commands for another robot.
+    """Read a campaign from a folder, optionally with a different robot.
 
     Args:
-        folder: folder with a file ``campaign.toml``, or that file; if a robot is given,
-            also a single table with the same columns in SI units.
-        robot: robot that replaces the robot of the campaign, such as the identified
-            one.  Measurements may then be missing; they are NaN.  None for the robot
-            that the campaign declares.
-        links: whether the stiffness of meshed links is computed, which diagnoses
-            require.
+        folder: folder that contains ``campaign.toml``, or the path of this file.  If
+            ``robot`` is given, a single table with the same columns in SI units is also
+            accepted.
+        robot: robot that replaces the declared one, for example the identified robot.
+            Measurements may then be missing, and are NaN.  None for the robot that the
+            campaign declares.
+        links: whether to compute the stiffness of meshed links, which a diagnosis
+            requires.
 
     Returns:
-        The campaign, including the joint coordinates of every configuration.
+        The campaign, with joint coordinates for every configuration.
 
     Raises:
-        BadInput: the folder violates a rule of the format, a value is not plausible, or
-            a configuration is unreachable.  The message names the file, the place, the
-            value found and the expected value.
+        BadInput: the folder does not follow the format, a value is implausible, or a
+            configuration is unreachable.  The message states the file, the location,
+            the value found and the value expected.
     """
     if robot is not None:
         return read_commands(folder, robot)
@@ -93,21 +94,20 @@ def read_campaign(
 
 
 def read_commands(source: Path | str, robot: Robot) -> Campaign:
-    """Return the commands of a machine as a campaign; measurements may be missing.
+    """Read the commands of a machine as a campaign; measurements are optional.
 
     Args:
         source: a campaign, or a single table with the same columns in SI units.  The
-            readings of a single table belong to the measured point for which the robot
-            was identified.  If the robot file names no point, they belong to the
-            platform's origin.
+            readings of a single table refer to the point for which the robot was
+            identified, or to the platform's origin if the robot file names no point.
         robot: robot that replaces the robot of the campaign.
 
     Returns:
-        A campaign with one row for each point of each row of the file; readings that
+        A campaign with one row for each point of each row of the file.  Readings that
         were not measured are NaN.
 
     Raises:
-        BadInput: for the same reasons as in :func:`read_campaign`.
+        BadInput: as for :func:`read_campaign`.
     """
     if Path(source).suffix.lower() == ".csv":
         content: dict[str, Any] = {"measurements": Path(source).name}
@@ -121,13 +121,13 @@ def read_commands(source: Path | str, robot: Robot) -> Campaign:
 
 
 def _declaration(folder: Path | str) -> Path:
-    """Return the path of ``campaign.toml`` for a folder or for this file."""
+    """Return the path of ``campaign.toml``, given the folder or the file."""
     file = Path(folder)
     return file if os.path.isfile(file) else file / "campaign.toml"
 
 
 def _declared(root: Table) -> _Declared:
-    """Return the content of ``campaign.toml`` without its robot."""
+    """Read the content of ``campaign.toml`` except for the robot."""
     folder = Path(root.file).parent
     declared = _Declared(
         root=root,
@@ -145,7 +145,7 @@ def _declared(root: Table) -> _Declared:
 
 
 def _per_session(root: Table) -> tuple[str, ...]:
-    """Return the effects whose parameters may differ between sessions."""
+    """Read the names of effects whose parameters may differ between sessions."""
     given = root.get("per_session", [])
     valid = [name for name, effect in LIBRARY.items() if effect.by_row]
     if not isinstance(given, list):
@@ -164,7 +164,7 @@ def _per_session(root: Table) -> tuple[str, ...]:
 
 
 def _table_names(root: Table) -> list[str]:
-    """Return the names of the tables: one table, or one table for each session."""
+    """Read the names of the tables: a single table, or one per session."""
     given = root.get("measurements")
     if not isinstance(given, list):
         return [root.text("measurements", expected="a CSV file")]
@@ -176,15 +176,15 @@ def _table_names(root: Table) -> list[str]:
 
 
 def _campaign(declared: _Declared, robot: Robot, *, measured: bool = True) -> Campaign:
-    """Return the campaign that a declaration describes.
+    """Build the campaign that a declaration describes.
 
     Args:
         declared: content of the file.
         robot: robot that executes the commands.
-        measured: whether every row must have a measurement.
+        measured: whether every row must contain a measurement.
 
     Returns:
-        The campaign, with one row for each measured point.
+        The campaign, with one row per measured point.
     """
     point, points = declared.point, declared.points
     table = join_tables([
@@ -206,7 +206,7 @@ def _campaign(declared: _Declared, robot: Robot, *, measured: bool = True) -> Ca
     _check_points(declared, extent)
     if measured:
         check_measured(table, points)
-    # Readings and their sigma by measured point; the reference point is first.
+    # Readings and standard deviations of each measured point, reference point first.
     every: dict[str, tuple[NDArray, NDArray]] = {}
     for name, at in {"": point, **points}.items():
         every[name] = _readings(table, name, declared.noise)
@@ -265,7 +265,7 @@ def _check_points(declared: _Declared, extent: float) -> None:
 def _labels(
     ids: Sequence[str], points: Sequence[str], row: NDArray, which: NDArray
 ) -> tuple[str, ...]:
-    """Return the label of each row: its label in the file, and its point's name."""
+    """Return a label for each row, composed of its label in the file and the point."""
     return tuple(
         f"{ids[i]}:{points[k]}" if points[k] else ids[i]
         for i, k in zip(row, which, strict=True)
@@ -275,12 +275,12 @@ def _labels(
 def _rows_of_points(
     every: dict[str, tuple[NDArray, NDArray]], measured: bool
 ) -> tuple[NDArray, NDArray]:
-    """Return the index of each row of the file, once for every measured point.
+    """Return the file row and the point for each row of the campaign.
 
     Args:
         every: mapping from the name of each point to its readings (R, 6) and their
             sigma.
-        measured: whether rows without a reading are omitted.  Otherwise such a row is
+        measured: whether to omit rows without a reading.  Otherwise such a row is
             returned once for each declared point.
 
     Returns:
@@ -290,8 +290,8 @@ def _rows_of_points(
         np.isfinite(readings).any(axis=1) for readings, _ in every.values()
     ])
     if not measured:
-        # If further points are declared but no point has a reading, each command is
-        # kept for every declared point, and not for the reference point.
+        # If additional points are declared but none has a reading, each command is
+        # repeated for every declared point, but not for the reference point.
         alone = not taken.any() and len(every) > 1
         taken[~taken.any(axis=1)] = taken.any(axis=0) if taken.any() else True
         taken[:, 0] &= not alone
@@ -300,7 +300,7 @@ def _rows_of_points(
 
 
 def _read_points(root: Table) -> dict[str, NDArray]:
-    """Return the positions (3,) [m] in ``[points]`` by name, platform axes."""
+    """Read ``[points]`` as a mapping from name to position (3,) [m], platform axes."""
     if not root.has("points"):
         return {}
     table = root.table("points")
@@ -314,7 +314,7 @@ def _read_points(root: Table) -> dict[str, NDArray]:
 def _readings(
     table: MeasurementTable, point: str, noise: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Return (R, 6) readings of a point, and sigma [rad, m] of the table or device."""
+    """Return the readings (R, 6) of a point and their standard deviations [rad, m]."""
     at = f".{point}" if point else ""
     stated = table.stack(f"sigma{at}", READING, np.nan)
     sigma = np.where(np.isnan(stated), noise, stated)
@@ -322,7 +322,7 @@ def _readings(
 
 
 def _read_noise(root: Table) -> NDArray:
-    """Return (6,) [rad, m] standard deviations of the device; NaN if not stated."""
+    """Read the device's standard deviations (6,) [rad, m]; NaN if not stated."""
     noise = np.full(6, np.nan)
     if root.has("noise"):
         table = root.table("noise")
@@ -335,7 +335,7 @@ def _read_noise(root: Table) -> NDArray:
 
 
 def _read_robot(root: Table, name: str, links: bool) -> Robot:
-    """Return the robot: a built-in robot, or one from a file in the folder."""
+    """Load the robot, which is built in or defined by a file in the folder."""
     if name in BUILT_IN:
         return BUILT_IN[name]()
     path = Path(root.file).parent / name
@@ -348,7 +348,7 @@ def _read_robot(root: Table, name: str, links: bool) -> Robot:
 
 
 def _commanded(table: MeasurementTable, robot: Robot) -> str:
-    """Return the names of the table's command columns: joints, or pose components."""
+    """Return the names of the command columns: joints or pose components."""
     actuated = [f"q.{f.name}" for f in robot.frames if f.actuated]
     given = [name for name in table.columns if name.startswith("q.")]
     pose = [name for name in table.columns if name.startswith("pose.")]
@@ -374,7 +374,7 @@ def _commanded(table: MeasurementTable, robot: Robot) -> str:
 
 
 def _command(table: MeasurementTable, robot: Robot, commanded: str) -> NDArray:
-    """Return (R, 6) poses ``[t r]`` or (R, n) joint coordinates; free ones are NaN."""
+    """Return poses ``[t r]`` (R, 6) or joint coordinates (R, n); NaN where free."""
     if commanded == "pose":
         return table.stack("pose", POSE, np.nan)
     return table.stack("q", tuple(f.name for f in robot.frames), np.nan)
@@ -382,7 +382,7 @@ def _command(table: MeasurementTable, robot: Robot, commanded: str) -> NDArray:
 
 def _place(table: MeasurementTable, robot: Robot, commanded: str,
            rows: NDArray) -> list[Posture]:  # fmt: skip
-    """Return the posture of each row; raise BadInput at the first unreachable row."""
+    """Compute the posture of each row; raise BadInput if a row is unreachable."""
     place = place_many if commanded == "pose" else place_many_joints
     postures, reasons = place(robot, _command(table, robot, commanded)[rows])
     placed = []

@@ -1,4 +1,4 @@
-"""JSON schema of ``campaign.toml`` for editors: the keys that the reader accepts."""
+"""Define the JSON schema of ``campaign.toml``, which editors use for completion."""
 
 from forcefit.assembly.effects import LIBRARY
 from forcefit.results.quantities import number, text

@@ -1,6 +1,6 @@
-"""Check whether the numbers of a campaign are plausible.
+"""Check that the values in a campaign are plausible.
 
-A value that is impossible for a machine is refused, and the message names the likely
+A value that is impossible for a real machine raises an error that names the likely
 mistake.  For example, a deviation of 153 m suggests a wrong unit.
 """
 
@@ -18,8 +18,8 @@ from forcefit.validation.campaign.measurement_table import MeasurementTable
 # degrees.
 _TURNS = 8 * np.pi
 _FORCE = 1e7  # [N], [N m] largest accepted load, far above that of any platform
-# [K] Largest accepted temperature difference from calibration; a value such as 293
-# would be an absolute temperature.
+# [K] Largest accepted temperature difference from calibration; a value such as 293 is
+# probably an absolute temperature.
 _WARMEST = 250.0
 _LATEST = 3e8  # [s] largest accepted time, ten years; larger numbers are dates
 _ROOM = 1000.0  # [m] largest accepted distance between machine and measuring device
@@ -35,7 +35,7 @@ def check_commands(table: MeasurementTable, robot: Robot) -> None:
         robot: robot of the campaign.
 
     Raises:
-        BadInput: the first impossible cell, with the likely mistake.
+        BadInput: a cell has an impossible value; the message names the likely mistake.
     """
     reach = _body_length(robot)
     for name, values in table.columns.items():
@@ -57,7 +57,7 @@ def check_commands(table: MeasurementTable, robot: Robot) -> None:
 
 
 def _check_covariates(table: MeasurementTable) -> None:
-    """Check temperature, time and approach; other covariates may have any value."""
+    """Check temperature, time and side of approach, the only restricted covariates."""
     columns = table.columns
     if "cov.temperature" in columns:
         what = "the deviation from the temperature of calibration, in K"
@@ -80,10 +80,10 @@ def check_measured(table: MeasurementTable, points: Iterable[str]) -> None:
 
     Args:
         table: the table in SI units.
-        points: names of further points measured.
+        points: names of additional measured points.
 
     Raises:
-        BadInput: the first row without a measurement.
+        BadInput: a row contains no measurement.
     """
     groups = ["meas", *(f"meas.{point}" for point in points)]
     measured = np.hstack([table.stack(group, READING, np.nan) for group in groups])
@@ -96,7 +96,7 @@ def check_measured(table: MeasurementTable, points: Iterable[str]) -> None:
 
 def check_readings(table: MeasurementTable, point: str, sigma: NDArray,
                    registration: str, extent: float) -> None:  # fmt: skip
-    """Reject deviations that exceed the size of the robot, and invalid values of sigma.
+    """Reject deviations larger than the robot and invalid standard deviations.
 
     Args:
         table: the table in SI units.
@@ -108,7 +108,7 @@ def check_readings(table: MeasurementTable, point: str, sigma: NDArray,
         extent: [m] size of the robot over all configurations.
 
     Raises:
-        BadInput: the first invalid reading, with the likely mistake.
+        BadInput: a reading is invalid; the message names the likely mistake.
     """
     at = f".{point}" if point else ""
     measured = table.stack(f"meas{at}", READING, np.nan)
@@ -139,14 +139,14 @@ def check_readings(table: MeasurementTable, point: str, sigma: NDArray,
 
 
 def extent_of(transforms: NDArray, reference_points: NDArray) -> float:
-    """Return the diagonal [m] of the box around base, frames and measured points.
+    """Return the diagonal [m] of the bounding box of base, frames and measured points.
 
     Args:
         transforms: (k, n, 4, 4) poses of the frames in each configuration.
         reference_points: (k, 3) [m] measured points, base axes.
 
     Returns:
-        The diagonal; 1 if all these points coincide.
+        The diagonal, or 1 if all points coincide.
     """
     origins = transforms[..., :3, 3].reshape(-1, 3)
     points = np.concatenate([np.zeros((1, 3)), origins, reference_points])
@@ -154,7 +154,7 @@ def extent_of(transforms: NDArray, reference_points: NDArray) -> float:
 
 
 def _body_length(robot: Robot) -> float:
-    """Return the total length [m] of all bodies or, if larger, the largest travel."""
+    """Return the total length [m] of all bodies, or a larger joint travel."""
     lengths = np.linalg.norm(robot.fixed_transforms[:, :3, 3], axis=1).sum()
     slides = [abs(f.position) for f in robot.frames if f.joint == "prismatic"]
     return float(lengths + sum(slides)) or 1.0
@@ -162,7 +162,7 @@ def _body_length(robot: Robot) -> float:
 
 def _within(table: MeasurementTable, name: str, values: NDArray, largest: float,
             expected: str) -> None:  # fmt: skip
-    """Raise BadInput at the first value whose magnitude exceeds the accepted limit."""
+    """Raise BadInput if the magnitude of any value exceeds a limit."""
     for i in np.flatnonzero(np.abs(values) > largest * (1 + 1e-9))[:1]:
         message = f"found {values[i]:g}, expected {expected}"
         raise table.bad(int(i), name, message)

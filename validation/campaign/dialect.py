@@ -1,7 +1,7 @@
-"""Read the format of a campaign's table: delimiter, decimal mark and units.
+"""Read the table format of a campaign: delimiter, decimal mark and units.
 
-The format is declared in ``campaign.toml``.  The defaults are comma, decimal point and
-SI units.
+The format is declared in ``campaign.toml``.  By default, cells are separated by commas,
+and numbers have a decimal point and SI units.
 """
 
 import math
@@ -17,8 +17,7 @@ _ANGLES = {
     "rad": 1.0, "mrad": 1e-3, "urad": 1e-6, "deg": math.pi / 180,
     "arcsec": math.pi / 648000,
 }  # fmt: skip
-# For each key in [units]: the accepted units and their factors to the SI unit.  The SI
-# unit is listed first.
+# Accepted units of each key in [units], with factors to the SI unit, which comes first.
 UNITS = {
     "position": _LENGTHS,
     "rotation": _ANGLES,
@@ -39,7 +38,7 @@ class Dialect:
     Attributes:
         delimiter: character between cells.
         decimal: the decimal mark.
-        units: mapping from each declared key to its unit; other keys are in SI units.
+        units: mapping from each declared key to its unit; all other keys use SI units.
         motions: unit of each covariate that is a measured motion, by name.
     """
 
@@ -49,11 +48,11 @@ class Dialect:
     motions: dict[str, str] = field(default_factory=dict)
 
     def unit(self, key: str) -> str:
-        """Return the unit in which the table states the quantity of a key."""
+        """Return the unit that the table uses for a key."""
         return self.units.get(key) or next(iter(UNITS[key]))
 
     def factor(self, key: str) -> float:
-        """Return the factor from the unit of a key to the SI unit."""
+        """Return the factor that converts a key's unit to the SI unit."""
         return UNITS[key][self.unit(key)]
 
     @property
@@ -63,11 +62,11 @@ class Dialect:
 
 
 def read_dialect(root: Table) -> Dialect:
-    """Return the table format that ``campaign.toml`` declares.
+    """Read the table format that ``campaign.toml`` declares.
 
     Args:
-        root: root of ``campaign.toml``; the optional tables ``[table]`` and ``[units]``
-            are read.
+        root: root of ``campaign.toml``, with optional tables ``[table]`` and
+            ``[units]``.
 
     Returns:
         The format.
@@ -99,7 +98,7 @@ def read_dialect(root: Table) -> Dialect:
 
 
 def parse_number(cell: str, decimal: str) -> float:
-    """Return the number in a cell; NaN for any other text, such as "nan" or "1_000"."""
+    """Parse the number in a cell; return NaN for text such as "nan" or "1_000"."""
     if decimal != ".":
         cell = cell.replace(".", "?").replace(decimal, ".")
     return float(cell) if _NUMBER.fullmatch(cell) else math.nan

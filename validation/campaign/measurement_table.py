@@ -1,7 +1,7 @@
-"""Read the table of a campaign: convert its text to numbers and check every cell.
+"""Read the measurement table of a campaign and check every cell.
 
-Delimiter, decimal mark and units are declared in ``campaign.toml``.  A table in another
-format is refused, and the message names the key that declares this format.
+Delimiter, decimal mark and units are declared in ``campaign.toml``.  If the table has a
+different format, the error message names the key that declares it.
 """
 
 import csv
@@ -38,18 +38,17 @@ _TEXTS = ("id", "session")  # names of columns that contain text instead of numb
 
 @dataclass(frozen=True, eq=False)
 class MeasurementTable:
-    """Numbers of a campaign's table in SI units.
+    """Measurement table of a campaign, converted to SI units.
 
     Attributes:
         file: name of the file, for messages.
         ids: unique label of each row.
-        lines: number of the line in the file at which each row ends, for messages.
+        lines: line number in the file at which each row ends, for messages.
         columns: mapping from the name of each column except ``id`` to its (R,) values,
             in the order of the file; an empty cell is NaN.
         dialect: format of the table.
-        sessions: name of the session of each row; empty if the file contains no
-            sessions.
-        files: name of the file of each row, if the campaign consists of several files.
+        sessions: session name of each row; empty if the file contains no sessions.
+        files: file name of each row, if the campaign consists of several files.
     """
 
     file: str
@@ -64,14 +63,14 @@ class MeasurementTable:
         return len(self.ids)
 
     def bad(self, row: int, column: str, message: str) -> BadInput:
-        """Return the error for a cell; the caller raises it."""
+        """Return the error for a cell, which the caller raises."""
         place = f"line {self.lines[row]} (id {quoted(self.ids[row])})"
         where = f"{place}, {column}" if column else place
         file = self.files[row] if self.files else self.file
         return BadInput(f"{file}: {where}: {message}")
 
     def stack(self, prefix: str, names: tuple[str, ...], absent: float) -> NDArray:
-        """Return (R, k) columns ``prefix.name``; ``absent`` fills missing columns."""
+        """Stack columns ``prefix.name`` as (R, k); ``absent`` fills missing ones."""
         empty = np.full(len(self), absent)
         return np.column_stack([
             self.columns.get(f"{prefix}.{n}", empty) for n in names
@@ -87,13 +86,13 @@ def read_table(
         path: a CSV file with a header.
         robot: robot whose actuated joints may occur as columns.
         dialect: format of the table.
-        points: names of further measured points.
+        points: names of additional measured points.
 
     Returns:
         The table in SI units.
 
     Raises:
-        BadInput: the file is not a valid table; the message names line and column.
+        BadInput: the file is not a valid table; the message gives line and column.
     """
     path = Path(path)
     lines, rows = _cells(path, dialect)
@@ -127,18 +126,18 @@ def read_table(
 
 
 def join_tables(tables: Sequence[MeasurementTable]) -> MeasurementTable:
-    """Join tables; each table without a column ``session`` is one session.
+    """Concatenate tables; a table without a column ``session`` forms one session.
 
     Args:
         tables: tables of one campaign, at least one.
 
     Returns:
-        The joined table.  If there are several tables, each label begins with the name
-        of its file.
+        The joined table.  If there are several tables, each label is prefixed with the
+        name of its file.
 
     Raises:
-        BadInput: a column of one table is missing in another table and is not a
-            covariate.  Missing covariates are filled with NaN.
+        BadInput: a column other than a covariate is missing in one of the tables.
+            Missing covariates are filled with NaN.
     """
     if len(tables) == 1:
         return tables[0]
@@ -172,7 +171,7 @@ def join_tables(tables: Sequence[MeasurementTable]) -> MeasurementTable:
 
 
 def _cells(path: Path, dialect: Dialect) -> tuple[list[int], list[list[str]]]:
-    """Return the stripped cells of each row, and the file line where the row ends."""
+    """Return the stripped cells of each row and the line number at which it ends."""
     lines, rows = [], []
     text = io.StringIO(read_text(path), newline="")
     reader = csv.reader(text, delimiter=dialect.delimiter, strict=True)
@@ -188,7 +187,7 @@ def _cells(path: Path, dialect: Dialect) -> tuple[list[int], list[list[str]]]:
 
 
 def _check_printable(path: Path, line: int, rows: list[list[str]]) -> None:
-    """Reject control characters, including NUL, in the row that was read last."""
+    """Reject control characters, including NUL, in the last row read."""
     header, row = rows[0], rows[-1]
     for k, cell in enumerate(row):
         if not cell.isprintable() and not printable(cell):
@@ -204,7 +203,7 @@ def _check_printable(path: Path, line: int, rows: list[list[str]]) -> None:
 def _header(
     path: Path, names: list[str], robot: Robot, points: tuple[str, ...]
 ) -> list[str]:
-    """Return the header after a check that every name is a valid column name."""
+    """Read the header and check that every name is a valid column name."""
     q = [f"q.{f.name}" for f in robot.frames if f.actuated]
     groups: dict[str, tuple[str, ...]] = {
         "pose": POSE, "load": LOAD, "meas": READING, "sigma": READING,
@@ -214,7 +213,7 @@ def _header(
     known = [*_TEXTS, *q, *(f"{g}.{c}" for g, cs in groups.items() for c in cs)]
     known += ["cov.temperature", "cov.time", "cov.approach"]
     if not any(name in known or name.startswith("cov.") for name in names):
-        # The message does not print the names, because the file may not be a table.
+        # The names are not printed, because the file may not be a table at all.
         raise BadInput(
             f"{path}: line 1: found no column of a table of "
             f"measurements{_other(names)}; expected id, q.<frame> or pose.tx "
@@ -231,7 +230,7 @@ def _header(
             hint = nearest(name, known)
             raise BadInput(
                 f"{path}: line 1: unknown column {quoted(name)}{_passive(name, robot)}"
-                f"{hint} (further covariates begin with cov.)"
+                f"{hint} (names of additional covariates begin with cov.)"
             )
     if "id" not in names:
         raise BadInput(f'{path}: line 1: missing column "id"')
@@ -239,7 +238,7 @@ def _header(
 
 
 def _passive(name: str, robot: Robot) -> str:
-    """Return the reason why a joint cannot be commanded, if the joint is passive."""
+    """Return why a joint cannot be commanded, or an empty text if it can."""
     frames = {f"q.{f.name}": f for f in robot.frames}
     if name not in frames:
         return ""
@@ -248,7 +247,7 @@ def _passive(name: str, robot: Robot) -> str:
 
 
 def _other(names: list[str]) -> str:
-    """Return a hint for a header that was read as a single cell."""
+    """Return a hint if the header was read as a single cell."""
     for word, mark in DELIMITERS.items():
         if len(names) == 1 and mark in names[0]:
             return (f"; it contains {word}: if this separates the cells, set "
@@ -257,7 +256,7 @@ def _other(names: list[str]) -> str:
 
 
 def _dialect_hint(row: list[str], expected: int, dialect: Dialect) -> str:
-    """Return the likely cause of a wrong number of cells in a row."""
+    """Return the likely cause if a row has the wrong number of cells."""
     if dialect.delimiter == "," and len(row) > expected:
         return (
             '; if the decimal mark is a comma, separate cells by ";" and set '
@@ -267,7 +266,7 @@ def _dialect_hint(row: list[str], expected: int, dialect: Dialect) -> str:
 
 
 def _check_labels(table: MeasurementTable) -> None:
-    """Reject missing ids and repeated ids."""
+    """Reject missing and duplicate ids."""
     seen: dict[str, int] = {}
     for label, line in zip(table.ids, table.lines, strict=True):
         where = f"{table.file}: line {line}, id"
@@ -284,7 +283,7 @@ def _check_labels(table: MeasurementTable) -> None:
 def _numbers(
     table: MeasurementTable, robot: Robot, name: str, cells: list[str]
 ) -> NDArray:
-    """Return a column as numbers in SI units; an empty reading is NaN."""
+    """Convert a column to numbers in SI units; empty readings become NaN."""
     key = _unit_key(name, robot)
     unit = table.dialect.unit(key) if key else ""
     factor = table.dialect.factor(key) if key else 1.0
@@ -312,7 +311,7 @@ def _numbers(
 
 
 def _number_hint(name: str, cell: str, dialect: Dialect) -> str:
-    """Return the likely meaning of a cell that cannot be read as a number."""
+    """Return the likely cause if a cell cannot be read as a number."""
     other = "," if dialect.decimal == "." else "."
     if other in cell and math.isfinite(parse_number(cell, other)):
         written = quoted(cell.replace(other, dialect.decimal))
@@ -331,7 +330,7 @@ def _number_hint(name: str, cell: str, dialect: Dialect) -> str:
 
 
 def _unit_key(name: str, robot: Robot) -> str:
-    """Return the key in ``[units]`` of a column; empty for a dimensionless column."""
+    """Return the key of a column in ``[units]``; empty if it is dimensionless."""
     group, _, rest = name.partition(".")
     if group in {"meas", "sigma"}:
         turns = rest.rpartition(".")[2][0] == "r"

@@ -1,6 +1,7 @@
-"""Convert results for the rows of a campaign to labelled arrays over ``row``.
+"""Convert results for the rows of a campaign to labelled arrays.
 
-The names of the columns are those of the file ``measurements.csv``.
+The arrays have the dimension ``row`` and are named after the columns of
+``measurements.csv``.
 """
 
 from collections.abc import Mapping, Sequence
@@ -19,7 +20,7 @@ _UNITS = {"temperature": "K", "time": "s", "approach": "1"}
 
 
 def screw(words: str, meaning: str = "") -> Quantity:
-    """Return the description of a quantity whose values are small screws [rad, m]."""
+    """Describe a quantity whose values are small screws [rad, m]."""
     return Quantity(words, "rad, m", ("screw",), meaning)
 
 
@@ -28,23 +29,23 @@ def row_dataset(
     values: Mapping[str, Any],
     labels: Mapping[str, Sequence[Any]] = NO_LABELS,
 ) -> "xarray.Dataset":
-    """Return a data set of arrays with one entry for each row of a campaign.
+    """Build a data set of arrays that contain one entry per row of a campaign.
 
     Args:
         campaign: campaign of R rows.
         values: arrays as for :func:`forcefit.assembly.model.tables.labelled`; the first
             axis of every array must have length R.
-        labels: labels of further dimensions.
+        labels: labels of additional dimensions.
 
     Returns:
-        Data set over ``row``.  The ids of the rows are its labels.
+        Data set with the dimension ``row``, labelled by the row ids.
     """
     data = labelled(values, "row", list(campaign.ids), labels)
     return data.assign_attrs(campaign=campaign.name, robot=campaign.robot.name)
 
 
 def campaign_dataset(campaign: "Campaign") -> "xarray.Dataset":
-    """Return a data set of a campaign's commands, loads, readings and covariates."""
+    """Convert a campaign's commands, loads, readings and covariates to a data set."""
     moves = mobile(campaign.robot)
     units = _UNITS | dict(campaign.motion_units)
     at_point = "at the reference point, base axes"

@@ -1,4 +1,4 @@
-"""Apply a corrected robot: predict readings, correct commands, fit new sessions.
+"""Predict readings, correct commands and fit new sessions with a saved robot.
 
 Start with ``prediction.py``; see ``docs/correction.md``.
 """

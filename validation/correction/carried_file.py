@@ -1,4 +1,4 @@
-"""Save a robot that was fitted to new sessions, together with its covariance."""
+"""Save a robot that was fitted to new sessions together with its covariance."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -21,7 +21,7 @@ from forcefit.validation.diagnosis.saved_covariance import (
 
 
 def save(carried: CarriedRobot, path: Path | str) -> None:
-    """Write the fitted robot to a file, and its covariance to a second file.
+    """Write the fitted robot and its covariance to two files.
 
     Args:
         carried: the robot, fitted to the new sessions.
@@ -42,7 +42,7 @@ def save(carried: CarriedRobot, path: Path | str) -> None:
 
 
 def covariance_of(carried: CarriedRobot, robot: Robot) -> SavedCovariance:
-    """Return the covariance of the parameters that were fitted to the set-up rows.
+    """Return the covariance of the parameters fitted to the set-up rows.
 
     Args:
         carried: the robot, fitted to the new sessions.
@@ -68,7 +68,7 @@ def covariance_of(carried: CarriedRobot, robot: Robot) -> SavedCovariance:
 
 
 def _with_std(robot: Robot, known: SavedCovariance) -> Robot:
-    """Return the robot; its functions get the standard deviations in ``known``."""
+    """Store the standard deviations in ``known`` with the robot's functions."""
     functions = list(robot.functions)
     for number, sigma in zip(known.numbers, known.std.tolist(), strict=True):
         if number.kind == FUNCTION:

@@ -1,14 +1,14 @@
-r"""Fit a saved robot to set-up rows of a new session, and test it on other rows.
+r"""Fit a saved robot to the set-up rows of a new session and test it on other rows.
 
-The parameters of a session are the pose of the measuring device and the changes with
-time.  If requested, the measured point and the zeros of the joints are parameters too
+The parameters of a session are the pose of the measuring device, the changes with time
+and, if requested, the measured point and the zeros of the joints
 (:mod:`.session_unknowns`).  The prior of the robot's parameters consists of their saved
 values and covariance (:mod:`.machine_numbers`).  All parameters are fitted to the
-set-up rows of all sessions (:mod:`.session_fit`), and tested on all other rows.  Set-up
-rows are the rows that are measured first to fit a new session.
+set-up rows of all sessions (:mod:`.session_fit`) and tested on all other rows.  Set-up
+rows are measured at the beginning of a session for this purpose.
 
 The uncertainty of the fit is propagated to the other rows.  The set-up rows are
-insufficient if this uncertainty exceeds their own residual with the saved robot.
+insufficient if this uncertainty exceeds their residual with the saved robot.
 """
 
 import math
@@ -49,15 +49,14 @@ class Carried:
         std: (k,) standard deviations of the values.
         rows: number of set-up rows, and number of other rows.
         error: error on the other rows.
-        declared: error of the robot that the campaign declares, fitted in the same way.
+        declared: error of the declared robot, fitted in the same way.
         uncertainty: [m] rms uncertainty of the predicted points of the other rows.
         left: [m] rms residual of the set-up rows.
         held: [m] rms residual of the set-up rows if the robot's parameters are fixed at
             their saved values.
-        open_: names of the most uncertain parameters if the set-up rows are
-            insufficient, otherwise empty.
-        left_behind: changes with time in the original session that are not fitted here,
-            because the new session has no column ``cov.time``.
+        open_: names of the most uncertain parameters; empty if the set-up rows suffice.
+        left_behind: changes with time in the original session that cannot be fitted
+            here, because the new session has no column ``cov.time``.
     """
 
     session: str | None
@@ -93,7 +92,7 @@ class CarriedRobot:
 
     Attributes:
         fit: fitted parameters of the sessions and of the robot.
-        sessions: results of the sessions, tested on the rows that were not fitted.
+        sessions: results of the sessions on the rows that were not fitted.
     """
 
     fit: SessionsFit
@@ -101,7 +100,7 @@ class CarriedRobot:
 
     @property
     def good(self) -> bool:
-        """Whether set-up rows suffice and the robot is better than the declared one."""
+        """Whether set-up rows suffice and the robot outperforms the declared one."""
         return all(one.suffices and one.better for one in self.sessions)
 
 
@@ -111,7 +110,7 @@ def carry(
     setup: NDArray,
     fitted: Sequence[str] = ("registration",),
 ) -> CarriedRobot:
-    """Fit a saved robot to the set-up rows of sessions, and test it on all other rows.
+    """Fit a saved robot to the set-up rows of sessions and test it on all other rows.
 
     Args:
         campaign: campaign with the saved robot.
@@ -120,10 +119,10 @@ def carry(
         fitted: names of parameters in :data:`OF_A_SESSION`.
 
     Returns:
-        The robot in these sessions, and the result of every session.
+        The robot in these sessions and the result of every session.
 
     Raises:
-        BadInput: a session consists only of set-up rows, or contains none.
+        BadInput: a session consists only of set-up rows or contains none.
     """
     clock = "time" in campaign.covariates
     unknowns = session_unknowns(campaign.robot, fitted, clock=clock)
@@ -161,14 +160,14 @@ def _of(campaign: Campaign, session: str | None, setup: NDArray) -> NDArray:
 
 
 def _left_behind(robot: Robot, unknowns: SessionUnknowns) -> tuple[str, ...]:
-    """Return the titles of changes with time that are not fitted in a new session."""
+    """Return the titles of changes with time that cannot be fitted in a new session."""
     drift, functions = of_one_session(robot)
     whole = [DRIFT] if drift and unknowns.constant is None else []
     return (*whole, *(f.title for f in functions if f not in unknowns.functions))
 
 
 def _judged(fit: SessionsFit, other: SessionsFit, number: int) -> Carried:
-    """Return the result of one session, tested on the rows that were not fitted."""
+    """Test one session on the rows that were not fitted."""
     one, alike = fit.sessions[number], other.sessions[number]
     campaign, setup, values = one.campaign, one.rows, fit.values(number)
     read = one.read(fit.robot, values)
@@ -182,7 +181,7 @@ def _judged(fit: SessionsFit, other: SessionsFit, number: int) -> Carried:
     ]
     level = max(*off, float(np.median(campaign.sigma[own])))
     cells = campaign.cells & ~setup[:, None]
-    # if any position was measured, rotations are ignored
+    # Rotations are ignored if any position was measured.
     cells[:, :3] &= not cells[:, 3:].any()
     variance, blame = fit.spread(number, cells)
     names = [*(name for _, name in one.unknowns.names), _MACHINE]
@@ -205,7 +204,7 @@ def _judged(fit: SessionsFit, other: SessionsFit, number: int) -> Carried:
 
 
 def carried_robot(carried: CarriedRobot) -> Robot:
-    """Return the robot for a file, without the parameters of its original session.
+    """Return the robot to save, without the parameters of its original session.
 
     Args:
         carried: the robot, fitted to the new sessions.
@@ -222,7 +221,7 @@ def carried_robot(carried: CarriedRobot) -> Robot:
 
 
 def _added(before: Any, more: dict[str, dict[str, float]]) -> dict[str, Any]:
-    """Return effects after adding ``more`` to their parameters; replace a drift."""
+    """Add ``more`` to the parameters of effects; a drift is replaced."""
     merged = {name: dict(values) for name, values in before.items()}
     for effect, values in more.items():
         own = merged.setdefault(effect, {})

@@ -8,7 +8,7 @@ from forcefit.validation.correction.carrying import CarriedRobot
 
 
 def table(carried: CarriedRobot) -> dict[str, Any]:
-    """Return plain values: sessions, fitted parameters and errors on the other rows."""
+    """Convert sessions, fitted parameters and errors on other rows to plain values."""
     return {
         "machine": {
             "numbers": len(carried.fit.machine.numbers),
@@ -44,11 +44,11 @@ def table(carried: CarriedRobot) -> dict[str, Any]:
 
 
 def text(carried: CarriedRobot) -> str:
-    """Return the results of the sessions as text."""
+    """Format the results of the sessions as text."""
     lines = []
     if carried.fit.machine.numbers:
         lines.append(
-            f"the robot's {len(carried.fit.machine.numbers)} parameters: fitted too, "
+            f"the robot's {len(carried.fit.machine.numbers)} parameters: also fitted, "
             f"with {carried.fit.widened:.3g} times their covariance as prior"
         )
     for one in carried.sessions:

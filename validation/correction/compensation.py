@@ -1,21 +1,21 @@
-r"""Compute commands with which a corrected robot reaches the pose of the declared one.
+r"""Compute commands with which a corrected robot reaches the nominal poses.
 
-The controller computes commands q for which the nominal robot has the wanted pose.  The
+The controller computes commands q for which the nominal robot has the target pose.  The
 machine deviates from this pose by d(q), which the corrected model predicts.  The
-Gauss-Newton method computes, for all rows together, commands for which the machine has
-the wanted pose:
+Gauss-Newton method solves, for all rows together, for commands with which the machine
+has the target pose:
 
- nominal pose(q) changed by the deviation d(q)  =  wanted pose
+ nominal pose(q) changed by the deviation d(q) = target pose
 
 ======  =============  ==========  ===================================================
 symbol  code           shape       meaning
 ======  =============  ==========  ===================================================
 q       ``drives``     (R, d)      commands of the driven joints
-e       ``error``      (R, 6)      motion from the machine's pose to the wanted pose
+e       ``error``      (R, 6)      motion from the machine's pose to the target pose
 J       ``jacobian``   (R, 6, d)   derivative of the platform's pose by the drives
 ======  =============  ==========  ===================================================
 
-If a robot has fewer than six drives, correcting positions has priority over rotations.
+If a robot has fewer than six drives, positions take priority over rotations.
 
 Sources:
     Nocedal, Wright, Numerical Optimization, section 10.3 (Gauss-Newton).
@@ -58,16 +58,16 @@ class Compensation:
     """Corrected commands for R rows.
 
     Attributes:
-        targets: the commands at which the nominal robot would have the wanted poses.
+        targets: commands at which the nominal robot has the target poses.
         drives: names of the d actuated joints.
         commands: (R, d) [rad or m] corrected commands; rows without a solution are
             unchanged.
         transforms: (R, n, 4, 4) nominal frames at the commands.
         coordinates: (R, n) [rad or m] coordinate of every joint at the commands.
-        before: (R, 6) [rad, m] deviation of the machine from the wanted pose for the
-            given commands, at the reference point, base axes.
-        after: (R, 6) [rad, m] deviation of the machine from the wanted pose for the
-            corrected commands.
+        before: (R, 6) [rad, m] deviation from the target pose for the given commands,
+            at the reference point, base axes.
+        after: (R, 6) [rad, m] deviation from the target pose for the corrected
+            commands.
         spread: (R, 6) [rad, m] standard deviation of ``after`` due to the uncertainty
             in the robot's file.
         limited: (R,) bool, True where a joint's limit prevents the correction.
@@ -88,7 +88,7 @@ class Compensation:
     __repr__, _repr_html_ = short_repr, html_table
 
     def to_xarray(self) -> "xarray.Dataset":
-        """Return an xarray data set over ``row``: commands, offsets and errors."""
+        """Convert to an xarray data set over ``row``: commands, offsets and errors."""
         from forcefit.validation.correction.compensation_table import (
             compensation_dataset,
         )
@@ -96,7 +96,7 @@ class Compensation:
         return compensation_dataset(self)
 
     def to_pandas(self) -> "pandas.DataFrame":
-        """Return a pandas table, one row per command, columns (variable, component)."""
+        """Convert to a pandas table with one row per command."""
         from forcefit.assembly.model.tables import frame_table
 
         return frame_table(self.to_xarray(), "row")
@@ -108,12 +108,12 @@ class Compensation:
 
 
 def compensate(targets: Campaign, *, as_read: bool = False) -> Compensation:
-    """Return commands with which the corrected robot reaches the nominal poses.
+    """Return commands with which a corrected robot reaches the nominal poses.
 
     Args:
         targets: commands for the corrected robot.
         as_read: whether the commands also cancel effects of the measuring device, so
-            that its readings become zero.  Otherwise only deviations of the machine are
+            that the readings become zero.  Otherwise only deviations of the machine are
             corrected.
 
     Returns:
@@ -161,7 +161,7 @@ def _corrected(
     machine: "_Machine", standing: "_Standing", q: NDArray, weights: NDArray,
     limits: tuple[NDArray, NDArray], going: NDArray,
 ) -> tuple[NDArray, "_Standing"]:  # fmt: skip
-    """Return the (R, d) commands of least error, and the state of the machine there.
+    """Return the commands (R, d) of smallest error, and the machine's state there.
 
     Only rows in ``going`` (R,) bool are corrected, by damped Gauss-Newton steps.
     """
@@ -179,7 +179,7 @@ def _corrected(
             if not worse.any():
                 break
             share = np.where(worse, share / 2, share)
-        # The remaining error is caused by rounding or by joint limits.
+        # The remaining error is due to round-off or joint limits.
         going = going & moving & ~worse
         q = np.where(going[:, None], tried, q)
         standing = next_ if going[moving].all() else machine.at(q)[0]
@@ -187,7 +187,7 @@ def _corrected(
 
 
 def _each_once(targets: Campaign) -> Campaign:
-    """Return each command once, instead of once for each measured point."""
+    """Drop the duplicates of commands at which several points were measured."""
     if targets.point is None:
         return targets
     labels = tuple(dict.fromkeys(targets.labels))
@@ -210,7 +210,7 @@ def _limits(robot: Robot, driven: NDArray) -> tuple[NDArray, NDArray]:
 def _too_far(
     robot: Robot, driven: NDArray, change: NDArray, reason: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Find rows whose correction (R, d) exceeds the robot's size, or a half turn.
+    """Find rows whose correction (R, d) exceeds the robot's size or half a turn.
 
     Returns:
         (R,) bool, True for such rows, and (R,) texts of the reasons.
@@ -231,12 +231,12 @@ def _too_far(
 
 
 def _astray(robot: Robot, error: NDArray, reason: NDArray) -> NDArray:
-    """Return (R,) reasons; rows whose error (R, 6) exceeds the robot's size get one."""
+    """Return reasons (R,), extended by errors (R, 6) larger than the robot."""
     size, reason = size_of(robot), reason.copy()
     off = np.linalg.norm(error[:, 3:], axis=1)
     for row in np.flatnonzero((off > size) & (reason == "")):
         reason[row] = (
-            f"the smallest error that a command reaches is {off[row]:.3g} m, "
+            f"the smallest error that any command attains is {off[row]:.3g} m, "
             f"more than the robot's size ({size:.3g} m)"
         )
     return reason
@@ -250,12 +250,12 @@ def _weights(robot: Robot, drives: int) -> NDArray:
 
 @dataclass(frozen=True, eq=False)
 class _Standing:
-    """State of the machine at its commands.
+    """State of a machine at given commands.
 
     Attributes:
         campaign: the commands.
         conditions: postures, loads and covariates of the measurement at the commands.
-        error: (R, 6) [rad, m] motion to the wanted pose; NaN without a solution.
+        error: (R, 6) [rad, m] motion to the target pose; NaN without a solution.
         jacobian: (R, 6, d) derivative of the reference point's pose by the drives.
     """
 
@@ -271,11 +271,11 @@ class _Standing:
 
 @dataclass(frozen=True, eq=False)
 class _Machine:
-    """The corrected robot for which commands are computed.
+    """Corrected robot for which commands are computed.
 
     Attributes:
         targets: the given commands.
-        goal: (R, 4, 4) wanted platform poses.
+        goal: (R, 4, 4) target platform poses.
         as_read: whether effects of the measuring device are corrected too.
     """
 
@@ -284,7 +284,7 @@ class _Machine:
     as_read: bool
 
     def conditions(self, campaign: Campaign) -> Conditions:
-        """Return the measurement's conditions at commands, for the reference point."""
+        """Return the measuring conditions at the commands, for the reference point."""
         conditions = replace(finite_conditions(campaign), target=None)
         if self.as_read:
             return conditions
@@ -292,9 +292,9 @@ class _Machine:
         return replace(conditions, base=still, tool=still[:3], reading=0.0)
 
     def at(self, q: NDArray) -> tuple[_Standing, NDArray]:
-        """Return the state of the machine at commands (R, d), and reasons of failures.
+        """Return the state of the machine at commands (R, d) and reasons for failures.
 
-        Rows that cannot be reached keep the given commands.
+        Unreachable rows keep the given commands.
         """
         campaign, reason = _commanded(self.targets, q)
         conditions = self.conditions(campaign)
@@ -307,7 +307,7 @@ class _Machine:
 
 
 def _commanded(targets: Campaign, q: NDArray) -> tuple[Campaign, NDArray]:
-    """Return a campaign with new commands; unreachable commands are not changed."""
+    """Return a campaign with new commands; unreachable commands stay unchanged."""
     robot = targets.robot
     driven = _driven(robot)
     wanted = np.full((len(q), len(robot.frames)), np.nan)
@@ -329,7 +329,7 @@ def _commanded(targets: Campaign, q: NDArray) -> tuple[Campaign, NDArray]:
 
 
 def _between(conditions: Conditions, deviation: NDArray, goal: NDArray) -> NDArray:
-    """Return the (R, 6) motion from the present pose to the wanted pose, base axes."""
+    """Return the motion (R, 6) from the present pose to the target pose, base axes."""
     nominal = conditions.postures.platform
     arm = nominal[:, :3, :3] @ conditions.point
     R = rotation_matrix(deviation[:, :3]) @ nominal[:, :3, :3]
@@ -340,7 +340,7 @@ def _between(conditions: Conditions, deviation: NDArray, goal: NDArray) -> NDArr
 
 
 def _jacobian(conditions: Conditions, drives: int) -> NDArray:
-    """Return the (R, 6, d) derivative of the reference point's pose by the drives."""
+    """Return the derivative (R, 6, d) of the reference point's pose by the drives."""
     robot = without_joint_clearances(conditions.robot)
     columns = np.zeros((6 * len(robot.frames), drives))
     for k, i in enumerate(_driven(robot)):
@@ -355,7 +355,7 @@ def _jacobian(conditions: Conditions, drives: int) -> NDArray:
 def _step(
     standing: _Standing, weights: NDArray, q: NDArray, limits: tuple[NDArray, NDArray]
 ) -> NDArray:
-    """Return the (R, d) least-squares step, zero for drives at their limits."""
+    """Return the least-squares step (R, d), zero for drives at their limits."""
     A = standing.jacobian * weights[:, None]
     b = np.nan_to_num(standing.error) * weights
     held = np.zeros(q.shape, dtype=bool)

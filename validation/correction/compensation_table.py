@@ -1,4 +1,4 @@
-"""Convert the results of a compensation to tables for controllers and to text."""
+"""Convert a compensation to tables for controllers and to text."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
@@ -20,15 +20,15 @@ if TYPE_CHECKING:
 
 
 def command_table(compensation: "Compensation") -> str:
-    """Return the corrected commands as a table with the columns of the targets.
+    """Return the corrected commands as a table in the format of the targets.
 
     Args:
         compensation: result of :func:`.compensation.compensate`.
 
     Returns:
         CSV with ``id``, ``q.*`` or ``pose.*``, and the given loads and covariates.  A
-        controller can execute this file, and after a measurement it can be compensated
-        again.
+        controller can execute this file, and it can be compensated again after a
+        measurement.
     """
     targets = compensation.targets
     platform = compensation.transforms[:, targets.robot.index(targets.robot.platform)]
@@ -50,7 +50,7 @@ def command_table(compensation: "Compensation") -> str:
 
 
 def offset_table(compensation: "Compensation") -> str:
-    """Return the controller's offsets, and the error before and after, as a table.
+    """Return a table of controller offsets and of the errors before and after.
 
     Args:
         compensation: result of :func:`.compensation.compensate`.
@@ -96,7 +96,7 @@ def compensation_dataset(compensation: "Compensation") -> "xarray.Dataset":
         "before": (screw("error of the given command"), compensation.before),
         "after": (screw("error of the corrected command"), compensation.after),
         "spread": (screw("standard deviation of the error"), compensation.spread),
-        "limited": (flag("a joint's limit prevents the correction"),
+        "limited": (flag("a joint limit prevents the correction"),
                     compensation.limited),
         "reason": (text("reason"), compensation.reason),
     }  # fmt: skip
@@ -104,7 +104,7 @@ def compensation_dataset(compensation: "Compensation") -> "xarray.Dataset":
 
 
 def _text(compensation: "Compensation", columns: dict[str, Any]) -> str:
-    """Return the columns as CSV with a header of their names."""
+    """Format columns as CSV with a header."""
     rows = {
         label: {
             name: values[i] if name == "session" else float(values[i])
@@ -118,7 +118,7 @@ def _text(compensation: "Compensation", columns: dict[str, Any]) -> str:
 def summary(
     compensation: "Compensation", diagnosed: Mapping[str, float] | None = None
 ) -> dict[str, Any]:
-    """Return plain values: expected errors, and rows without a solution.
+    """Return expected errors and rows without a solution as plain values.
 
     Args:
         compensation: result of :func:`.compensation.compensate`.
@@ -126,10 +126,9 @@ def summary(
             None for the values of the robot's file.
 
     Returns:
-        Plain values.  ``expected`` combines the error after correction, the standard
-        deviation of the parameters in the file, and the unexplained error of the
-        diagnosis.  ``expected`` is None if neither the file nor ``diagnosed`` contains
-        this error.
+        Plain values.  ``expected`` combines the error after correction, the parameter
+        uncertainty in the file, and the unexplained error of the diagnosis.  It is None
+        if neither the file nor ``diagnosed`` states the latter.
     """
     ids = compensation.targets.ids
     record = compensation.targets.robot.diagnosis
@@ -166,7 +165,7 @@ def summary(
 def _unexplained(
     record: Mapping[str, Any], diagnosed: Mapping[str, float] | None
 ) -> dict[str, float] | None:
-    """Return the unexplained position [m] and rotation [rad] error; None if unknown."""
+    """Return the unexplained errors [m] and [rad], or None if they are unknown."""
     sizes = {}
     for key in ("position", "rotation"):
         after = record.get(key, 0.0) if diagnosed is None else diagnosed[key]
@@ -176,7 +175,7 @@ def _unexplained(
 
 
 def _sizes(error: NDArray) -> dict[str, float | None]:
-    """Return the rms of positions and of rotations; None for rows without values."""
+    """Return the rms of positions and rotations; None if there are no values."""
 
     def rms(part: NDArray) -> float | None:
         known = part[np.isfinite(part).all(axis=1)]
@@ -186,7 +185,7 @@ def _sizes(error: NDArray) -> dict[str, float | None]:
 
 
 def summary_text(compensation: "Compensation", table: Mapping[str, Any]) -> str:
-    """Return ``table``, the result of :func:`summary`, as text."""
+    """Format ``table``, the result of :func:`summary`, as text."""
     lines = [f"{table['rows']} commands, drives {', '.join(compensation.drives)}"]
     says = {
         "before": "as commanded", "after": "corrected", "spread": "spread of the model",

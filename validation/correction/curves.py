@@ -1,7 +1,7 @@
-"""Compute curves of the functions in a robot file, with their uncertainty.
+"""Plot the functions in a robot file with their uncertainty.
 
-Functions describe deviations that depend on temperature, time, load or position.  If a
-function has memory, its response to a unit step is plotted over time.  A function that
+Functions describe deviations that depend on temperature, time, load or position.  For a
+function with memory, the response to a unit step is plotted over time.  A function that
 depends on the direction of motion is plotted for an approach from below.
 """
 
@@ -48,7 +48,7 @@ class Curve:
         function: the function.
         component: component of the screw or compliance that the function returns.
         variable: variable on the horizontal axis.
-        constant: (name, value) of the second variable, which is constant along the
+        constant: name and value of the second variable, which is constant along the
             curve; None for a function of one variable.
         x: (k,) values of the variable, in its unit.
         values: (k,) values of the component [rad, m, N m, N]; divided by N or N m for a
@@ -72,16 +72,17 @@ class Curve:
 def curves_of(
     robot: Robot, over: Mapping[str, tuple[float, float]] | None = None
 ) -> list[Curve]:
-    """Return all functions of a robot as curves.
+    """Evaluate all functions of a robot along curves.
 
     Args:
         robot: robot with its functions.
-        over: mapping from a variable to its smallest and largest plotted value.  The
-            default is a full turn, the range of a spline's knots, or a typical range.
+        over: mapping from a variable to its smallest and largest plotted value.  By
+            default, a full turn, the range of a spline's knots, or a typical range is
+            used.
 
     Returns:
-        One curve for each component.  For a function of two variables, one curve for
-        each component and each of three values of the second variable.
+        One curve per component.  A function of two variables has one curve per
+        component for each of three values of the second variable.
     """
     curves = []
     for function in robot.functions:
@@ -99,7 +100,7 @@ def curves_of(
 
 
 def _variables(function: Function) -> tuple[str, str]:
-    """Return the plotted variable, and a second variable if there is one."""
+    """Return the plotted variable and, if there is one, the second variable."""
     first, *rest = function.variables
     if function.form in {"lag", "creep"}:
         return "time", ""
@@ -112,7 +113,7 @@ def _curve(
     robot: Robot, function: Function, component: str, along: str,
     fixed: tuple[str, float] | None, x: NDArray,
 ) -> Curve:  # fmt: skip
-    """Return one curve with standard deviations from its parameters' covariance."""
+    """Return one curve with standard deviations from the parameter covariance."""
     values = _values(function, component, x, fixed)
     numbers, C = _covariance_of(robot, function)
     slopes = np.zeros((len(numbers), len(values)))
@@ -193,7 +194,7 @@ def _range(robot: Robot, function: Function, variable: str) -> tuple[float, floa
 
 
 def table(robot: Robot, curves: list[Curve]) -> list[dict[str, Any]]:
-    """Return the curves as plain values."""
+    """Convert the curves to plain values."""
     return [
         {
             "label": c.function.title,
@@ -222,7 +223,7 @@ def table(robot: Robot, curves: list[Curve]) -> list[dict[str, Any]]:
 
 
 def text(curves: list[Curve]) -> str:
-    """Return the curves as text, with :data:`_SHOWN` points of each."""
+    """Format the curves as text, with :data:`_SHOWN` points each."""
     lines: list[str] = []
     for c in curves:
         second = f", {c.constant[0]} = {c.constant[1]:.4g}" if c.constant else ""

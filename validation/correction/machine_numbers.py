@@ -1,10 +1,10 @@
-r"""Compute the prior of a machine's parameters in a new session.
+r"""Compute the prior of machine parameters in a new session.
 
 The file of a saved robot contains its geometric errors, compliances, effects and
 functions, and the covariance C of their fit.  The machine may have changed by more than
-this uncertainty before the new session.  Therefore the prior mean is the saved values
-and the prior covariance is k C. The factor k is chosen by cross-validation on the
-set-up rows (:mod:`.session_fit`).
+this uncertainty before the new session.  The prior therefore has the saved values as
+its mean and k C as its covariance, where k is chosen by cross-validation on the set-up
+rows (:mod:`.session_fit`).
 
 ======  =============  =========  ====================================================
 symbol  code           shape      meaning
@@ -36,7 +36,7 @@ _RANK = 1e-10
 
 @dataclass(frozen=True, eq=False)
 class MachineNumbers:
-    """Parameters of a saved robot that do not belong to one session.
+    """Parameters of a saved robot that are common to all sessions.
 
     Attributes:
         robot: the saved robot.
@@ -57,13 +57,13 @@ class MachineNumbers:
         return np.sqrt(np.einsum("mr,mr->m", self.root, self.root))
 
     def robot_at(self, u: NDArray) -> Robot:
-        """Return the robot with its parameters changed by L u, within their range.
+        """Return the robot with its parameters changed by L u, within bounds.
 
         Args:
             u: (r,) independent variables; a change of the parameters is L u.
 
         Returns:
-            The robot.  A parameter that cannot be negative is multiplied by a positive
+            The robot.  A parameter that cannot be negative is scaled by a positive
             factor instead of adding the change.
         """
         robot = self.robot
@@ -82,8 +82,8 @@ def machine_numbers(robot: Robot) -> MachineNumbers:
         robot: robot with a covariance, or with ``tolerance`` and ``std``, in its file.
 
     Returns:
-        Parameters with a stated uncertainty, except those of one session and of the
-        pose of a measuring device.
+        Parameters with a stated uncertainty, except those of a single session and of
+        the pose of a measuring device.
 
     Raises:
         BadInput: the file of the covariance cannot be read.
@@ -100,7 +100,7 @@ def machine_numbers(robot: Robot) -> MachineNumbers:
 
 
 def _is_shared(number: Number, robot: Robot) -> bool:
-    """Return whether a parameter is the same in all sessions."""
+    """Return whether a parameter is common to all sessions."""
     if number.kind == EFFECT:
         return not number.session and number.owner not in {"registration", DRIFT}
     if number.kind == FUNCTION:
@@ -110,7 +110,7 @@ def _is_shared(number: Number, robot: Robot) -> bool:
 
 
 def _possible(number: Number, robot: Robot, by: float) -> float:
-    """Return the change of a parameter, limited to the parameter's admissible range."""
+    """Limit the change of a parameter to its admissible range."""
     value = number.of(robot)
     if number.kind == EFFECT and value > 0.0:
         unknowns = LIBRARY[number.owner].unknowns(robot)
@@ -120,19 +120,18 @@ def _possible(number: Number, robot: Robot, by: float) -> float:
 
 
 def unchanging(robot: Robot) -> MachineNumbers:
-    """Return an empty set of parameters: the robot is treated as known exactly."""
+    """Return an empty set of parameters, as for a robot that is known exactly."""
     return MachineNumbers(robot, (), np.zeros((0, 0)))
 
 
 def renumbered(machine: MachineNumbers) -> list[Number]:
-    """Return the parameters, renumbered after removing the functions of time.
+    """Return the parameters, renumbered for a robot without functions of time.
 
     Args:
         machine: parameters of a saved robot.
 
     Returns:
-        The same parameters.  The indices of functions count only functions that do not
-        depend on time.
+        The same parameters, in which function indices skip functions of time.
     """
     own, places = of_one_session(machine.robot)[1], dict[str, str]()
     for place, function in enumerate(machine.robot.functions):

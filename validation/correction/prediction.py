@@ -1,4 +1,4 @@
-"""Predict the readings of a robot for commands, with or without measurements."""
+"""Predict the readings of a robot for given commands."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -33,7 +33,7 @@ _MOVED = 3.0  # largest ratio of residuals, saved to fitted pose, of an unmoved 
 
 @dataclass(frozen=True, eq=False)
 class PredictedReadings:
-    """Readings that a robot predicts for commands.
+    """Predicted readings of a robot for given commands.
 
     Attributes:
         commands: the commands, R rows.
@@ -64,7 +64,7 @@ class PredictedReadings:
     __repr__, _repr_html_ = short_repr, html_table
 
     def to_xarray(self) -> "xarray.Dataset":
-        """Return an xarray data set over ``row``: measured and predicted readings."""
+        """Convert measured and predicted readings to a data set over ``row``."""
         return row_dataset(
             self.commands,
             {
@@ -78,13 +78,13 @@ class PredictedReadings:
         )
 
     def to_pandas(self) -> "pandas.DataFrame":
-        """Return a pandas table, one row per reading, columns (variable, component)."""
+        """Convert to a pandas table with one row per reading."""
         from forcefit.assembly.model.tables import frame_table
 
         return frame_table(self.to_xarray(), "row")
 
     def table(self) -> dict[str, Any]:
-        """Return the predictions as plain values."""
+        """Convert the predictions to plain values."""
         rows = zip(self.commands.ids, self.prediction.reason, strict=True)
         far = zip(self.commands.ids, self.extrapolated, strict=True)
         missing = list(self.commands.robot.diagnosis.get("not_measured", []))
@@ -113,22 +113,20 @@ def _both(values: NDArray) -> dict[str, float]:
 
 
 def predict(commands: Campaign) -> PredictedReadings:
-    """Return the readings of a campaign's robot for its commands.
+    """Return the predicted readings of a campaign's robot for its commands.
 
-    The registration is the pose of the measuring device.  An unknown registration is
-    read from the robot file.  The registration is fitted to the measured rows if the
-    file contains none.  It is also fitted if the residual of these rows shows that the
-    device was moved.
+    An unknown registration, that is, the pose of the measuring device, is read from the
+    robot file.  It is fitted to the measured rows if the file contains none, or if the
+    residual of these rows shows that the device was moved.
 
     Args:
         commands: campaign with the robot, its effects and its rows.
 
     Returns:
-        The predicted readings with their uncertainty.
+        The predicted readings and their uncertainty.
 
     Raises:
-        BadInput: the registration is unknown, and the rows do not determine the pose of
-            the measuring device.
+        BadInput: the registration is unknown and the rows do not determine it.
     """
     conditions, registration = _registered(commands, finite_conditions(commands))
     prediction = predict_rows(conditions)
@@ -158,7 +156,7 @@ _FITTED = "fitted to these rows"
 
 
 def _registered(commands: Campaign, conditions: Conditions) -> tuple[Conditions, str]:
-    """Return the conditions with the device's pose, and the source of this pose."""
+    """Add the device pose to the conditions; also return the source of this pose."""
     if commands.registration == "known":
         return conditions, "known"
     carried = np.broadcast_to(conditions.base, (len(commands), 6)).any(axis=1).all()
@@ -192,7 +190,7 @@ def _unplaced(robot: Robot) -> Robot:
 
 
 def _noise(commands: Campaign) -> NDArray:
-    """Return (R, 6) [rad, m] noise: sigma, or the scatter of held-out rows."""
+    """Return the noise (R, 6) [rad, m]: sigma, or the scatter of held-out rows."""
     record = commands.robot.diagnosis
     known = [record.get("noise_rotation"), record.get("noise_position")]
     sizes = [x if isinstance(x, float) else np.nan for x in known]
@@ -206,8 +204,8 @@ def reading_names(commands: Campaign) -> list[tuple[str, str, int]]:
     """Return the columns of a table of readings as triples: column, point, component.
 
     Args:
-        commands: the rows of the table.  Components that were not measured in any row
-            are omitted, unless the table contains no measurement at all.
+        commands: the rows of the table.  Components that were never measured are
+            omitted unless the table contains no measurement at all.
     """
     points = [""]
     if commands.point is not None:
@@ -228,15 +226,15 @@ def reading_names(commands: Campaign) -> list[tuple[str, str, int]]:
 
 
 def reading_table(predicted: PredictedReadings) -> str:
-    """Return predicted readings as a table with ``id`` and a campaign's columns.
+    """Return predicted readings as a table with the columns of a campaign.
 
     Args:
         predicted: result of :func:`predict`.
 
     Returns:
-        CSV. The cells of a row without a solution are empty.  If the robot file
-        contains uncertainties, columns ``std.`` and ``noise.`` for every reading
-        follow.  The column ``extrapolated`` lists the variables whose values are
+        CSV in which the cells of rows without a solution are empty.  If the robot file
+        contains uncertainties, columns ``std.`` and ``noise.`` follow for every
+        reading.  The column ``extrapolated`` lists the variables whose values are
         outside the range in which the robot was identified.
     """
     commands, deviations = predicted.commands, predicted.prediction.deviation

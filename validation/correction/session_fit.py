@@ -1,4 +1,4 @@
-r"""Fit the parameters of sessions and of the machine to set-up rows.
+r"""Fit session and machine parameters to set-up rows.
 
 ======  ==============  ============  ================================================
 symbol  code            shape         meaning
@@ -11,16 +11,16 @@ C       ``covariance``  (k, k)        covariance of x
 
 The parameters of each session (:mod:`.session_unknowns`) have a flat or a Gaussian
 prior.  The parameters u of the machine (:mod:`.machine_numbers`) are common to all
-sessions, with the prior N(0, k).  The diagnosis of the robot provides tau, the ratio
-between the scatter of the readings about the saved robot and sigma.  Its prior has 20
-degrees of freedom.  Rows of one configuration contain the same information, so together
-they have the weight of one row.
+sessions, with the prior N(0, k).  The ratio tau of the scatter about the saved robot to
+sigma is known from the diagnosis; its prior has 20 degrees of freedom.  Rows of one
+configuration contain the same information, so together they carry the weight of a
+single row.
 
 k is chosen by cross-validation: each configuration of the set-up rows is predicted by a
 fit to the others.  A larger k replaces a smaller one only if it reduces the prediction
-error significantly: by more than a standard error, and by a relevant part of the noise.
-The Bayesian evidence of k is not used, because the evidence assumes that the machine
-changed in the directions of the covariance.
+error by more than a standard error and by a relevant fraction of the noise.  The
+Bayesian evidence of k is not used, because it assumes that the machine changed along
+the directions of the covariance.
 """
 
 from collections.abc import Sequence
@@ -56,7 +56,7 @@ _AT_ONCE = 1000  # number of rows processed together, which limits memory
 
 @dataclass(frozen=True, eq=False)
 class SetUp:
-    """One session of R rows, some of which are set-up rows.
+    """A session of R rows, some of which are set-up rows.
 
     Attributes:
         campaign: the rows, with the saved robot.
@@ -70,23 +70,23 @@ class SetUp:
 
     @cached_property
     def own(self) -> Campaign:
-        """Campaign that contains only the rows measured in this set-up."""
+        """Campaign that contains only the set-up rows."""
         return self.campaign.take(self.rows)
 
     @property
     def repeated(self) -> float:
-        """Average number of set-up rows of each configuration."""
+        """Average number of set-up rows per configuration."""
         return len(self.own) / len(np.unique(self.own.configuration))
 
     @property
     def told(self) -> float:
-        """Ratio of a reading's prior variance to sigma^2; it increases with repeats."""
+        """Ratio of a reading's prior variance to sigma^2; it grows with repeats."""
         left = self.campaign.robot.diagnosis.get("normalised")
         level = max(1.0, left) if isinstance(left, float) else 1.0
         return level**2 * self.repeated
 
     def start(self) -> NDArray:
-        """Return the (p,) start values of the session's parameters."""
+        """Return start values (p,) of the session's parameters."""
         x = self.unknowns.mean.copy()
         if any(name in BASE for _, name in self.unknowns.names):
             conditions = self._still(self.campaign.robot, self.rows)
@@ -95,12 +95,12 @@ class SetUp:
         return x
 
     def _still(self, robot: Robot, rows: NDArray) -> Conditions:
-        """Return the conditions of selected rows without the session's effects."""
+        """Return the conditions of selected rows, excluding the session's effects."""
         bare = replace(self.campaign, robot=without_session(robot))
         return finite_conditions(bare, rows)
 
     def read(self, robot: Robot, values: NDArray) -> NDArray:
-        """Return the (R, 6) [rad, m] predicted readings of all rows."""
+        """Return the predicted readings (R, 6) [rad, m] of all rows."""
         still = self._still(robot, np.arange(len(self.campaign)))
         return predict(self.unknowns.applied(still, values)).deviation
 
@@ -140,7 +140,7 @@ class SetUp:
     def whitened(
         self, machine: MachineNumbers, values: NDArray, u: NDArray
     ) -> tuple[NDArray, NDArray]:
-        """Return (n,) residuals / sigma of set-up rows, and their (n, p + r) slopes."""
+        """Return residuals (n,) / sigma of set-up rows and their slopes (n, p + r)."""
         own = self.own
         read, slopes = self.tangent(machine, values, u, self.rows)
         A = (slopes / own.sigma[:, :, None])[own.cells]
@@ -149,7 +149,7 @@ class SetUp:
 
 @dataclass(frozen=True, eq=False)
 class SessionsFit:
-    """Fitted parameters of sessions and of the machine.
+    """Fitted session and machine parameters.
 
     Attributes:
         sessions: the m sessions.
@@ -170,7 +170,7 @@ class SessionsFit:
 
     @property
     def u(self) -> NDArray:
-        """(r,) independent variables u that describe the changes of the machine."""
+        """(r,) independent variables u that describe changes of the machine."""
         return self.x[len(self.x) - len(self.machine) :]
 
     @property
@@ -187,7 +187,7 @@ class SessionsFit:
         return self.x[self.own(number)]
 
     def spread(self, number: int, cells: NDArray) -> tuple[float, NDArray]:
-        """Return the uncertainty of a session's readings due to the uncertainty of x.
+        """Return the variance of a session's readings caused by the uncertainty of x.
 
         Args:
             number: index of the session.
@@ -195,8 +195,8 @@ class SessionsFit:
                 averaged.
 
         Returns:
-            The mean variance, and (p + 1,) contributions of each parameter of the
-            session and of all of u together.
+            The mean variance, and the contributions (p + 1,) of each session parameter
+            and of u as a whole.
         """
         one, own = self.sessions[number], self.own(number)
         p, u = own.stop - own.start, slice(len(self.x) - len(self.machine), len(self.x))
@@ -220,7 +220,7 @@ def _own(sessions: Sequence[SetUp], number: int) -> slice:
 
 
 def fit_sessions(sessions: Sequence[SetUp], machine: MachineNumbers) -> SessionsFit:
-    """Fit the parameters of sessions and machine to the set-up rows.
+    """Return session and machine parameters fitted to the set-up rows.
 
     Args:
         sessions: sessions of one robot.
@@ -269,7 +269,7 @@ def _settled(
 
 
 def _inverse(H: NDArray) -> NDArray:
-    """Return the inverse of the information matrix H, finite for a singular H too."""
+    """Return the inverse of the information matrix H, finite even if H is singular."""
     size = np.sqrt(np.diag(H))
     unit = np.where(size > 0, size, 1.0)
     scaled = H / np.outer(unit, unit) + 1e-14 * np.eye(len(H))
@@ -316,13 +316,13 @@ def _widened(
 
 
 def _matters(more: NDArray, count: int) -> bool:
-    """Return whether an increase of the blocks' squared errors is significant."""
+    """Return whether an increase in the blocks' squared errors is significant."""
     error = float(more.std(ddof=1)) * np.sqrt(len(more)) if len(more) > 1 else 0.0
     return bool(more.sum() > max(_SURE * error, _MATTERS * count))
 
 
 def _blocks(sessions: Sequence[SetUp], number: int) -> NDArray:
-    """Return the (n,) configuration of set-up readings, numbered over all sessions."""
+    """Return the configuration (n,) of set-up readings, numbered over all sessions."""
     before = sum(len(np.unique(s.own.configuration)) for s in sessions[:number])
     own = sessions[number].own
     rows = np.nonzero(own.cells)[0]

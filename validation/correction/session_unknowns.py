@@ -1,14 +1,14 @@
-"""Define the parameters of a robot that are fitted again in every session.
+"""Define the robot parameters that are refitted in every session.
 
-These parameters are the pose of the measuring device and all changes with time, that
-is, the effect ``drift`` and the functions of time.  If requested, the measured point
-and the zeros of the joints are fitted too.  A slow wave or a step that occurred on one
-day is not expected to repeat.  In a new session the prior mean of its coefficients is
-zero, and the prior standard deviation is their previous size.  A change that starts
-with every session (a lag or creep) may repeat, so the prior mean of its coefficients is
-their previous values.  Early readings determine a later drift poorly.  The drift then
-increases the uncertainty of predictions for later rows.  Without a column ``cov.time``
-no drift is fitted.
+These are the pose of the measuring device, all changes with time, that is, the effect
+``drift`` and the functions of time, and, if requested, the measured point and the zeros
+of the joints.  A slow wave or a step that occurred on one day is not expected to
+repeat.  In a new session the prior mean of its coefficients is zero, and the prior
+standard deviation is their previous size.  A change that starts with every session (a
+lag or creep) may repeat, so the prior mean of its coefficients is their previous
+values.  Early readings determine a later drift poorly, so the drift increases the
+uncertainty of predictions for later rows.  No drift is fitted without a column
+``cov.time``.
 """
 
 from collections.abc import Sequence
@@ -40,7 +40,7 @@ _CONSTANT = "time_constant"
 
 
 def of_one_session(robot: Robot) -> tuple[dict[str, float], tuple[Function, ...]]:
-    """Return the drift's parameters, and the functions of time for all sessions."""
+    """Return the drift parameters and the functions of time of all sessions."""
     functions = tuple(
         f for f in robot.functions
         if f.session is None and any(name in CLOCKS for name in f.variables)
@@ -49,7 +49,7 @@ def of_one_session(robot: Robot) -> tuple[dict[str, float], tuple[Function, ...]
 
 
 def without_session(robot: Robot) -> Robot:
-    """Return the robot without the pose of the device and without changes with time."""
+    """Remove the device pose and all changes with time from a robot."""
     effects = {name: dict(values) for name, values in robot.effects.items()}
     effects.pop(DRIFT, None)
     tool = {k: v for k, v in effects.pop("registration", {}).items() if k in TOOL}
@@ -65,7 +65,7 @@ class SessionUnknowns:
     """Prior of the k parameters that are fitted in a session.
 
     Attributes:
-        names: pairs of the owner (an effect, or a function's title) and the parameter.
+        names: pairs of owner (an effect or the title of a function) and parameter.
         mean: (k,) prior means.
         prior: (k,) prior precisions, 1 / variance; zero for a flat prior.
         step: (k,) step of the numerical derivative, which changes the readings by
@@ -90,7 +90,7 @@ class SessionUnknowns:
         return [_owner(i, function) for i, function in enumerate(self.functions)]
 
     def effects(self, x: NDArray) -> dict[str, dict[str, float]]:
-        """Return the effects of the library for the parameter values x (k,)."""
+        """Return the library effects for parameter values x (k,)."""
         values: dict[str, dict[str, float]] = {}
         for (effect, name), value in zip(self.names, x.tolist(), strict=True):
             if effect in LIBRARY:
@@ -100,7 +100,7 @@ class SessionUnknowns:
         return values
 
     def functions_with(self, x: NDArray, session: str | None) -> tuple[Function, ...]:
-        """Return the functions of time for the values x (k,), active in one session."""
+        """Return the functions of time for values x (k,), active in one session."""
         known = dict(zip(self.names, x.tolist(), strict=True))
         return tuple(
             replace(
@@ -116,7 +116,7 @@ class SessionUnknowns:
         )
 
     def applied(self, conditions: Conditions, x: NDArray) -> Conditions:
-        """Return the conditions of the session's rows for the values x (k,)."""
+        """Apply the values x (k,) to the conditions of the session's rows."""
         known = apply_effects(conditions, self.effects(x))
         return apply_functions(known, self.functions_with(x, None), conditions)
 
@@ -132,7 +132,7 @@ def session_unknowns(
         clock: whether the rows of the session contain a time.
 
     Returns:
-        The parameters.  Changes with time are included only if ``clock`` is true.
+        The parameters, which include changes with time only if ``clock`` is true.
     """
     names: list[tuple[str, str]] = []
     if "registration" in fitted:
@@ -180,7 +180,7 @@ def _owner(number: int, function: Function) -> str:
 
 
 def _numbers(robot: Robot, function: Function) -> dict[str, tuple[str, float]]:
-    """Return unit and value of each coefficient in which a function is linear."""
+    """Return unit and value of each linear coefficient of a function."""
     numbers, units = {}, units_of(robot, function)
     for component in function.components:
         own = parameters_of(function, component)

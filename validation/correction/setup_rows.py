@@ -1,4 +1,4 @@
-"""Select rows of a campaign with the option ``--setup``."""
+"""Interpret the option ``--setup``, which selects set-up rows."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,8 +12,8 @@ def setup_rows(campaign: Campaign, text: str) -> NDArray:
 
     Args:
         campaign: campaign with rows in the order of its file.
-        text: ``20`` for the first 20 rows of each session; or a list of row numbers,
-            ranges and labels, such as ``1-20,31``.
+        text: ``20`` for the first 20 rows of each session, or a list of row numbers,
+            ranges and labels, for example ``1-20,31``.
 
     Returns:
         (R,) bool; all points of one row of the file are selected together.
@@ -42,7 +42,7 @@ def _first(campaign: Campaign, labels: list[str], count: int) -> set[str]:
 
 
 def _range(part: str, order: list[str]) -> list[str]:
-    """Return the labels that a number, a range of numbers, or a label selects."""
+    """Return the labels selected by a number, a range of numbers, or a label."""
     if part in order:
         return [part]
     begin, dash, end = part.partition("-")

@@ -1,8 +1,8 @@
-"""Propagate the uncertainty in a robot file to the deviation of the platform.
+"""Propagate the uncertainty in a robot file to the platform deviation.
 
-The covariance of the readings is J C J'.  C is the covariance of the parameters in the
-file (:mod:`forcefit.validation.diagnosis.saved_covariance`).  J contains the
-derivatives of the readings by these parameters.
+The covariance of the readings is J C J', where C is the parameter covariance in the
+file (:mod:`forcefit.validation.diagnosis.saved_covariance`) and J contains the
+derivatives of the readings with respect to the parameters.
 """
 
 from collections.abc import Callable
@@ -38,7 +38,7 @@ _STEP = 0.1  # [standard deviations] step of the numerical derivative
 def deviation_spread(
     robot: Robot, conditions_for: Callable[[Robot], Conditions]
 ) -> NDArray:
-    """Return the standard deviation of the deviation at the measured points.
+    """Return the standard deviation of the deviations at the measured points.
 
     Args:
         robot: robot with its effects.
@@ -60,7 +60,7 @@ def number_slopes(
     robot: Robot, conditions: Conditions, numbers: tuple[Number, ...], std: NDArray,
     conditions_for: Callable[[Robot], Conditions],
 ) -> NDArray:  # fmt: skip
-    """Return the derivatives of the deviation by parameters of a robot file.
+    """Return the derivatives of the deviations by parameters of a robot file.
 
     Args:
         robot: robot with its effects.
@@ -92,7 +92,7 @@ def number_slopes(
 
 
 def _is_direct(robot: Robot, number: Number) -> bool:
-    """Return whether a function's variables do not change by the motion it causes."""
+    """Return whether a function's variables are unaffected by the motion it causes."""
     function = robot.functions[int(number.owner)]
     wrench = any(name.startswith("wrench.") for name in function.variables)
     alone = function.where not in PLACES and function.kind == "compliance"
@@ -105,7 +105,7 @@ def _of_function(
     robot: Robot, conditions: Conditions, response: Responses, number: Number,
     sigma: float,
 ) -> NDArray:  # fmt: skip
-    """Return the (R, 6) derivatives of the deviation by one parameter of a function."""
+    """Return the derivatives (R, 6) of the deviation by one parameter of a function."""
     one = robot.functions[int(number.owner)]
     step = _STEP * sigma if sigma > 0.0 else 1.0
     more = one.parameters[number.name] + step

@@ -1,4 +1,4 @@
-"""Compare model and simulation, quantity by quantity, at several scales.
+"""Compare model and multibody simulation at several scales of the imperfections.
 
 Start with ``crosscheck.py``.  The compared quantities are defined in ``pose_metric.py``
 and ``clearance_metric.py``.

@@ -1,10 +1,10 @@
 """Compare two models with clearances by their energies and spring deformations.
 
-If no load acts on a clearance, the pose of least energy is not unique, so poses are not
-compared.  The least energy and the deformations and wrenches of the springs are unique.
-The clearance motions of the simulation are also inserted into the linear model.  The
-difference between the resulting energy and the least energy is the optimality gap.  If
-links are springs in the simulation, its energy must also equal the energy of the exact
+If a clearance carries no load, the minimum-energy pose is not unique, so poses are not
+compared.  The minimum energy and the deformations and wrenches of the springs are
+unique. In addition, the simulated clearance motions are inserted into the linear model.
+The excess of the resulting energy over the minimum is the optimality gap.  If links are
+springs in the simulation, its energy must also equal the energy of the exact
 virtual-joint model at full scale.  Errors, clearances and load are multiplied by one
 scale s.  The linear energy is proportional to s^2.  The relative optimality gap is also
 proportional to s^2, until the compliance of the contacts dominates.
@@ -37,12 +37,12 @@ FLOOR_ENERGY = 1e-4  # [J] energy of the springs that centre clearances, at scal
 
 @dataclass(frozen=True, eq=False)
 class ClearanceMetric:
-    """Differences of energies and spring deformations, and the optimality gap.
+    """Differences in energies and spring deformations, and the optimality gap.
 
     Attributes:
         robot: robot with its clearances.
-        pairs: both solutions at each scale, largest first.
-        springs: whether all links are springs in the simulation too.
+        pairs: both solutions at each scale, largest scale first.
+        springs: whether the simulation also models all links as springs.
     """
 
     robot: Robot
@@ -51,12 +51,12 @@ class ClearanceMetric:
 
     @property
     def slope(self) -> float:
-        """NaN, because poses are not unique and are not compared."""
+        """NaN, because poses are not compared."""
         return math.nan
 
     @property
     def scales(self) -> NDArray:
-        """(k,) scales of the imperfections, the largest first."""
+        """(k,) scales of the imperfections, largest first."""
         return np.array([pair.scale for pair in self.pairs])
 
     @cached_property
@@ -70,10 +70,10 @@ class ClearanceMetric:
 
     @cached_property
     def signal(self) -> bool:
-        """Whether clearances or springs deform by more than the noise.
+        """Whether clearance motions or spring deformations exceed the noise.
 
-        Inside an assembly zone both energies are zero.  This agreement counts as a
-        result only if closing the loops without clearances would store energy.
+        Inside an assembly zone both energies are zero.  This agreement is meaningful
+        only if closing the loops without clearances would store energy.
         """
         linear, s = self.pairs[0].linear, self.pairs[0].scale
         return (
@@ -97,7 +97,7 @@ class ClearanceMetric:
         return {k: replace(check, signal=self.signal) for k, check in limits.items()}
 
     def _strain_limit(self) -> Check:
-        """Return the difference of all spring deformations in the energy norm."""
+        """Return the energy norm of the difference in spring deformations."""
         frames = self.robot.frames
         K = {"link_screws": np.zeros((len(frames), 6, 6))}
         K["joint_screws"] = np.zeros((len(frames), 6, 6))
@@ -159,7 +159,7 @@ class ClearanceMetric:
         return checks
 
     def table(self) -> dict[str, Any]:
-        """Return the entries of the public format that exist only for this metric."""
+        """Return the public entries that are specific to this metric."""
         return {
             "clearances": "on both sides; poses are not unique and not judged",
             "slope": None,
@@ -179,7 +179,7 @@ class ClearanceMetric:
         ]
 
     def rows(self) -> list[list[str]]:
-        """Return one row of text for each scale."""
+        """Return one table row per scale."""
         return [
             [
                 f"{pair.scale:.4g}",
@@ -194,7 +194,7 @@ class ClearanceMetric:
         ]
 
     def notes(self) -> list[str]:
-        """Return the text lines that precede the table of scales."""
+        """Return the lines of text above the table of scales."""
         return ["with clearances"]
 
 
@@ -206,15 +206,15 @@ def optimality_gap(pair: Pair) -> float:
 
     Returns:
         [-] potential energy (elastic energy minus work of the load) of the linear model
-        minus its least value, divided by a reference energy.  The linear model is
-        evaluated at the simulated clearance motions, projected onto their cones.  The
-        reference is the largest of three energies: stored without clearances, stored
-        with clearances under the load, and :data:`FLOOR_ENERGY`.
+        minus its minimum, divided by a reference energy.  The linear model is evaluated
+        at the simulated clearance motions, projected onto their cones.  The reference
+        is the largest of the energy stored without clearances, the energy stored with
+        clearances under load, and :data:`FLOOR_ENERGY`.
     """
     best = pair.linear
     small = reduce_problem(linearise(best.posture), best.joints, best.frame_loads)
     cones = best.joints.cones
-    # Each column of ``cones`` contains one nonzero entry, the inverse of its bound.
+    # Each column of ``cones`` has a single nonzero entry, the inverse of its bound.
     u = cones.T @ pair.simulated.clearance_screws.ravel() / (cones**2).sum(axis=0)
     u = into_cones(u, best.joints.group)
     strain, least = small.G @ u + small.h, small.G @ best.clearances + small.h

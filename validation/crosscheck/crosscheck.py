@@ -3,7 +3,7 @@
 Both models are solved at several scales.  A scale multiplies the load and all
 imperfections (geometric errors and clearances).  Without clearances, the platform's
 poses are compared (:mod:`forcefit.validation.crosscheck.pose_metric`).  With
-clearances, the pose of least energy is not unique, so energies and springs are compared
+clearances, the minimum-energy pose is not unique, so energies and springs are compared
 (:mod:`forcefit.validation.crosscheck.clearance_metric`).
 """
 
@@ -67,32 +67,32 @@ ELEMENTS = 4  # number of elements of each beam in the simulation
 
 
 class Metric(Protocol):
-    """Comparison of two models at several scales (protocol)."""
+    """Protocol of a comparison of two models at several scales."""
 
     @property
     def slope(self) -> float:
-        """Slope of the pose difference against the scale; NaN without poses."""
+        """Slope of the pose difference over the scale; NaN if not compared."""
 
     @property
     def checks(self) -> dict[str, Check]:
         """Checks of the comparison, by name."""
 
     def notes(self) -> list[str]:
-        """Return the text lines that precede the table of scales."""
+        """Return the lines of text above the table of scales."""
 
     def header(self) -> list[str]:
         """Return the column headings of :meth:`rows`."""
 
     def rows(self) -> list[list[str]]:
-        """Return one row of text for each scale."""
+        """Return one table row per scale."""
 
     def table(self) -> dict[str, Any]:
-        """Return the entries of the public format that exist only for this metric."""
+        """Return the public entries that are specific to this metric."""
 
 
 @dataclass(frozen=True, eq=False)
 class Crosscheck:
-    """Solutions of a robot at one posture by two models at several scales.
+    """Solutions of one posture by two models at several scales.
 
     Attributes:
         posture: the nominal posture.
@@ -100,8 +100,8 @@ class Crosscheck:
         links: model of links in the simulation: ``"beam"``, ``"spring"``, ``"fem"``.
         gravity: (3,) [m/s^2] gravity at scale 1, base axes.
         pairs: solutions at each scale, largest first.
-        asked: number of requested scales.  The other, smaller scales were added because
-            a check was not decided.
+        asked: number of requested scales.  Smaller scales were added because a check
+            was undecided.
         metric: comparison of the solutions.
     """
 
@@ -117,12 +117,12 @@ class Crosscheck:
 
     @property
     def scales(self) -> NDArray:
-        """(k,) scales of the imperfections, the largest first."""
+        """(k,) scales of the imperfections, largest first."""
         return np.array([pair.scale for pair in self.pairs])
 
     @property
     def slope(self) -> float:
-        """Slope of the pose difference against the scale; NaN without poses."""
+        """Slope of the pose difference over the scale; NaN if not compared."""
         return self.metric.slope
 
     @property
@@ -144,11 +144,11 @@ class Crosscheck:
         return verdict(self) == PASSED
 
     def table(self) -> dict[str, Any]:
-        """Return all results of ``validation crosscheck`` by key of the public format.
+        """Return all results of ``validation crosscheck`` under their public keys.
 
         Returns:
-            Mapping.  ``scales`` contains the requested scales, ``added_scales`` all
-            others.
+            Mapping in which ``scales`` contains the requested scales and
+            ``added_scales`` all others.
         """
         robot = self.posture.robot
         tables = [pair.table(robot) for pair in self.pairs]
@@ -189,7 +189,7 @@ class Crosscheck:
         }
 
     def text(self) -> str:
-        """Return a table and the verdict as text without colours."""
+        """Format the table of scales and the verdict as plain text."""
         cells = [self.metric.header(), *self.metric.rows()]
         lines = [f"{self.posture.robot.name}, {self.metric.notes()[0]}"]
         lines += self.metric.notes()[1:]
@@ -217,7 +217,7 @@ def crosscheck(
     time_limit: float = TIME_LIMIT,
     clearances: bool = False,
 ) -> Crosscheck:
-    """Solve both models of a robot at several scales of its imperfections.
+    """Cross-check both models of a robot at several scales of its imperfections.
 
     Args:
         posture: the robot's configuration.
@@ -232,16 +232,16 @@ def crosscheck(
         gravity: (3,) [m/s^2] gravity in base axes.  Beams with a density and bodies
             with a mass then have weight in all models.
         time_limit: [s] time limit of each simulation.
-        clearances: whether both models have clearances; poses are then not compared.
+        clearances: whether both models include clearances; poses are then not compared.
 
     Returns:
-        Both solutions at every scale, and the verdict.
+        Both solutions at every scale and the verdict.
 
     Raises:
-        BadInput: fewer than two scales, or a scale that is not positive.
+        BadInput: fewer than two scales are given, or a scale is not positive.
         SimulationFailed: the simulation found no equilibrium.
         CannotAssemble: the virtual-joint model has no solution.
-        FreeMotion: the load acts along a motion without stiffness.
+        FreeMotion: the load acts along an unresisted motion.
     """
     robot = posture.robot if clearances else without_clearance(posture.robot)
     compared = replace(posture, robot=robot)
@@ -252,7 +252,7 @@ def crosscheck(
     springs = links == "spring"
     between = 0.0 if springs else energy_between_ends(compared, g, ELEMENTS)
 
-    # free motions that springs hold at one scale are held at smaller scales too
+    # Free motions that springs hold at one scale are held at all smaller scales, too.
     held: list[float] = []
 
     def solve(s: float) -> Pair:
@@ -296,14 +296,14 @@ def crosscheck(
 def attempt(
     robot: str, check: Callable[[], Result]
 ) -> tuple[Result | None, dict[str, Any]]:
-    """Run a check, and return its result or the reason of its failure.
+    """Run a check and return its result, or the reason for its failure.
 
     Args:
         robot: name of the robot.
         check: function without arguments that runs the check.
 
     Returns:
-        The pair (result, None) or, after a failure, the pair (None, table).  The table
+        ``(result, None)`` on success.  ``(None, table)`` on failure, where the table
         contains ``status``, ``reason``, ``passed`` and a null ``slope``.
     """
     try:

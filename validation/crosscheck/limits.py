@@ -1,4 +1,4 @@
-"""Compute limits and slopes of differences between two models, with uncertainties.
+"""Extrapolate differences between two models to scale 0, with uncertainties.
 
 ======  ===================  ==========================================================
 symbol  code                 meaning
@@ -37,13 +37,13 @@ HALVES = {"rotation": slice(0, 3), "translation": slice(3, 6)}
 def spring_limits(
     robot: Robot, pairs: Sequence[Pair], spread: bool = False
 ) -> dict[str, Check]:
-    """Return the relative differences of springs and energy, extrapolated to scale 0.
+    """Return relative differences of springs and energy, extrapolated to scale 0.
 
     Args:
         robot: robot with the compared links and joint springs.
         pairs: both solutions at several scales.
-        spread: whether loads act between the ends of links.  The linear model does not
-            contain such loads, so the wrenches of links are not compared.
+        spread: whether loads act between the ends of links.  Link wrenches are then not
+            compared, because the linear model does not contain such loads.
 
     Returns:
         Mapping from name to difference, relative to the largest value of all links or
@@ -102,9 +102,9 @@ def limit_difference(
             the values at scale 1.
 
     Returns:
-        [-] the relative difference; at most the bound if only noise remains.  The check
-        has a signal if the bound times the largest value of ``ours`` is above the
-        noise.
+        [-] the relative difference, which is at most the bound if only noise remains.
+        The check has a signal if the bound times the largest value of ``ours`` exceeds
+        the noise.
     """
     weight = scales.reshape(-1, *[1] * (ours.ndim - 1)) ** -float(power)
     limit, change = limit_of(scales, (theirs - ours) * weight)
@@ -131,7 +131,7 @@ def limit_of(scales: NDArray, values: NDArray) -> tuple[float, float]:
 
 
 def _stiffest(robot: Robot) -> NDArray:
-    """Return the (2,) [N m/rad, N/m] largest stiffness of any spring."""
+    """Return the largest stiffness (2,) [N m/rad, N/m] of any spring."""
     diagonals = [np.zeros(6)]
     links = [frame for frame in robot.frames if frame.link is not None]
     diagonals += [np.diag(link_stiffness(frame)) for frame in links]
@@ -155,8 +155,8 @@ def difference_slope(scales: ArrayLike, differences: ArrayLike, floor: float) ->
         floor: size below which differences are noise and are omitted.
 
     Returns:
-        2 without a first-order term, and 1 with only this term.  NaN if fewer than two
-        differences are above the floor.
+        2 without a first-order term, and 1 if only this term is present.  NaN if fewer
+        than two differences exceed the floor.
     """
     scales, parts = _clear(scales, differences, floor)
     if len(scales) < 2:
@@ -169,7 +169,7 @@ def difference_slope(scales: ArrayLike, differences: ArrayLike, floor: float) ->
 def slope_check(
     scales: ArrayLike, differences: ArrayLike, floor: float, bound: float
 ) -> Check:
-    """Return the check of a slope: its difference from 2.
+    """Return the check that a slope equals 2.
 
     Args:
         scales: (k,) scales, largest first.
@@ -199,7 +199,7 @@ def slope_check(
 def _clear(
     scales: ArrayLike, differences: ArrayLike, floor: float
 ) -> tuple[NDArray, NDArray]:
-    """Return the scales and the (k, components) differences that exceed the noise."""
+    """Return the scales and differences (k, components) that exceed the noise."""
     scales = np.asarray(scales, dtype=float)
     parts = np.asarray(differences, dtype=float).reshape(len(scales), -1)
     clear = np.linalg.norm(parts, axis=1) > floor
@@ -207,7 +207,7 @@ def _clear(
 
 
 def _slope_of_noise(scales: ArrayLike, differences: ArrayLike, floor: float) -> float:
-    """Return the largest change of the slope that noise of size ``floor`` can cause."""
+    """Return the largest slope change that noise of size ``floor`` can cause."""
     scales, parts = _clear(scales, differences, floor)
     weights = extrapolate(scales, np.diag(1.0 / scales))
     first = scales[-1] * floor * float(np.abs(weights).sum())
@@ -215,14 +215,14 @@ def _slope_of_noise(scales: ArrayLike, differences: ArrayLike, floor: float) -> 
 
 
 def extrapolate(scales: NDArray, values: NDArray) -> NDArray:
-    """Return the value at scale 0 of the polynomial through all points (Neville).
+    """Return the value at scale 0 of the interpolating polynomial (Neville).
 
     Args:
         scales: (k,) different scales.
         values: (k, ...) values at these scales.
 
     Returns:
-        (...) value at scale 0.  Its error is of the order of the product of all scales.
+        (...) value at scale 0.  Its error is of the order of the product of the scales.
     """
     table = [np.asarray(v, dtype=float) for v in values]
     for step in range(1, len(table)):

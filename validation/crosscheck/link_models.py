@@ -1,4 +1,4 @@
-"""Select the model of a robot's links in a simulation: beams, springs or solids."""
+"""Select whether a simulation models links as beams, springs or solids."""
 
 from collections.abc import Mapping
 
@@ -15,7 +15,7 @@ KINDS = ("beam", "spring", "fem")
 
 
 def link_models(robot: Robot, kind: str) -> SimulationModel:
-    """Return the model of a robot's links: stiffnesses of springs, and solids.
+    """Return the link model of a simulation: spring stiffnesses and solids.
 
     Args:
         robot: robot of the virtual-joint model.
@@ -24,7 +24,7 @@ def link_models(robot: Robot, kind: str) -> SimulationModel:
             modelled as for ``"beam"``.
 
     Returns:
-        The model, whose joints have no clearance.
+        The model, in which joints have no clearance.
 
     Raises:
         BadInput: the kind is unknown, or a mesh cannot be used.
@@ -59,5 +59,5 @@ def link_stiffnesses(robot: Robot, links: str) -> Mapping[str, NDArray]:
 
 
 def link_stiffness(frame: Frame) -> NDArray:
-    """Return the (6, 6) [N m/rad .. N/m] K_E of a frame's link."""
+    """Return K_E (6, 6) [N m/rad .. N/m] of a frame's link."""
     return np.linalg.inv(link_compliance(frame))

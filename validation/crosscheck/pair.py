@@ -1,4 +1,4 @@
-"""Solutions of two models at one scale of a robot's imperfections."""
+"""Define the pair of solutions of two models at one scale of the imperfections."""
 
 from dataclasses import dataclass, replace
 from typing import Any
@@ -42,17 +42,18 @@ class Pair:
     holding: Assembly | None = None
 
     def noise_of(self, quantity: str) -> NDArray:
-        """Return the effect of the simulation's springs on free motions, at scale 1.
+        """Return the effect at scale 1 of the springs that hold free motions.
 
-        These springs are so weak that their effect is proportional to their stiffness.
+        These springs, which only the simulation contains, are so weak that their effect
+        is proportional to their stiffness.
 
         Args:
             quantity: name of a screw or of wrenches of an ``Assembly``, proportional to
                 the scale.
 
         Returns:
-            Absolute values of the changes, in the shape of the quantity; zero if both
-            models contain the same springs.
+            Absolute changes, in the shape of the quantity; zero if both models contain
+            the same springs.
         """
         value = np.asarray(getattr(self.linear, quantity))
         if self.holding is None or self.simulated.held:
@@ -63,7 +64,7 @@ class Pair:
 
     @property
     def linear_energy(self) -> float:
-        """[J] energy of the linear model, with the energy of distributed weights.
+        """[J] energy of the linear model, including that of distributed weights.
 
         The energy of the springs that hold free motions is excluded, as in the
         simulation.
@@ -121,7 +122,7 @@ class Pair:
 
 
 def sprung(robot: Robot) -> NDArray:
-    """Mark the joint components with springs, which are compared.
+    """Mark the joint components that have springs and are therefore compared.
 
     Args:
         robot: robot of n frames.
@@ -146,7 +147,7 @@ def _named(robot: Robot, part: str, rows: NDArray) -> dict[str, NDArray]:
 
 
 def hold_free_motions(posture: Posture) -> Posture:
-    """Add the springs with which the simulation holds free motions.
+    """Return a posture with the springs that hold free motions in the simulation.
 
     Args:
         posture: posture of a robot without clearances.
@@ -170,7 +171,7 @@ def hold_free_motions(posture: Posture) -> Posture:
 
 
 def holding_energy(robot: Robot, joint_screws: NDArray) -> float:
-    """Return the energy of the springs that hold free motions; zero without them.
+    """Return the energy of the springs that hold free motions, if there are any.
 
     Args:
         robot: robot of the virtual-joint model, with or without springs on free
@@ -190,15 +191,15 @@ def holding_energy(robot: Robot, joint_screws: NDArray) -> float:
 def exact_solution(
     linear: Assembly, gravity: ArrayLike | None = None
 ) -> ExactAssembly | None:
-    """Return the solution with finite rotations near a linear one, or None.
+    """Return the finite-rotation solution near a linear one, or None.
 
     Args:
         linear: linear solution from which the iteration starts.
         gravity: (3,) [m/s^2] base axes, as in the linear solution.
 
     Returns:
-        The exact solution, or None if the iteration found none.  The moment of the load
-        is a couple of dead forces on the platform, as in the simulation.
+        The exact solution, or None if the iteration does not converge.  The moment of
+        the load is a couple of dead forces on the platform, as in the simulation.
     """
     joints, robot = linear.joints, linear.posture.robot
     if not any(A.shape[1] for A in (joints.elastic, joints.cones, joints.free)):

@@ -1,4 +1,4 @@
-"""Plot cross-checks."""
+"""Plot the results of cross-checks."""
 
 import math
 from typing import TYPE_CHECKING
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def slope_figure(check: Crosscheck) -> "Figure":
-    """Return a figure of the difference between both models over the scale.
+    """Return a log-log figure of the model difference over the scale.
 
     Args:
         check: result of :func:`forcefit.validation.crosscheck.crosscheck.crosscheck`,

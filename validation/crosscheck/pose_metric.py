@@ -1,12 +1,12 @@
 """Compare the poses of two models without clearances by slopes and limits.
 
-The virtual-joint model is linear in the errors, and the simulation is nonlinear.  If
-the linear model is correct, the difference between both models is of second order.  If
-errors and load are multiplied by s, the pose difference is proportional to s^2, so its
-slope is 2 in a log-log plot.  Each quantity of the simulation is divided by its power
-of s and extrapolated to s = 0.  The limit must equal the quantity of the linear model.
-Even a wrong first-order term of one thousandth changes the slope and the limit.
-Passive joints move freely about or along their z axis in both models.
+The virtual-joint model is linear in the errors, whereas the simulation is nonlinear. If
+the linear model is correct, the difference is of second order: multiplying errors and
+load by s changes it in proportion to s^2, which is a slope of 2 in a log-log plot. Each
+quantity of the simulation is divided by its power of s and extrapolated to s = 0. The
+limit must equal the quantity of the linear model. Even a relative error of one
+thousandth in a first-order term changes the slope and the limit. Passive joints move
+freely about or along their z axis in both models.
 
 ======  ===============  =============================================================
 symbol  code             meaning
@@ -42,21 +42,20 @@ SLOPE_TOLERANCE = 0.1
 # [-] Largest accepted fraction of the pose difference that remains with the exact model
 # if links are springs.
 EXPLAINED_TOLERANCE = 0.02
-# [-] Relative pose difference of first order between a mesh's K_E and its solid.
-# Rounding causes this difference, which is significant only if second-order terms are
-# as small.
+# [-] Relative first-order pose difference between a mesh's K_E and its solid.  It is
+# caused by round-off and matters only if second-order terms are equally small.
 _ROUNDING = 2e-5
 
 
 @dataclass(frozen=True, eq=False)
 class PoseMetric:
-    """Differences of the platform's pose, of spring deformations and of energy.
+    """Differences in platform pose, spring deformations and energy.
 
     Attributes:
         robot: robot without clearances.
-        pairs: both solutions at each scale, largest first.
-        springs: whether all links are springs in the simulation too.
-        gravity: whether there is gravity.
+        pairs: both solutions at each scale, largest scale first.
+        springs: whether the simulation also models all links as springs.
+        gravity: whether gravity acts.
     """
 
     robot: Robot
@@ -66,7 +65,7 @@ class PoseMetric:
 
     @property
     def scales(self) -> NDArray:
-        """(k,) scales of the imperfections, the largest first."""
+        """(k,) scales of the imperfections, largest first."""
         return np.array([pair.scale for pair in self.pairs])
 
     @cached_property
@@ -82,7 +81,7 @@ class PoseMetric:
 
     @cached_property
     def slopes(self) -> dict[str, float]:
-        """Slope of each difference; NaN if it is below the solver's noise."""
+        """Slope of each difference; NaN if it is below the solver noise."""
         return {
             name: difference_slope(self.scales, values, FLOOR[name])
             for name, values in self.components.items()
@@ -99,9 +98,9 @@ class PoseMetric:
         """Fraction of the pose difference that remains with the exact model.
 
         The fraction is computed at the largest scale.  If links are springs, only
-        rounding errors remain.  If links are beams, the error of modelling the finite
-        bending of a beam by one spring remains.  The fraction is NaN without a pose
-        difference.
+        round-off remains.  If links are beams, the error of modelling the finite
+        bending of a beam by one spring remains.  The fraction is NaN if there is no
+        pose difference.
         """
         first = self.pairs[0]
         if first.exact is None:
@@ -118,10 +117,10 @@ class PoseMetric:
     def limits(self) -> dict[str, Check]:
         """Relative difference of both models by quantity, extrapolated to scale 0.
 
-        The rotation and translation parts of screws and wrenches are compared
-        separately.  Each is divided by the largest value of all frames with such a
+        Rotational and translational parts of screws and wrenches are compared
+        separately, each relative to the largest value over all frames with such a
         spring.  Differences below :data:`FLOOR` are noise, and so are the wrenches that
-        such differences cause in the stiffest spring.
+        they cause in the stiffest spring.
         """
         ours = np.array([p.linear.platform_screw for p in self.pairs])
         theirs = np.array([p.simulated.platform_screw for p in self.pairs])
@@ -155,7 +154,7 @@ class PoseMetric:
         return slopes | limits | shares
 
     def table(self) -> dict[str, Any]:
-        """Return the entries of the public format that exist only for this metric."""
+        """Return the public entries that are specific to this metric."""
         return {
             "clearances": "left out on both sides",
             "slope": self.slope,
@@ -175,7 +174,7 @@ class PoseMetric:
         ]
 
     def rows(self) -> list[list[str]]:
-        """Return one row of text for each scale."""
+        """Return one table row per scale."""
         differences = zip(*self.differences.values(), strict=True)
         return [
             [
@@ -189,7 +188,7 @@ class PoseMetric:
         ]
 
     def notes(self) -> list[str]:
-        """Return the text lines that precede the table of scales."""
+        """Return the lines of text above the table of scales."""
         lines = ["without clearances: simulation minus virtual-joint model"]
         known = {k: v for k, v in self.unexplained.items() if not math.isnan(v)}
         shares = [f"{100 * share:.2g} % of {half}" for half, share in known.items()]

@@ -1,4 +1,4 @@
-"""Run a cross-check at every pose of a grid, and record failures."""
+"""Run a cross-check at every pose of a grid and record failures."""
 
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -40,16 +40,16 @@ def check_poses(
             are free.
         check: function that runs a check at a posture.
         progress: function called after each pose with the number of finished poses and
-            the total number.
+            the total.
 
     Returns:
-        For each pose a mapping with the requested pose ``asked``, ``passed``,
+        For each pose, a mapping with the requested pose ``asked``, ``passed``,
         ``status`` and the results of the check.  ``passed`` is None if the pose is
         unreachable (status ``"out of reach"``) or violates a joint limit (status
         ``"beyond_limits"``).
 
     Raises:
-        BadInput: the kinematic loops of the robot are not closed in its home pose.
+        BadInput: the kinematic loops of the robot do not close in its home pose.
     """
     mesh = np.meshgrid(*axes.values(), indexing="ij")
     poses = np.full((mesh[0].size, 6), np.nan)
@@ -80,14 +80,14 @@ def _row(
 
 
 def poses_table(rows: list[dict[str, Any]]) -> dict[str, Any]:
-    """Return plain values; ``passed`` is true if all reached poses passed."""
+    """Convert to plain values; ``passed`` is true if all reached poses passed."""
     reached = [row for row in rows if row["passed"] is not None]
     passed = bool(reached) and all(row["passed"] for row in reached)
     return {"poses": rows, "passed": passed, "reached": len(reached)}
 
 
 def outcome_text(row: Mapping[str, Any]) -> str:
-    """Return the outcome of :func:`check_poses` at one pose as text."""
+    """Format the outcome of :func:`check_poses` at one pose."""
     outcome = _VERDICTS.get(row.get("verdict", ""), "FAILED")
     if row["passed"] is None:
         outcome = "not checked"
@@ -95,7 +95,7 @@ def outcome_text(row: Mapping[str, Any]) -> str:
 
 
 def poses_text(rows: list[dict[str, Any]]) -> str:
-    """Return one text line for each pose, and the verdict."""
+    """Format one line of text per pose, followed by the verdict."""
     lines = []
     for row in rows:
         where = ", ".join(f"{k}={v:.6g}" for k, v in row["asked"].items())

@@ -28,14 +28,14 @@ _LISTED = 30  # parameters in the table of smallest detectable changes
 ASSUMED = (
     "The simulation (Exudyn) has geometrically exact motions; the virtual-joint model "
     "is linear in errors and loads.",
-    "Both models read the same robot file, so a wrong number there is not found.",
+    "Both models read the same robot file, so errors in that file are not detected.",
     "Neither model has friction or contact stiffness.",
 )
 Cells = list[list[Cell]]
 
 
 def crosscheck_page(check: Crosscheck, provenance: Provenance) -> str:
-    """Return the page of a cross-check at one pose.
+    """Return the report page of a cross-check at one pose.
 
     Args:
         check: result of :func:`forcefit.validation.crosscheck.crosscheck.crosscheck`.
@@ -65,7 +65,7 @@ def crosscheck_page(check: Crosscheck, provenance: Provenance) -> str:
 
 
 def _verdict(check: Crosscheck) -> str:
-    """Return the outcome of the checks in a sentence."""
+    """State the outcome of the checks in one sentence."""
     outcomes = [one.verdict for one in check.checks.values()]
     count = f"{outcomes.count(OK)} of {len(outcomes)} checks passed"
     if verdict(check) == PASSED:
@@ -75,7 +75,7 @@ def _verdict(check: Crosscheck) -> str:
 
 
 def _tiles(check: Crosscheck) -> list[Tile]:
-    """Return tiles of the slope, the check closest to its bound, and the scales."""
+    """Return tiles for the slope, the check closest to its bound, and the scales."""
     tiles = []
     if not np.isnan(check.slope):
         tiles.append(Tile("Slope of the difference", [Value(check.slope)],
@@ -90,35 +90,35 @@ def _tiles(check: Crosscheck) -> list[Tile]:
 
 
 def compared(check: Crosscheck) -> list[str]:
-    """Return a sentence, a table and a chart that compare both models at every scale.
+    """Return text, a table and a chart that compare both models at every scale.
 
     Args:
         check: a cross-check, run alone or as part of a study.
 
     Returns:
-        Pieces of HTML. A chart is included only if poses are compared.
+        HTML fragments.  The chart is included only if poses are compared.
     """
     pieces = [table(check.metric.header(), check.metric.rows(), "cross-check")]
     if not isinstance(check.metric, PoseMetric):
         return pieces
     text = paragraph(
-        "A linearised model must differ from the simulation by the square of the "
-        f"errors' size: slope 2. {_slope_text(check.slope)}"
+        "The difference between a linearised model and the simulation must grow with "
+        f"the square of the errors: slope 2. {_slope_text(check.slope)}"
     )
-    # If the differences are below the noise, there is no slope and no chart.
+    # There is no slope and no chart if the differences are below the noise.
     chart = [] if np.isnan(check.slope) else [_slope_chart(check, check.metric)]
     return [text, *pieces, *chart]
 
 
 def _slope_text(slope: float) -> str:
-    """Return a sentence with the slope, or a sentence that there is no slope."""
+    """State the slope, or that there is none."""
     if np.isnan(slope):
-        return "The two models do not differ here, so there is no slope."
+        return "The two models do not differ measurably, so there is no slope."
     return f"Measured: {slope:.3f}."
 
 
 def _slope_chart(check: Crosscheck, metric: PoseMetric) -> str:
-    """Return the chart of differences over the scale, with a line of slope 2."""
+    """Chart the differences over the scale, together with a line of slope 2."""
     scales = np.asarray(check.scales)
     traces: list[dict[str, Any]] = []
     for name, values in metric.differences.items():
@@ -139,7 +139,7 @@ def _slope_chart(check: Crosscheck, metric: PoseMetric) -> str:
 
 
 def _checks(check: Crosscheck) -> str:
-    """Return a table of the value, uncertainty, bound and outcome of every check."""
+    """Tabulate the value, uncertainty, bound and outcome of every check."""
     rows: Cells = [
         [name, one.value, one.uncertainty, one.bound,
          NOT_CHECKED if one.verdict == NO_SIGNAL else one.verdict]
@@ -153,7 +153,7 @@ def _checks(check: Crosscheck) -> str:
 
 
 def _platform(check: Crosscheck) -> str:
-    """Return a table of the platform's displacement at the largest scale."""
+    """Tabulate the platform's displacement at the largest scale."""
     first = check.pairs[0]
     rows = screw_table(first.linear.platform_screw, first.simulated.platform_screw)
     text = paragraph(
@@ -164,7 +164,7 @@ def _platform(check: Crosscheck) -> str:
 
 
 def screw_table(ours: Any, theirs: Any) -> str:
-    """Return a table of a screw (6,) [rad, m] in both models, rotations first."""
+    """Tabulate a screw (6,) [rad, m] in both models, rotations first."""
     rows: Cells = [
         [
             name,
@@ -178,7 +178,7 @@ def screw_table(ours: Any, theirs: Any) -> str:
 
 
 def _resolutions(check: Crosscheck) -> str:
-    """Return a table of the parameters whose changes are hardest to detect."""
+    """Tabulate the parameters whose changes are hardest to detect."""
     found = sorted(check.resolutions, key=lambda one: -one.smallest)
     unproved = sum(one.unproved for one in found)
     rows: Cells = [
@@ -187,16 +187,16 @@ def _resolutions(check: Crosscheck) -> str:
         for one in found[:_LISTED]
     ]  # fmt: skip
     text = paragraph(
-        f"The relative change of a parameter that a check detects, for the {len(rows)} "
-        f"of {len(found)} parameters that are detected worst; of {unproved} not even a "
-        "change by the full value is detected."
+        f"Smallest relative parameter change that a check detects, for the {len(rows)} "
+        f"of {len(found)} parameters that are hardest to detect; for {unproved} even a "
+        "change by the full value goes undetected."
     )
     head = ["parameter", "kind", "smallest change detected", "check"]
     return section("What the checks detect", text, table(head, rows, "parameters"))
 
 
 def failure_page(failure: Mapping[str, Any], provenance: Provenance) -> str:
-    """Return the page of a cross-check that failed to run.
+    """Return the report page of a cross-check that failed to run.
 
     Args:
         failure: the failure returned by
@@ -224,7 +224,7 @@ def failure_page(failure: Mapping[str, Any], provenance: Provenance) -> str:
 def poses_page(
     robot: str, rows: Sequence[Mapping[str, Any]], provenance: Provenance
 ) -> str:
-    """Return the page of cross-checks at many poses.
+    """Return the report page of cross-checks at many poses.
 
     Args:
         robot: name of the robot.
@@ -265,6 +265,6 @@ def poses_page(
 
 
 def _slope(row: Mapping[str, Any]) -> float:
-    """Return the slope at a pose; NaN if there is none."""
+    """Return the slope at a pose, or NaN if there is none."""
     slope = row.get("slope")
     return np.nan if slope is None else float(slope)

@@ -1,12 +1,10 @@
-"""Compute the smallest change of each robot parameter that a cross-check detects.
+"""Compute the smallest change in each robot parameter that a cross-check detects.
 
-The effect of a wrong parameter is computed with the linear model.  Each parameter is
-changed by one hundredth, and the model is solved again.  The changed solution is
-compared with the original one, as if it were the result of the simulation.  The metric,
-the noise floors and the bounds are the same as in the cross-check.  The smallest
-detected change follows by proportion: it is the relative change for which the first
-check reaches its bound.  A parameter is unproved if a change by its full value is not
-detected.
+Each parameter in turn is changed by one per cent, and the linear model is solved again.
+The perturbed solution takes the place of the simulation in a cross-check with the same
+metric, noise floors and bounds.  The smallest detectable change follows by proportion:
+it is the relative change for which the first check reaches its bound.  A parameter is
+unproved if even a change by its full value goes undetected.
 """
 
 from collections.abc import Iterator, Sequence
@@ -42,7 +40,7 @@ from forcefit.validation.crosscheck.pair import (
 from forcefit.validation.crosscheck.pose_metric import PoseMetric
 
 _CHANGE = 1e-2  # [-] relative change by which the effect of a parameter is computed
-# Name of the check with a value proportional to the square of a change.
+# Name of the check whose value is proportional to the square of a change.
 _QUADRATIC = "optimality gap"
 # [-] A parameter is unproved if a relative change of this size is not detected.
 UNPROVED = 1.0
@@ -52,10 +50,10 @@ _KINDS = ("link", "joint stiffness", "clearance", "error")
 
 @dataclass(frozen=True)
 class Resolution:
-    """Smallest detected change of one parameter of the robot.
+    """Smallest detectable change of one robot parameter.
 
     Attributes:
-        name: frame and quantity, such as ``leg1.elbow.radial``.
+        name: frame and quantity, for example ``leg1.elbow.radial``.
         kind: kind of the parameter: link, joint stiffness, clearance or error.
         value: value of the parameter.  For a link it is 1, the factor on its stiffness
             matrix.
@@ -72,7 +70,7 @@ class Resolution:
 
     @property
     def unproved(self) -> bool:
-        """Whether even a change by the full value of the parameter is not detected."""
+        """Whether even a change by the parameter's full value goes undetected."""
         return not self.smallest < UNPROVED
 
 
@@ -80,7 +78,7 @@ def resolutions(
     posture: Posture, pairs: Sequence[Pair], metric: PoseMetric | ClearanceMetric,
     load: NDArray, gravity: NDArray,
 ) -> list[Resolution]:  # fmt: skip
-    """Return the smallest changes that the limits of a cross-check detect.
+    """Return the smallest parameter changes that a cross-check detects.
 
     Args:
         posture: posture at which the models are compared.
@@ -90,9 +88,9 @@ def resolutions(
         gravity: (3,) [m/s^2] gravity at scale 1.
 
     Returns:
-        One result for each parameter, in the order of the robot's frames.  Parameters
-        are links, finite entries of joint stiffnesses, clearances, and nonzero
-        components of geometric errors.
+        One result per parameter, in the order of the robot's frames.  Parameters are
+        links, finite joint stiffnesses, clearances, and nonzero components of geometric
+        errors.
     """
     found = []
     for name, kind, value, frame in _changes(posture, bool(gravity.any())):
@@ -106,7 +104,7 @@ def resolutions(
 
 
 def _changes(posture: Posture, weight: bool) -> Iterator[tuple[str, str, float, Frame]]:
-    """Yield name, kind and value of each parameter, and its changed frame."""
+    """Yield the name, kind and value of each parameter, and the perturbed frame."""
     more = 1.0 + _CHANGE
     for frame in posture.robot.frames:
         link = frame.link
@@ -134,7 +132,7 @@ def _changes(posture: Posture, weight: bool) -> Iterator[tuple[str, str, float, 
 def _joint_changes(
     frame: Frame, more: float
 ) -> Iterator[tuple[str, str, float, Frame]]:
-    """Yield changes of a joint's finite stiffnesses; a matrix is one parameter."""
+    """Yield perturbed finite joint stiffnesses; a matrix is one parameter."""
     K = frame.joint_stiffness
     if K is None:
         return
@@ -151,7 +149,7 @@ def _joint_changes(
 
 
 def _with_frame(posture: Posture, frame: Frame) -> Posture:
-    """Return the posture with one frame replaced by a frame of the same name."""
+    """Replace the frame of the same name in a posture."""
     frames = [frame if f.name == frame.name else f for f in posture.robot.frames]
     return replace(posture, robot=replace(posture.robot, frames=tuple(frames)))
 
@@ -160,13 +158,13 @@ def _noticed(
     changed: Posture, pairs: Sequence[Pair], metric: PoseMetric | ClearanceMetric,
     load: NDArray, gravity: NDArray,
 ) -> tuple[float, str]:  # fmt: skip
-    """Return the smallest detected relative change, and the name of the check."""
+    """Return the smallest detectable relative change and the check that detects it."""
     first = pairs[0]
     if first.simulated.held:
         changed = hold_free_motions(changed)
     s = first.scale
     other = solve_assembly(scaled(changed, s), s * load, gravity=s * gravity)
-    # Any second scale can be used, because the linear model is homogeneous.
+    # Any second scale will do, because the linear model is homogeneous.
     compared = tuple(
         replace(pair, simulated=_as_simulated(other, first, pair)) for pair in pairs[:2]
     )
@@ -183,7 +181,7 @@ def _noticed(
 
 
 def _as_simulated(other: Assembly, first: Pair, pair: Pair) -> Any:
-    """Return a linear solution in place of the simulation's result at another scale."""
+    """Present a linear solution as the simulation's result at another scale."""
     ratio = pair.scale / first.scale
     held = holding_energy(other.posture.robot, other.joint_screws)
     energy = (other.energy - held) * ratio**2 + pair.between
@@ -201,14 +199,14 @@ def _as_simulated(other: Assembly, first: Pair, pair: Pair) -> Any:
 
 
 def resolution_text(found: Sequence[Resolution]) -> list[str]:
-    """Return text lines: detected changes of each kind, and unproved parameters."""
+    """Format the detectable changes of each kind and the unproved parameters."""
     lines = []
     for kind in _KINDS:
         proved = [r for r in found if r.kind == kind and not r.unproved]
         if proved:
             low, high = (f(proved, key=lambda r: r.smallest) for f in (min, max))
             lines.append(
-                f"smallest change detected, {kind}: {_percent(low.smallest)} "
+                f"smallest detectable change, {kind}: {_percent(low.smallest)} "
                 f"({low.name}) to {_percent(high.smallest)} ({high.name})"
             )
     unproved = [r.name for r in found if r.unproved]
@@ -222,5 +220,5 @@ def resolution_text(found: Sequence[Resolution]) -> list[str]:
 
 
 def _percent(share: float) -> str:
-    """Return a fraction in per cent with two significant digits."""
+    """Format a fraction in per cent with two significant digits."""
     return f"{100 * share:.2g} %"

@@ -1,4 +1,4 @@
-"""Select meshed links as solids for a simulation, with their stiffness matrices."""
+"""Prepare meshed links as solids for a simulation."""
 
 import numpy as np
 from scipy.sparse import csr_matrix, diags

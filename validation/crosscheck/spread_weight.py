@@ -1,11 +1,11 @@
-"""Compute the energy of a beam's distributed weight that loads at its ends neglect.
+"""Compute the energy that is lost when a beam's weight is lumped at its ends.
 
 The virtual-joint model contains only the displacements of a link's two ends.  The
-weight is replaced by half of its force at each end and by the fixed-end moments of a
-beam clamped at both ends (:func:`forcefit.assembly.linear.load.weights`).  The
-displacements of the ends are then exact, but the energy stored between the ends is
-missing.  Without these moments, the displacements of the ends would be wrong too: the
-deflection of a cantilever's tip would be one third too large.
+weight is replaced by half of its force at each end, together with the fixed-end moments
+of a beam clamped at both ends (:func:`forcefit.assembly.linear.load.weights`).  The end
+displacements are then exact, but the energy stored between the ends is missing.
+Without the moments, the end displacements would also be wrong: the tip deflection of a
+cantilever would be one third too large.
 """
 
 from collections.abc import Iterator
@@ -30,7 +30,7 @@ class HeavyBeam:
         section: constants of its cross-section.
         length: [m] length of the beam.
         line: (3,) [m] vector from base to tip, base axes.
-        weight: (3,) [N/m] weight per length, in the axes x, y, z of the cross-section.
+        weight: (3,) [N/m] weight per unit length, in the cross-section axes x, y, z.
         total: (3,) [N] weight of the beam, base axes.
     """
 

@@ -1,11 +1,10 @@
-"""Check the platform's stiffness by two methods of the multibody simulation.
+"""Check the platform stiffness by two methods of the multibody simulation.
 
 Both methods start from the equilibrium with the robot's errors, load and weight.  The
-first method (linearised) differentiates the residual of the simulation.  The second
-method (load steps) applies small loads to the platform along each axis, in both
-directions.  The uncertainty of each method is estimated
-(:mod:`forcefit.validation.multibody.tangent`).  A method whose uncertainty exceeds the
-tolerance is not used for the verdict.
+linearised method differentiates the residual of the simulation.  The load-step method
+applies small loads to the platform along each axis, in both directions.  The
+uncertainty of each method is estimated (:mod:`forcefit.validation.multibody.tangent`).
+A method whose uncertainty exceeds the tolerance is not used for the verdict.
 
 Clearances are zero in both models unless they are requested.  With clearances, only the
 linearised method is used, with smoothed contacts.  The force of a load keeps its
@@ -51,7 +50,7 @@ _ELSEWHERE = 0.1
 
 @dataclass(frozen=True, eq=False)
 class StiffnessCheck:
-    """Compliance of the platform by exact model, linear model and simulation.
+    """Platform compliance by exact model, linear model and simulation.
 
     Attributes:
         exact: tangent stiffness of the exact model at its equilibrium.
@@ -62,7 +61,7 @@ class StiffnessCheck:
         links: model of the links in the simulation.
         bent: whether springs are deformed at the equilibrium, by errors, a load or
             weight.
-        clearances: whether clearances are included.
+        clearances: whether clearances are modelled.
         moved: (6,) [rad, m] displacement of the platform from its nominal pose at the
             exact equilibrium.
     """
@@ -80,7 +79,7 @@ class StiffnessCheck:
 
     @cached_property
     def differences(self) -> dict[str, float]:
-        """Largest differences of entries over sqrt(C_ii C_jj), by name.
+        """Largest entrywise differences divided by sqrt(C_ii C_jj), by name.
 
         The exact compliance is compared with load steps (``exact``) and with the
         linearised simulation (``linearised``); the classical compliance is compared
@@ -116,10 +115,10 @@ class StiffnessCheck:
     def mixed(self) -> tuple[str, ...]:
         """Names of deformed joints whose finite motion differs between the models.
 
-        Such joints are locked in some components and elastic in several others, of
-        which at least one is a rotation.  In the exact model, a locked component is a
-        component of the logarithm of the rotation.  In the simulation, a locked
-        component is an angle between axes.  Both definitions agree only to first order.
+        Such joints are locked in some components and elastic in several others, at
+        least one of which is a rotation.  Locked components are components of the
+        logarithm of the rotation in the exact model, but angles between axes in the
+        simulation.  The two definitions agree only to first order.
         """
         names = []
         for frame in self.exact.posture.robot.frames:
@@ -138,9 +137,9 @@ class StiffnessCheck:
 
     @property
     def another_equilibrium(self) -> bool:
-        """Whether exact model and simulation are at two different equilibria.
+        """Whether exact model and simulation are at different equilibria.
 
-        The tangents then differ.  A robot loaded beyond buckling has several
+        The tangents then differ.  A robot that is loaded beyond buckling has several
         equilibria.
         """
         scale = np.repeat([self.exact.length, 1.0], 3)
@@ -151,7 +150,7 @@ class StiffnessCheck:
 
     @property
     def passed(self) -> bool:
-        """Whether a method is sufficiently accurate, and all such methods agree."""
+        """Whether all sufficiently accurate methods, at least one, agree."""
         return not self.mixed and bool(self._decided) and all(self._decided)
 
     @property
@@ -172,7 +171,7 @@ class StiffnessCheck:
 
     @property
     def reason(self) -> str:
-        """Reason of the outcome as text."""
+        """Reason for the outcome."""
         if self.another_equilibrium:
             ours, theirs = (
                 f"{numbers(screw)} rad, m ({'' if stable else 'un'}stable)"
@@ -182,13 +181,13 @@ class StiffnessCheck:
                 )
             )
             return (
-                "the two models are at different equilibria: the platform has moved "
+                "the two models are at different equilibria: the platform is displaced "
                 f"by {ours}, in the simulation by {theirs}"
             )
         if self.mixed:
             return (
-                f"{', '.join(self.mixed)} have both locked and elastic axes and "
-                "deform: their law for finite deformation is not unique"
+                f"{', '.join(self.mixed)} deform and have both locked and elastic "
+                "axes: their finite-deformation law is not unique"
             )
         return f"exact within {self.tolerance:.2g}"
 
@@ -246,7 +245,7 @@ class StiffnessCheck:
         lines.append(f"{words[self.outcome]}: {self.reason}")
         if self.outcome == FAILED and self.links == "beam" and self.bent:
             lines.append(
-                "with one spring for each link a loaded link bends otherwise than a "
+                "a single spring per link bends differently from a loaded "
                 'beam: declare more "pieces" of the link in the robot file'
             )
         return "\n".join(lines)
@@ -260,7 +259,7 @@ def check_stiffness(
     time_limit: float = TIME_LIMIT,
     clearances: bool = False,
 ) -> StiffnessCheck:
-    """Compare the exact model's tangent stiffness with a simulation in Exudyn.
+    """Compare the tangent stiffness of the exact model with a simulation in Exudyn.
 
     Args:
         posture: the robot's configuration, with its errors.
@@ -268,14 +267,14 @@ def check_stiffness(
         links: ``"spring"``, ``"beam"`` or ``"fem"``.
         gravity: (3,) [m/s^2] gravity in base axes.
         time_limit: [s] time limit of the simulation.
-        clearances: whether clearances are included.
+        clearances: whether clearances are modelled.
 
     Returns:
-        The compliances by all methods.
+        The platform compliances by all methods.
 
     Raises:
         CannotAssemble: the kinematic loops cannot be closed with these errors.
-        FreeMotion: a motion of the platform has no stiffness.
+        FreeMotion: the platform has an unresisted motion.
         SolverFailed: no equilibrium was found.
         SimulationFailed: the simulation found no equilibrium either.
     """

@@ -1,4 +1,4 @@
-"""Create the report page that compares the platform's stiffness with a simulation."""
+"""Create the report page that compares platform stiffness with a simulation."""
 
 import numpy as np
 
@@ -13,7 +13,7 @@ Cells = list[list[Cell]]
 
 
 def stiffness_check_page(check: StiffnessCheck, provenance: Provenance) -> str:
-    """Return the page of the platform's stiffness by several methods.
+    """Return the report page of the platform stiffness by several methods.
 
     Args:
         check: result of
@@ -43,7 +43,7 @@ def stiffness_check_page(check: StiffnessCheck, provenance: Provenance) -> str:
 
 
 def _stiffness_tiles(check: StiffnessCheck) -> list[Tile]:
-    """Return tiles of the differences between the exact stiffness and other methods."""
+    """Return tiles with each method's difference from the exact stiffness."""
     return [
         Tile(words, [f"{100 * check.differences[name]:.2g} %"],
              [f"known to {100 * check.uncertainties[name]:.2g} %; at most "
@@ -55,7 +55,7 @@ def _stiffness_tiles(check: StiffnessCheck) -> list[Tile]:
 
 
 def _compliances(check: StiffnessCheck) -> str:
-    """Return a table of the diagonals of the compliances by every method."""
+    """Tabulate the diagonals of the compliances by every method."""
     names = ["exact", "linear", "load steps", "linearised simulation"]
     matrices = [check.exact.compliance, check.linear.compliance,
                 check.simulated.stepped, check.simulated.linearised]  # fmt: skip
@@ -64,13 +64,13 @@ def _compliances(check: StiffnessCheck) -> str:
                  for C in matrices)]
         for k, name in enumerate(SCREW)
     ]  # fmt: skip
-    text = paragraph("Motion along an axis for a unit wrench along the same axis.")
+    text = paragraph("Motion along each axis for a unit wrench along the same axis.")
     return section("Diagonal of the compliance", text,
                    table(["component", *names], rows, "compliance"))  # fmt: skip
 
 
 def _methods(check: StiffnessCheck) -> str:
-    """Return a table of the differences and uncertainties of the methods."""
+    """Tabulate the differences and uncertainties of the methods."""
     words = {"exact": "exact minus load steps", "linearised": "exact minus linearised "
              "simulation", "linear": "linear minus linearised simulation"}  # fmt: skip
     rows: Cells = [
@@ -85,7 +85,7 @@ def _methods(check: StiffnessCheck) -> str:
 
 
 def _displacements(check: StiffnessCheck) -> str:
-    """Return a table of the platform's displacement at both equilibria."""
+    """Tabulate the platform's displacement at both equilibria."""
     return section(
         "The platform at the equilibrium",
         screw_table(check.moved, check.simulated_moved),

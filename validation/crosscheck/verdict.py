@@ -1,13 +1,13 @@
-"""Decide whether two models agree, and add scales until every check is decided.
+"""Decide whether two models agree, adding scales until every check is decided.
 
-Terms of higher order can imitate or cancel errors of first order.  At large errors and
-few scales, the uncertainty of a limit therefore exceeds its bound.  Smaller scales are
-then added, each half of the last, until every check is decided.  At small scales, terms
-of higher order vanish and a wrong term of first order remains.  A check can fail only
+Higher-order terms can imitate or cancel first-order errors, so that with large errors
+and few scales the uncertainty of a limit exceeds its bound.  Smaller scales are then
+added, each half of the previous one, until every check is decided.  At small scales,
+higher-order terms vanish while a wrong first-order term remains.  A check can fail only
 if at least four scales were solved.
 
-A quantity is not compared if it is below the noise of either model, for example for a
-robot without errors and load.  Such a check has no signal and does not count as passed.
+A quantity below the noise of either model is not compared, for example if the robot has
+neither errors nor loads.  Such a check has no signal and does not count as passed.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -30,13 +30,13 @@ from forcefit.validation.crosscheck.pair import Pair
 
 SCALES = (1.0, 0.5, 0.25, 0.125)
 NOT_CHECKED = "not checked, nothing to compare"
-# Smallest number of scales with which a check can fail, and largest number of scales.
+# Smallest number of scales at which a check can fail, and largest number of scales.
 _FEWEST, _MOST = 4, 6
 
 
 @dataclass(frozen=True)
 class Check:
-    """Check that a value does not exceed a bound.
+    """A check that a value does not exceed a bound.
 
     Attributes:
         value: best estimate of the value, >= 0.
@@ -61,17 +61,17 @@ class Check:
             return FAILS
         if not self.signal and not max(self.value, self.uncertainty) > self.bound:
             return NO_SIGNAL
-        # A comparison with NaN is false, so a NaN value is never "ok".
+        # Comparisons with NaN are false, so NaN is never "ok".
         known = self.value <= self.bound and self.uncertainty <= self.bound
         return OK if known else UNDECIDED
 
 
 class Judged(Protocol):
-    """Checks on the solutions of two models at several scales (protocol)."""
+    """Protocol of checks on the solutions of two models at several scales."""
 
     @property
     def pairs(self) -> tuple[Pair, ...]:
-        """One pair of solutions for each scale, largest first."""
+        """One pair of solutions per scale, largest first."""
 
     @property
     def checks(self) -> Mapping[str, Check]:
@@ -104,19 +104,19 @@ def compare_scales(
     solve: Callable[[float], Pair],
     judge: Callable[[tuple[Pair, ...], int], Comparison],
 ) -> Comparison:
-    """Solve both models at several scales, and add scales until the verdict is decided.
+    """Solve both models at several scales, adding scales until the verdict is decided.
 
     Args:
         scales: factors on all imperfections, at least two different values.
         solve: function that solves both models at a scale.
-        judge: function that returns a comparison; its arguments are the pairs of
-            solutions, largest scale first, and the number of requested scales.
+        judge: function that returns a comparison, given the pairs of solutions (largest
+            scale first) and the number of requested scales.
 
     Returns:
-        The comparison.  It is undecided only if at least six scales were solved.
+        The comparison, which is undecided only if at least six scales were solved.
 
     Raises:
-        BadInput: fewer than two scales, or a scale that is not finite and > 0.
+        BadInput: fewer than two scales are given, or a scale is not finite and > 0.
     """
     factors = check_scales(scales)
     pairs = [solve(scale) for scale in factors]
@@ -128,7 +128,7 @@ def compare_scales(
 
 
 def check_scales(scales: Sequence[float]) -> list[float]:
-    """Check the scales, and return them sorted, largest first.
+    """Validate the scales and return them in descending order.
 
     Args:
         scales: factors on errors, clearances and load.
@@ -137,7 +137,7 @@ def check_scales(scales: Sequence[float]) -> list[float]:
         The distinct scales, sorted.
 
     Raises:
-        BadInput: fewer than two scales, or a scale that is not finite and > 0.
+        BadInput: fewer than two scales are given, or a scale is not finite and > 0.
     """
     factors = sorted({float(s) for s in scales}, reverse=True)
     if len(factors) < 2 or not all(0 < s < np.inf for s in factors):
@@ -148,7 +148,7 @@ def check_scales(scales: Sequence[float]) -> list[float]:
 
 
 def verdict_text(comparison: Judged) -> str:
-    """Return the verdict as text, with the number of checks without a signal."""
+    """Format the verdict, with the number of checks without a signal."""
     texts = {
         PASSED: "passed",
         FAILED: "FAILED",

@@ -1,5 +1,5 @@
-"""Identify the effects that cause the difference between a machine and its model.
+"""Identify the effects that make a machine differ from its model.
 
 Start with ``diagnose.py``, which selects effects and learns functions.  ``judge.py``
-determines the verdict.  ``diagnosis.py`` defines the result.
+determines the verdict, and ``diagnosis.py`` defines the result.
 """

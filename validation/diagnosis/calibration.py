@@ -1,4 +1,4 @@
-"""Estimate the error rates of a diagnosis by simulating campaigns of its design."""
+"""Estimate the error rates of a diagnosis by simulating campaigns."""
 
 from collections import Counter
 from collections.abc import Callable
@@ -17,18 +17,16 @@ from forcefit.validation.diagnosis.verdict import verdict
 
 @dataclass(frozen=True)
 class Calibration:
-    """Success and error rates of a diagnosis for the design of a campaign.
+    """Success and error rates of a diagnosis for a given campaign design.
 
     Attributes:
         campaigns: number of simulated campaigns of each kind.
-        without: for each verdict, the number of simulated campaigns of pure noise with
-            this verdict.
-        with_found: for each verdict, the number of simulated campaigns with this
-            verdict.  These campaigns contain the identified effects with their fitted
-            parameters.
+        without: number of simulated pure-noise campaigns with each verdict.
+        with_found: number of simulated campaigns with each verdict.  These campaigns
+            contain the identified effects with their fitted parameters.
         right: fraction of the campaigns with effects in which exactly these effects
             were identified.
-        false_claims: fraction of all verdicts that claimed absent effects.
+        false_claims: fraction of all verdicts that claim absent effects.
     """
 
     campaigns: int
@@ -41,11 +39,10 @@ class Calibration:
 def calibrate(
     diagnosis: Diagnosis, count: int, update: Callable[[int, int], None]
 ) -> Calibration:
-    """Simulate campaigns with the design of a diagnosis, and diagnose them.
+    """Simulate and diagnose campaigns with the design of a diagnosis.
 
-    The simulated readings are linear in the effects of the machine that the diagnosis
-    identified.  The model search and the verdict are computed as in the diagnosis, but
-    the final fit is omitted.
+    The simulated readings are linear in the effects of the identified machine.  Model
+    search and verdict are computed as in the diagnosis, but the final fit is omitted.
 
     Args:
         diagnosis: diagnosis whose design and identified machine are simulated.
@@ -79,7 +76,7 @@ def calibrate(
 
 
 def _decided(selected: Selected, count: int) -> tuple[str, tuple[str, ...]]:
-    """Return the verdict on a simulated campaign."""
+    """Return the verdict for a simulated campaign."""
     best = selected.states[0]
     names = tuple(sorted(e.name for e in best.elements if e.name))
     freedom = max(1.0, count - selected.unknowns)

@@ -1,4 +1,4 @@
-"""Describe candidate functions of a diagnosis: effects outside the library.
+"""Describe candidate functions, which represent effects outside the library.
 
 A candidate function is a small screw or a compliance at a place of the robot.  Its
 value depends on one or two variables.
@@ -19,7 +19,7 @@ from forcefit.assembly.model.robot import Frame, Robot
 from forcefit.validation.diagnosis.function_forms import CandidateShape
 
 TURN, SHIFT = AXES[:3], AXES[3:]
-# Changes below this fraction of a vector's largest component are rounding errors.
+# Changes below this fraction of a vector's largest component are round-off.
 _ROUNDING = 1e-12
 
 
@@ -41,7 +41,7 @@ class CandidatePart:
 
 @dataclass(frozen=True)
 class Candidate:
-    """A function that may act at one place, or at several places of one kind.
+    """A function that may act at one place or at several places of one kind.
 
     Attributes:
         parts: places and variables.
@@ -54,7 +54,7 @@ class Candidate:
     shape: CandidateShape
 
     def functions(self) -> list[Function]:
-        """Return the functions in the form of a robot file, without coefficients."""
+        """Return the functions as in a robot file, without coefficients."""
         numbers = dict.fromkeys(self.shape.names, 0.0) | dict(self.shape.given)
         return [
             Function(
@@ -75,15 +75,15 @@ def is_turn(component: str) -> bool:
 
 
 def own_component(frame: Frame) -> str:
-    """Return the component in which a joint moves; for a screw, along its thread."""
+    """Return the component along which a joint moves; for a screw, its thread."""
     return THREAD if frame.pitch else AXES[frame.own_axis]
 
 
 def variables_of(conditions: Conditions) -> list[str]:
-    """Return the names of variables that vary and are known throughout a session.
+    """Return the variables that vary and are known throughout a session.
 
-    The variables are coordinates of drives, components and magnitudes of loads,
-    positions and covariates.
+    Variables are drive coordinates, components and magnitudes of loads, positions and
+    covariates.
     """
     names = [f"q.{name}" for name in drives(conditions.robot)]
     names += [f"load.{axis}" for axis in ("mx", "my", "mz", "fx", "fy", "fz")]
@@ -103,13 +103,13 @@ def variables_of(conditions: Conditions) -> list[str]:
 
 
 def _kind(name: str) -> str:
-    """Return the name of the vector that contains a component, or a scalar's name."""
+    """Return the name of the vector that has a component, or a scalar's name."""
     vectors = "position.", "load.m", "load.f"
     return next((v for v in vectors if name.startswith(v)), name)
 
 
 def is_known(conditions: Conditions, *names: str) -> NDArray:
-    """Return (R,) bool: rows of sessions in which the variables are always known.
+    """Return a mask (R,) of the rows of sessions in which all variables are known.
 
     Without sessions, all rows count as one session.  Wrenches are not checked.
     """
@@ -125,12 +125,12 @@ def is_known(conditions: Conditions, *names: str) -> NDArray:
 def places_of(
     robot: Robot, variables: Sequence[str]
 ) -> Iterator[tuple[str, tuple[CandidatePart, ...]]]:
-    """Yield the places of all candidate functions, for one variable after another.
+    """Yield the places of all candidate functions, one variable at a time.
 
     Yields:
-        The kind of the function, and the places with the variable.  The places are
-        single components, groups of three components, all drives with their own
-        coordinates, and all bodies along their axes.
+        The kind of function, and the places with their variable.  Places are single
+        components, groups of three components, all drives with their own coordinates,
+        and all bodies along their axes.
     """
     single: list[tuple[str, tuple[str, ...]]]
     single = [(f.name, (axis,)) for f in robot.frames for axis in AXES]

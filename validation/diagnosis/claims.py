@@ -1,8 +1,8 @@
 """Decide which effects of a fitted machine the readings support.
 
-An effect is claimed under three conditions.  Its change of the readings exceeds the
-uncertainty of this change.  A change of this size is improbable without the effect.  No
-parameter that defines the effect is at a bound.
+An effect is claimed under three conditions: its change of the readings exceeds the
+uncertainty of this change, a change of this size is improbable without the effect, and
+no parameter that defines the effect is at a bound.
 """
 
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ from forcefit.validation.diagnosis.lack_of_fit import UNLIKELY
 from forcefit.validation.diagnosis.separability import orthonormal_basis
 from forcefit.validation.diagnosis.unknowns import STEP, Acting, effects_in
 
-# An unknown counts as at its bound if its distance is below this fraction of the bound.
+# Relative distance below which an unknown counts as being at its bound.
 _AT_BOUND = 1e-3
 
 
@@ -52,7 +52,7 @@ def supported(fit: MachineFit, one: Acting) -> bool:
 
 
 def _without_devices(fit: MachineFit, slopes: NDArray) -> NDArray:
-    """Return (n, k) slopes without what the measuring frame's pose can imitate."""
+    """Project out of slopes (n, k) what the pose of the measuring frame can imitate."""
     own = [fit.own(one)[2] for one in fit.unknowns.effects if one.device]
     if not own:
         return slopes
@@ -67,11 +67,11 @@ def _at_bound(bound: float, value: float) -> bool:
 
 @dataclass(frozen=True)
 class Parameter:
-    """Identified parameter of an effect, in the unit of the public format.
+    """Identified parameter of an effect in its public unit.
 
     Attributes:
         name: public name.
-        value: identified value, including the declared value.
+        value: identified value, which includes the declared value.
         std: standard deviation of the value.
         declared: value in the robot file; None if the file does not contain the
             parameter.
@@ -86,7 +86,7 @@ class Parameter:
 
 
 def parameters_of(fit: MachineFit, one: Acting) -> list[Parameter]:
-    """Return the parameters of an identified effect on which a reading depends."""
+    """Return those parameters of an identified effect on which readings depend."""
     h, robot = one.hypothesis, fit.unknowns.robot.without_effects()
     declared = effects_in(fit.unknowns.robot, one.session).get(h.effect, {})
     x, C, _ = fit.own(one)
@@ -111,7 +111,7 @@ def parameters_of(fit: MachineFit, one: Acting) -> list[Parameter]:
         around = np.remainder(change + np.pi, 2 * np.pi) - np.pi
         J[:, i] = np.where(phase, around, change) / (2 * step)
     std = np.sqrt(np.maximum(np.einsum("pi,ij,pj->p", J, C, J), 0.0)).tolist()
-    # Components that were not measured are omitted.
+    # Unmeasured components are omitted.
     shown = np.any(J[:, fit.seen(one)] != 0, axis=1).tolist()
     return [
         Parameter(name, v, s, declared.get(name), difference[name])

@@ -1,4 +1,4 @@
-"""Compute the columns of all candidates from a campaign's design, without readings."""
+"""Compute the columns of all candidates from the design of a campaign."""
 
 import math
 from collections import Counter
@@ -43,10 +43,10 @@ from forcefit.validation.diagnosis.whitening import (
 
 FUNCTION = "function"
 _CLOCK = 0.999  # correlation with time above which a variable is taken as the time
-# Number of randomly drawn rows by which functions are scored in the first step.
+# Number of random rows on which functions are scored first.
 _SAMPLE = 500
-# A candidate counts as imitated by the measuring frame if the fraction of its column
-# that no motion of the frame can produce is smaller.
+# A candidate counts as imitated by the measuring frame if a smaller fraction of its
+# column remains after projecting out the motions of the frame.
 _ALIKE = 1e-3
 # Smallest visible change: sum of squares of the whitened readings, two standard
 # deviations.
@@ -58,20 +58,18 @@ class Columns:
 
     Attributes:
         campaign, conditions: campaign of R rows and its conditions.
-        row: (N,) row of every cell.
-        block: (N,) configuration or time span of every cell.
-        visit: (N,) row of the file to which every cell belongs; a row may contain
-            several points.
-        motions: (R, 6, 6) change of the readings by motions of the platform, see
-            :func:`.platform_motions`; None if every row contains only one point.
-        device: hypothesis for the unknown pose of the measuring frame; None if this
-            pose is known.
+        row: (N,) row of each cell.
+        block: (N,) configuration or time span of each cell.
+        visit: (N,) file row of each cell; a file row may contain several points.
+        motions: (R, 6, 6) change of the readings by platform motions, see
+            :func:`.platform_motions`; None if every file row contains only one point.
+        device: hypothesis for the unknown pose of the measuring frame; None if it is
+            known.
         flat: (N, f) columns of the measuring frame, separate for each session.
-        library: elements of the library's effects.
-        nuisance: geometric errors and springs that every machine has.
+        library: elements of the library effects.
+        nuisance: geometric errors and springs, which every machine has.
         functions: candidate functions at single places.
-        sampled: (N,) bool, True for cells by which functions are scored in the first
-            step.
+        sampled: (N,) mask of the cells on which functions are scored first.
         explicit: functions at several places, with their columns in the sampled cells.
     """
 
@@ -82,10 +80,10 @@ class Columns:
     ) -> None:  # fmt: skip
         """Compute the derivatives of the readings by all candidates.
 
-        Of the measured readings, only the information which of them exist is used.  The
-        conditions include the registration and second-order terms.  ``odds`` maps the
-        name of an effect, ``"function"``, ``"geometry"`` or ``"springs"`` to a factor
-        on its prior odds; 0 excludes it.
+        Readings enter only through the pattern of measured cells.  Conditions include
+        the registration and second-order terms.  ``odds`` maps the name of an effect,
+        ``"function"``, ``"geometry"`` or ``"springs"`` to a factor on its prior odds; 0
+        excludes it.
         """
         self.odds = odds
         self.campaign, self.conditions = campaign, derivatives.conditions
@@ -114,7 +112,7 @@ class Columns:
         self.explicit = joint_functions(self.functions, rows) if any_function else []
 
     def _library(self, update: Callable[[str, int, int], None]) -> list[Element]:
-        """Return the hypotheses that change the readings visibly and differently."""
+        """Return the hypotheses that change the readings visibly and distinctly."""
         campaign = self.campaign
         shown: dict[object, Signature] = {}
         listed = hypotheses(self.conditions, loaded_components(campaign))
@@ -139,7 +137,7 @@ class Columns:
         return [e for e in made if e.columns.shape[1] or e.offset is not None]
 
     def without_clocks(self) -> "Columns":
-        """Return the columns without functions of time and without effects of time."""
+        """Return the columns without functions and effects of time."""
         other = copy(self)
         timed = {name for name, effect in LIBRARY.items() if effect.needs == ("time",)}
         other.library = [e for e in self.library if e.name not in timed]
@@ -151,11 +149,11 @@ class Columns:
 
     @property
     def candidates(self) -> bool:
-        """Whether there is a candidate effect or a candidate function."""
+        """Whether there is any candidate effect or function."""
         return bool(self.library or self.explicit or self.functions.variables)
 
     def loadings(self, cells: NDArray) -> NDArray | None:
-        """Return (n, 6) changes of the readings over sigma per platform motion."""
+        """Return changes (n, 6) of the readings per platform motion, over sigma."""
         if self.motions is None:
             return None
         measured = self.campaign.cells
@@ -165,7 +163,7 @@ class Columns:
     def whitening(
         self, cells: NDArray, root: NDArray, common: tuple[float, float]
     ) -> Whitening:
-        """Return the transformation of cells (N,) bool to cells with independent noise.
+        """Return the whitening transformation of selected cells (N,).
 
         ``root`` (n,) contains the square roots of the relative precisions of the cells.
         ``common`` [rad, m] contains the standard deviations of the platform's common
@@ -178,12 +176,12 @@ class Columns:
 
     @property
     def has_clocks(self) -> bool:
-        """Whether rows are ordered in time and one of the variables is the time."""
+        """Whether rows are ordered in time and time is among the variables."""
         successive = blocks_of(self.campaign)[1] == SPANS
         return successive and any(map(self._is_clock, self.functions.variables))
 
     def _is_clock(self, name: str) -> bool:
-        """Return whether a variable is the time, or proportional to it."""
+        """Return whether a variable is, or is proportional to, the time."""
         time = self.conditions.time
         if name == "time" or not np.isfinite(time).all() or not np.ptp(time):
             return name == "time"
@@ -191,7 +189,7 @@ class Columns:
         return bool(abs(np.corrcoef(x, time)[0, 1]) > _CLOCK)
 
     def _named(self) -> NDArray:
-        """Return (N, c) columns of library effects with only one unknown."""
+        """Return the columns (N, c) of library effects with a single unknown."""
         alone = [e.columns for e in self.library if e.columns.shape[1] == 1]
         return np.hstack([np.zeros((len(self.row), 0)), *alone])
 
@@ -205,7 +203,7 @@ class Columns:
         return np.hstack([columns * self.tangents.rows_of(s) for s in sessions])
 
     def _told(self, signature: Signature) -> Signature:
-        """Return a per-session hypothesis without what the device pose can imitate."""
+        """Project out of a per-session hypothesis what the device pose can imitate."""
         h = signature.hypothesis
         if not self.flat.shape[1] or sessions_of(h) == (None,):
             return signature
@@ -226,7 +224,7 @@ def _shows(signature: Signature) -> bool:
 
 
 def _print(signature: Signature) -> object:
-    """Return a key that is equal for hypotheses of one effect with equal columns."""
+    """Return a key that identifies hypotheses of one effect with equal columns."""
     shown = signature.columns[:, signature.columns.any(axis=0)]
     starts = tuple(s.start for s in signature.hypothesis.slots if s.shape)
     return signature.hypothesis.effect, tuple(sorted(fingerprints(shown))), starts

@@ -1,11 +1,10 @@
-"""Estimate the noise that the points of one measurement share.
+"""Estimate noise that is common to the points of one measurement.
 
-A device may measure several points of the platform together.  The readings of all these
-points then share two errors: the machine's repeatability error and the motion of the
-device's frame.  This shared noise is modelled as a small random motion of the platform
-in each measurement.  One standard deviation describes its rotations, and one describes
-the translations of the points' centre.  Both standard deviations maximise the evidence
-of a model of the readings, in which all other unknowns are marginalised.
+A device may measure several points of the platform together.  Their readings then share
+the repeatability error of the machine and the motion of the device frame.  This common
+noise is modelled as a small random platform motion in each measurement, with one
+standard deviation for rotations and one for translations of the points' centre.  Both
+maximise the evidence of a model in which all other unknowns are marginalised.
 """
 
 import math
@@ -30,12 +29,12 @@ _STABLE = 0.1  # smaller changes of a standard deviation's logarithm change no d
 
 
 def common_sizes(state: State) -> tuple[float, float]:
-    """Estimate the noise that points share, for a model with given elements.
+    """Estimate the common noise of points for a model with given elements.
 
     Returns:
         [rad, m] standard deviations of rotation and translation, divided by the scale
-        of the noise.  A standard deviation is zero if the gain in evidence does not
-        exceed the penalty of the parameter.
+        of the noise.  A standard deviation is zero if it does not increase the evidence
+        by more than its penalty.
     """
     some = state.readings.sample(NONE)
     loadings = some.columns.loadings(some.cells)
@@ -62,7 +61,7 @@ def common_sizes(state: State) -> tuple[float, float]:
 def _largest(
     state: State, kinds: tuple[int, ...], units: list[float]
 ) -> tuple[tuple[float, float], float]:
-    """Return the standard deviations that maximise the evidence, and the evidence."""
+    """Return the standard deviations of maximum evidence, and the evidence."""
 
     def sizes(logs: NDArray) -> tuple[float, float]:
         own = dict(zip(kinds, np.exp(logs).tolist(), strict=True))
@@ -90,7 +89,7 @@ def _evidence(state: State, sizes: tuple[float, float]) -> float:
 
 
 def stable(one: tuple[float, float], other: tuple[float, float]) -> bool:
-    """Return whether two estimates of the standard deviations are equivalent."""
+    """Return whether two estimates of the standard deviations agree."""
     pairs = list(zip(one, other, strict=True))
     if any((a > 0) != (b > 0) for a, b in pairs):
         return False

@@ -1,4 +1,4 @@
-"""Predict the readings of the declared machine once for all folds."""
+"""Predict the readings of the declared machine, once for all folds."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -33,7 +33,7 @@ class Declared:
 
     @cached_property
     def derivatives(self) -> Derivatives:
-        """Derivatives of the declared readings; clearances are in rest position."""
+        """Derivatives of the declared readings, with clearances in rest position."""
         return Derivatives(at_rest(self.conditions))
 
     def bent(
@@ -41,8 +41,8 @@ class Declared:
     ) -> Conditions | None:
         """Return conditions with the second-order change by geometric errors (n, 6).
 
-        The errors are added to the declared ones.  The result is None if the
-        second-order change of every reading is at most ``least`` [sigma].
+        The errors add to the declared ones.  Return None if no reading changes by more
+        than ``least`` [sigma] in second order.
         """
         if not errors.any():
             return None
@@ -62,8 +62,8 @@ def declared(campaign: Campaign, *, finite: bool = False) -> Declared:
 
     Args:
         campaign: campaign of R rows.
-        finite: whether the declared model computes finite motions.  Finite motions are
-            also computed if the robot file requests them.
+        finite: whether the declared model computes finite motions, which the robot file
+            may also request.
 
     Returns:
         The declared model, which does not depend on the readings of the campaign.
@@ -75,7 +75,7 @@ def declared(campaign: Campaign, *, finite: bool = False) -> Declared:
 
 
 def at_rest(conditions: Conditions) -> Conditions:
-    """Return conditions; clearances of closed chains are in rest position (cached)."""
+    """Put the clearances of closed chains in rest position (cached)."""
     if conditions.robot.closures and virtual_joints(conditions.robot).cones.shape[1]:
         return with_rest_positions(conditions)
     return conditions

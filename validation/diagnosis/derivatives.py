@@ -1,8 +1,7 @@
-"""Compute the readings of a machine and their derivatives by effects.
+"""Compute the readings of a machine and their derivatives with respect to effects.
 
-The derivatives depend on the design of a campaign and not on its readings.  Therefore
-searches with equal conditions, such as the folds of a diagnosis, use the same
-derivatives.
+The derivatives depend on the design of a campaign but not on its readings, so that
+searches under equal conditions, for example the folds of a diagnosis, share them.
 """
 
 from collections.abc import Mapping
@@ -20,8 +19,8 @@ from forcefit.validation.diagnosis.hypotheses import Slot
 from forcefit.validation.diagnosis.responses import Responses, responses
 from forcefit.validation.diagnosis.sensitivities import Sensitivities
 
-# Step of numerical derivatives, relative to the plausible size of the unknown.  The
-# value keeps both rounding and truncation errors small.
+# Step of numerical derivatives, relative to the plausible size of the unknown.  This
+# value balances round-off and truncation errors.
 STEP = 1e-3
 
 
@@ -44,7 +43,7 @@ class Derivatives:
 
     @cached_property
     def response(self) -> Responses:
-        """Response of the readings to small screws at each frame, see ``Responses``."""
+        """Responses of the readings to small screws at frames, see ``Responses``."""
         return responses(self.conditions)
 
     @cached_property
@@ -53,7 +52,7 @@ class Derivatives:
         return Sensitivities(self.conditions, self.response)
 
     def model(self, effects: Mapping[str, Values], *, finite: bool = False) -> NDArray:
-        """Return the (R, 6) [rad, m] readings with effects, linear in clearances.
+        """Return the readings (R, 6) [rad, m] with effects, linear in clearances.
 
         ``effects`` maps the name of each effect to its parameters by public name.
         Readings of rows without a solution are NaN. Finite motions are computed for the
@@ -68,7 +67,7 @@ class Derivatives:
         return predict(changed).deviation
 
     def begun(self, effect: str, slot: Slot, shapes: Mapping[str, float]) -> NDArray:
-        """Return the (R, 6) [rad, m] readings after a step of one unknown of an effect.
+        """Return the readings (R, 6) [rad, m] after a step of one unknown of an effect.
 
         ``shapes`` contains the values of the effect's shape parameters.
         """

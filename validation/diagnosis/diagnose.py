@@ -1,4 +1,4 @@
-"""Diagnose a campaign: find the effects that are missing in its declared model.
+"""Diagnose a campaign, that is, find effects missing from its declared model.
 
 Steps:
 
@@ -42,7 +42,7 @@ def diagnose(
     odds: Mapping[str, float] = MappingProxyType({}),
     update: Update = lambda what, done, total: None,
 ) -> Diagnosis:
-    """Find the effects that cause a campaign's residual from the declared model.
+    """Find the effects that explain a campaign's residual from the declared model.
 
     Args:
         campaign: measured deviations.
@@ -59,19 +59,18 @@ def diagnose(
         The diagnosis.
 
     Raises:
-        BadInput: the pose of the measuring frame is unknown, and the readings do not
+        BadInput: the pose of the measuring frame is unknown and the readings do not
             determine it.
     """
     held = hold_out(campaign)
     design = declared(campaign, finite=finite)  # common to all folds
 
     def found(rows: NDArray) -> tuple[Traced, MachineFit, tuple[SetupBlunder, ...]]:
-        """Return the search, the fitted machine and the blunders, from some rows."""
+        """Search and fit selected rows; return search, fitted machine and blunders."""
         part = hidden(campaign, ~rows)
         seen = part.cells.any(axis=1)
         setup = setup_blunders(part.take(seen), conditions_of(part).take(seen))
-        # If there are set-up blunders, no effects are searched, because effects would
-        # imitate the blunders.
+        # Set-up blunders rule out a search for effects, which would imitate them.
         nothing = dict.fromkeys((*LIBRARY, FUNCTION, GEOMETRY, SPRINGS), 0.0)
         own = nothing if setup else odds
         return *trace(part, rows, design, update, odds=own), setup
@@ -94,5 +93,5 @@ def diagnose(
 
 
 def _fitted_rows(held: HeldOut, rows: NDArray) -> NDArray:
-    """Return (R,) bool: rows that are not held out, or all if none can be held out."""
+    """Return a mask (R,) of rows that are not held out, or all if none can be."""
     return np.ones(len(rows), dtype=bool) if held.how == "none" else ~rows

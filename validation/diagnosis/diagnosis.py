@@ -1,8 +1,7 @@
-"""Define the result of a diagnosis: the verdict and the evidence for it.
+"""Define the result of a diagnosis, its verdict and the evidence.
 
 Other modules convert the result to text, figures and files.  The attribute ``wording``
-is the function that creates the text.  It is stored so that this module does not import
-the module of the text.
+stores the function that creates the text, so that this module need not import it.
 """
 
 from collections.abc import Callable
@@ -41,35 +40,29 @@ class Diagnosis:
         campaign: the measurements with the declared sigma.
         verdict: ``"explained"``, ``"learned"``, ``"none_needed"``, ``"ambiguous"``,
             ``"outside_library"`` or ``"not_enough_rows"``.
-        fit: the identified machine, with all parameters fitted together.  Its robot is
-            saved.
+        fit: the identified machine, with all parameters fitted together.
         traced: result of the search.
         claimed: names of the claimed effects.
-        effects: names of all effects of the identified machine, including effects that
-            are not claimed.
-        probability: probability of every effect of the library that the design can
-            detect.
+        effects: names of all effects of the identified machine, claimed or not.
+        probability: probability of each library effect that the design can detect.
         alternatives: sets of effect names with their probabilities, most probable
             first.
-        lack: lack-of-fit test of the fitted rows, that is, whether their residual is
-            noise.
+        lack: lack-of-fit test of the fitted rows.
         before: errors of the declared model on the held-out rows, without outliers.
-        after: errors on the same rows of machines that were fitted without these rows.
-        saved: errors of the saved robot on all rows without outliers, to which it was
-            fitted.
-        noise: expected errors due to sigma, and due to the noise that the points of a
-            measurement share.
+        after: errors on the same rows of machines fitted without them.
+        saved: errors of the saved robot on all rows without outliers, which it was
+            fitted to.
+        noise: expected errors due to sigma and to common noise of points.
         with_outliers: the errors ``before`` and ``after`` on all held-out rows,
             including outliers.
-        uncertainty: [-] standard error of ``after.normalised``, from the scatter of
-            blocks.
-        noise_scale: ratio of true to stated sigma, and the standard deviation of the
-            ratio.
+        uncertainty: [-] standard error of ``after.normalised``, estimated from the
+            scatter between blocks.
+        noise_scale: ratio of true to stated sigma, and its standard deviation.
         noise_in_time: correlation of the noise in time, which increases the uncertainty
             of the effects; None if there is no correlation.
         sequence: models from the declared to the identified machine, with their errors.
-        held: the held-out rows, and the method of holding out.
-        outliers: (R,) bool, rows that no computation uses.
+        held: the held-out rows and how they were chosen.
+        outliers: (R,) bool, True for rows excluded from all computations.
         conditions: declared conditions of the campaign, including the registration.
         open: (R,) bool, True for rows in which clearances leave the pose undetermined,
             in the declared model or with the identified effects; see
@@ -77,14 +70,12 @@ class Diagnosis:
         residual_before: (R, 6) [rad, m] reading minus prediction of the declared model;
             NaN if not measured.
         residual_after: (R, 6) [rad, m] reading minus prediction of the saved robot.
-        trends: variables on which the residual depends, if the residual exceeds the
-            noise.
+        trends: variables on which a residual above the noise depends.
         next: the measurement that would resolve an ambiguous verdict.
-        needed: description of the additional rows that a verdict requires, if there are
-            too few rows.
+        needed: additional rows that a verdict requires, if there are too few.
         remarks: implausible parameters of the machine, and impossible readings.
-        setup: blunders in the set-up of the campaign.  If there are any, no effects
-            were searched.
+        setup: blunders in the set-up of the campaign, which rule out a search for
+            effects.
         wording: function that returns a diagnosis as text.
     """
 
@@ -133,17 +124,17 @@ class Diagnosis:
 
     @property
     def better(self) -> bool:
-        """Whether held-out errors are smaller than those of the declared machine."""
+        """Whether held-out errors are smaller than for the declared machine."""
         found = bool(len(self.fit.unknowns)) or bool(self.effects)
         return found and self.after.normalised < self.before.normalised
 
     @property
     def findings(self) -> tuple[str, ...]:
-        """Sentences about the noise: its scale, repeatability and memory."""
+        """Sentences about the scale, repeatability and memory of the noise."""
         return self.traced.selected.noise.findings
 
     def to_xarray(self) -> "xarray.Dataset":
-        """Return a data set over ``row``: residuals, held-out rows and outliers."""
+        """Convert to a data set over ``row``: residuals, held-out rows and outliers."""
         return row_dataset(
             self.campaign,
             {
@@ -156,7 +147,7 @@ class Diagnosis:
         )
 
     def to_pandas(self) -> "pandas.DataFrame":
-        """Return a pandas table of the measurements, columns (variable, component)."""
+        """Convert to a pandas table with one row per measurement."""
         from forcefit.assembly.model.tables import frame_table
 
         return frame_table(self.to_xarray(), "row")
@@ -180,7 +171,7 @@ class Diagnosis:
         return self.wording(self)
 
     def _figures(self) -> Figures:
-        """Return text lines with the verdict and its main numbers."""
+        """Return the verdict and its main figures for display."""
         likely = sorted(self.probability.items(), key=lambda one: -one[1])[:3]
         return {
             "campaign": f"{self.campaign.name}, {len(self.campaign)} rows",

@@ -1,8 +1,8 @@
-"""Describe effects of the library and functions as elements of a linear model.
+"""Describe library effects and functions as elements of a linear model.
 
-An element adds ``offset + columns d`` to the whitened readings.  The unknowns d of one
-unit share a prior standard deviation.  They are scaled so that the root mean square
-norm of their columns is one.
+An element adds ``offset + columns d`` to the whitened readings.  Unknowns d of the same
+unit share a prior standard deviation and are scaled so that the root mean square norm
+of their columns is one.
 """
 
 from collections.abc import Iterable
@@ -20,12 +20,12 @@ from forcefit.validation.diagnosis.signatures import Signature
 from forcefit.validation.diagnosis.whitening import Whitening
 
 _PLAUSIBLE = 1e3  # largest ratio of an unknown to its plausible size
-_NO_OFFSET = 1e-9  # [sigma] smaller offsets are rounding errors
+_NO_OFFSET = 1e-9  # [sigma] smaller offsets are round-off
 
 
 @dataclass(frozen=True, eq=False)
 class Element:
-    """An effect of the library at certain frames, or a function.
+    """A library effect at certain frames, or a function.
 
     Attributes:
         name: name of the effect; ``""`` for a function.
@@ -81,7 +81,7 @@ class Element:
         return np.abs(self.lower) < 1e-12
 
     def values(self, d: NDArray) -> NDArray:
-        """Return the values of all slots or unknowns of a function, within bounds."""
+        """Return the values of all slots or function unknowns, within bounds."""
         x = self.begin.copy()
         x[self.slots] += np.clip(d, self.lower, self.upper) * self.scale
         return x
@@ -141,7 +141,7 @@ def _kind(robot: Robot, h: Hypothesis, slot: int) -> tuple[object, ...]:
 
 
 def _norms(columns: NDArray, kinds: Iterable[object]) -> NDArray:
-    """Return, for each of m columns, the rms norm of all columns of the same kind."""
+    """Return for each of m columns the rms norm over all columns of its kind."""
     names = list(kinds)
     squares = (columns**2).sum(axis=0)
     own = [[k for k, other in enumerate(names) if other == kind] for kind in names]
@@ -152,7 +152,7 @@ def function_element(
     candidate: Candidate, columns: NDArray, axes: NDArray, falling: NDArray,
     most: float, log_prior: float,
 ) -> Element | None:  # fmt: skip
-    """Return the element of a function of m unknowns; None if no reading shows it.
+    """Return the element of a function of m unknowns, or None if it is invisible.
 
     ``columns`` (N, m) are the whitened changes of the readings per unknown.  ``axes``
     (m,) is the screw component of each unknown.  ``falling`` (m,) are the relative
@@ -171,7 +171,7 @@ def function_element(
 
 
 class Dense:
-    """Elements with stored columns, which are scored together in batches."""
+    """Elements with stored columns, scored in batches."""
 
     def __init__(
         self, elements: list[Element], cells: NDArray, whiten: Whitening
@@ -196,7 +196,7 @@ class Dense:
             self._groups.append((np.array(own), B, gram, most, bounded))
 
     def gains(self, marginal: Marginal) -> NDArray:
-        """Return the log evidence ratio of adding each element to a model."""
+        """Return the log evidence ratio for adding each element to a model."""
         gains = np.full(len(self.elements), -np.inf)
         for own, B, gram, most, bounded in self._groups:
             m = gram.shape[1]

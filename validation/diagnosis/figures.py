@@ -1,4 +1,4 @@
-"""Create the charts of a diagnosis and a three-dimensional view of the robot.
+"""Create the charts of a diagnosis and a 3-D view of the robot.
 
 Each function returns HTML for a report page.
 """
@@ -25,7 +25,7 @@ _COLOURS = {"before": RED, "after": BLUE}
 
 
 def error_chart(diagnosis: Diagnosis) -> str:
-    """Return a bar chart of held-out errors before and after diagnosis, and noise."""
+    """Return a bar chart of the noise and of errors before and after diagnosis."""
     charts = []
     for kind, unit in (("rotation", "rad"), ("position", "m")):
         names = ("before", "after", "noise")
@@ -33,7 +33,7 @@ def error_chart(diagnosis: Diagnosis) -> str:
         known = {name: v for name, v in values.items() if np.isfinite(v)}
         if known:
             axis = Axis(f"{kind}: rms on held-out rows", unit)
-            caption = "Rows used neither to choose nor to fit the model."
+            caption = "Rows that were used neither to choose nor to fit the model."
             charts.append(bars(known, axis, caption, float("nan")))
     return grid(*charts)
 
@@ -50,7 +50,7 @@ def sequence_chart(diagnosis: Diagnosis) -> str:
 
 
 def vector_charts(diagnosis: Diagnosis) -> str:
-    """Return charts of residual displacements of measured points, from top and side."""
+    """Return top and side views of the residual displacements of measured points."""
     platform = diagnosis.conditions.postures.platform
     where = platform[:, :3, 3] + platform[:, :3, :3] @ diagnosis.conditions.point
     known = ~diagnosis.outliers
@@ -81,7 +81,7 @@ def vector_charts(diagnosis: Diagnosis) -> str:
 
 
 def covariate_charts(diagnosis: Diagnosis) -> str:
-    """Return charts of the residual before and after diagnosis, over each variable."""
+    """Return charts of the residual over each variable, before and after diagnosis."""
     kept, rows = ~diagnosis.outliers, _labels(diagnosis)
     sizes = {
         name: np.sqrt(np.nanmean((left / diagnosis.campaign.sigma) ** 2, axis=1))[kept]
@@ -122,7 +122,7 @@ def _labels(diagnosis: Diagnosis) -> list[str]:
 
 
 def _varied(diagnosis: Diagnosis) -> dict[tuple[str, str], NDArray]:
-    """Return the name and unit of each variable that a chart shows."""
+    """Return the name and unit of each charted variable."""
     campaign = diagnosis.campaign
     varied = {("load size", "N"): np.linalg.norm(campaign.loads[:, 3:], axis=1)}
     for i, frame in enumerate(campaign.robot.frames):
@@ -136,17 +136,17 @@ def _varied(diagnosis: Diagnosis) -> dict[tuple[str, str], NDArray]:
 
 
 def probability_chart(diagnosis: Diagnosis) -> str:
-    """Return a bar chart of the probabilities of all effects, the largest on top."""
+    """Return a bar chart of the probabilities of all effects, largest on top."""
     ranked = sorted(diagnosis.probability.items(), key=lambda item: -item[1])
     axis = Axis(f"probability (claimed from {CLAIM}, a rival from {RIVAL})",
                 options={"range": [0, 1]})  # fmt: skip
     return bars(
-        dict(ranked), axis, "Posterior weight of all sets with this effect.", CLAIM
+        dict(ranked), axis, "Posterior weight of all sets with the effect.", CLAIM
     )
 
 
 def confounding_chart(diagnosis: Diagnosis) -> str:
-    """Return the matrix chart of how well effects can imitate each other."""
+    """Return a matrix chart of how well effects imitate each other."""
     columns: dict[str, NDArray] = {}
     for element in diagnosis.traced.columns.library:  # most general first
         if np.any(element.columns):
@@ -156,7 +156,7 @@ def confounding_chart(diagnosis: Diagnosis) -> str:
 
 
 def imitation_chart(shared: NDArray, names: tuple[str, ...]) -> str:
-    """Return a chart (HTML) of the fraction of each effect that another can imitate.
+    """Return an HTML chart of the fraction of each effect that another can imitate.
 
     Args:
         shared: (m, m) fraction of the row's effect that the column's effect can
@@ -188,7 +188,7 @@ def worst_row(diagnosis: Diagnosis) -> tuple[int, str]:
 
 
 def assembled(diagnosis: Diagnosis, row: int) -> Assembly | None:
-    """Return the identified machine, assembled at a row under its load, or None."""
+    """Assemble the identified machine in a row under its load, or return None."""
     campaign = replace(diagnosis.campaign, robot=diagnosis.robot)
     try:
         forced = assemble_row(replace(conditions_of(campaign), exact=False), row)
@@ -198,7 +198,7 @@ def assembled(diagnosis: Diagnosis, row: int) -> Assembly | None:
 
 
 def worst_robot(diagnosis: Diagnosis) -> str:
-    """Return a 3-D scene of the robot at the row of largest error, or nothing."""
+    """Return a 3-D scene of the robot at the row of largest error, if there is one."""
     row, name = worst_row(diagnosis)
     forced = assembled(diagnosis, row) if row >= 0 else None
     if forced is None:

@@ -1,13 +1,13 @@
-r"""Fit all unknown parameters of a robot together, the last step of a diagnosis.
+r"""Fit all unknown robot parameters together, as the last step of a diagnosis.
 
-The most probable x minimises
+The most probable parameters x minimise
 
     F(x) = |W (y - f(x)) / sigma|^2 + |(x - m) / s|^2    within the bounds of x,
 
 f(x) are the predicted readings of the fitted robot, computed by the function that
 predicts with a saved file (:mod:`forcefit.validation.diagnosis.prediction`).  The
 minimum is computed by Gauss-Newton steps with the derivatives of the linear model at
-the current robot.  A step that increases F is halved.
+the current robot.  Steps that increase F are halved.
 
 ======  ==============  =========  ===================================================
 symbol  code            shape      meaning
@@ -42,7 +42,7 @@ from forcefit.validation.diagnosis.whitening import whitening_of
 _STEPS = 20  # largest number of Gauss-Newton steps; usually ten suffice
 _SLOPES = 6  # number of steps in which the derivatives are recomputed
 _SHORTEST = 1 / 64  # smallest fraction of a step that is tried
-# Decrease of F at convergence; F is a sum of squares in standard deviations.
+# Decrease of F at convergence.  F is a sum of squares in standard deviations.
 _SETTLED = 1e-3
 # [sigma] Residual assigned to a reading if the robot has no solution there.
 _NO_ANSWER = 1e3
@@ -57,9 +57,9 @@ class MachineFit:
         x: (k,) most probable values of the parameters.
         covariance: (k, k) posterior covariance of x, at fixed prior standard deviations
             and sigma.
-        slopes: (n, k) derivatives of the fitted readings by the parameters, over sigma,
-            whitened.
-        residual: (n,) residual of the fitted readings, over sigma, whitened.
+        slopes: (n, k) whitened derivatives of the fitted readings by the parameters,
+            divided by sigma.
+        residual: (n,) whitened residual of the fitted readings, divided by sigma.
     """
 
     unknowns: Unknowns
@@ -70,7 +70,7 @@ class MachineFit:
 
     @cached_property
     def robot(self) -> Robot:
-        """The fitted robot that is saved."""
+        """The fitted robot, which is saved."""
         return self.unknowns.robot_at(self.x)
 
     @property
@@ -80,7 +80,7 @@ class MachineFit:
 
     @property
     def determined(self) -> NDArray:
-        """(k,) fraction of each parameter that is determined by the readings."""
+        """(k,) fraction of each parameter that the readings determine."""
         prior = self.unknowns.std**2
         return 1.0 - np.clip(np.diag(self.covariance) / prior, 0.0, 1.0)
 
@@ -95,7 +95,7 @@ class MachineFit:
         return self.x[own], self.covariance[own, own], self.slopes[:, own]
 
     def seen(self, part: Acting) -> NDArray:
-        """Return (k,) bool: unknowns of an effect on which any reading depends."""
+        """Return a mask (k,) of the unknowns of an effect on which readings depend."""
         return self.determined[self.unknowns.place(part)] > ROUNDING
 
 
@@ -107,15 +107,13 @@ def fit_machine(
     Args:
         campaign: campaign of R rows; its sigma and shared noise are used.
         unknowns: unknown parameters of the campaign's robot.
-        rows: (R,) bool, True for rows to be fitted; readings of other rows are not
-            used.
+        rows: (R,) bool, True for rows to fit; other readings are not used.
         start: (k,) start values; None for the mean of the prior.
 
     Returns:
         The fit.
     """
-    # All rows are predicted, because the readings of a row can depend on earlier
-    # commands.
+    # All rows are predicted, because readings can depend on earlier commands.
     cells = campaign.cells & rows[:, None]
     sigma, whiten = campaign.sigma[cells], whitening_of(campaign, cells)
 
@@ -136,7 +134,7 @@ def _minimum(
     unknowns: Unknowns, residual: Callable[[NDArray], NDArray],
     slopes: Callable[[NDArray], NDArray], start: NDArray | None,
 ) -> tuple[NDArray, NDArray, NDArray]:  # fmt: skip
-    """Return (k,) most probable x, and the (n, k) slopes and (n,) residual there."""
+    """Return the most probable x (k,), with its slopes (n, k) and residual (n,)."""
     mean, std = unknowns.mean, unknowns.std
     lower, upper = unknowns.bounds
     x = np.clip(mean if start is None else start, lower, upper)
@@ -167,7 +165,7 @@ def _minimum(
 
 
 def _step(unknowns: Unknowns, A: NDArray, left: NDArray, x: NDArray) -> NDArray:
-    """Return the (k,) Gauss-Newton step within bounds, in units of the prior."""
+    """Return the Gauss-Newton step (k,) within bounds, in units of the prior."""
     std = unknowns.std
     B = A * std
     L = cholesky(_information(B), lower=True, check_finite=False)
@@ -176,7 +174,7 @@ def _step(unknowns: Unknowns, A: NDArray, left: NDArray, x: NDArray) -> NDArray:
     step = solve_triangular(L, y, lower=True, trans=1, check_finite=False)
     low, high = ((bound - x) / std for bound in unknowns.bounds)
     if np.any(step < low) or np.any(step > high):
-        # |L' step - y| has the same minimiser, and its solver accepts bounds.
+        # |L' step - y| has the same minimiser and is a bounded least-squares problem.
         wide = high - low > 0.0
         step = np.zeros(len(x))
         free = lsq_linear(L.T[:, wide], y, (low[wide], high[wide]), method="bvls")
@@ -185,7 +183,7 @@ def _step(unknowns: Unknowns, A: NDArray, left: NDArray, x: NDArray) -> NDArray:
 
 
 def _information(B: NDArray) -> NDArray:
-    """Return (k, k) B'B + 1, the inverse of C if unknowns are scaled by their prior."""
+    """Return B'B + 1 (k, k), the inverse of C for unknowns scaled by their prior."""
     M = B.T @ B
     M[np.diag_indices(len(M))] += 1.0
     return np.asarray(M)

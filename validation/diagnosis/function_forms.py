@@ -1,7 +1,7 @@
-"""List the forms of functions of one or two variables, and their prior probabilities.
+"""List the forms of functions of one or two variables with their prior probabilities.
 
-All families of forms of a variable have equal prior probability.  This probability is
-divided among the forms of the family.  The part of a wave decreases with its order.
+All families of forms of a variable have equal prior probability, which is divided among
+the forms of the family.  Higher harmonics receive a smaller part.
 """
 
 import math
@@ -15,25 +15,25 @@ from forcefit.assembly.measurement.conditions import Conditions
 from forcefit.assembly.measurement.variables import variable
 from forcefit.assembly.model.robot import Robot
 
-KNOTS = 7  # number of knots of a spline; powers up to three fit simpler curves
-MANY = 150  # number of rows from which waves of high order are searched
+KNOTS = 7  # number of spline knots; powers up to three fit simpler curves
+MANY = 150  # minimum number of rows for a search of high-order harmonics
 # Time constants relative to the duration of the campaign.
 LAGS = 0.02, 0.03, 0.05, 0.07, 0.1, 0.14, 0.2, 0.3, 0.5
-_CYCLES = 0.5, 1, 1.5, 2, 3, 4, 6  # cycles of a slow wave in the campaign's duration
-# depths of slip (hysteresis) that are tried, relative to the variable's range
+_CYCLES = 0.5, 1, 1.5, 2, 3, 4, 6  # cycles of a slow harmonic during the campaign
+# Candidate depths of slip (hysteresis), relative to the variable's range.
 _DEPTHS = 0.03, 0.1, 0.3, 1.0
-# Depths of slip near the best depth, for the refined search.
+# Depths of slip near the best one, for the refined search.
 _ALL_DEPTHS = tuple(0.01 * 1.4**k for k in range(15))
-# Step of the search for the number of screw turns over the travel of a slide; a larger
-# step would miss waves.
+# Search step for the number of screw turns over the travel of a slide; a larger step
+# would miss harmonics.
 _TURNS = 0.5
-# Largest number of screw turns over the travel of a slide.  A smaller limit applies to
-# few positions: two turns for each different position.
+# Largest number of screw turns over the travel of a slide.  With few positions, the
+# limit is two turns per distinct position.
 _MOST_TURNS = 200.0
 _FINER = 1.2  # first factor in the refinement of a shape parameter
 # Loads below this fraction of the largest load do not close backlash.
 _NO_LOAD = 1e-3
-_HIGH = 12  # highest order of waves that is tried separately
+_HIGH = 12  # highest harmonic that is tried separately
 _CLOCKS = "time", "cov.time"
 # Number of points in time at which a step function is tried, in short and in long
 # campaigns.
@@ -58,7 +58,7 @@ class CandidateShape:
 
     @property
     def bends(self) -> NDArray:
-        """The shape parameter as an array (1,) if it is fitted; otherwise (0,)."""
+        """The shape parameter as an array (1,), or (0,) if none is fitted."""
         one = len(self.given) == 1 and self.form != "step"
         return np.array([value for _, value in self.given] if one else [])
 
@@ -73,7 +73,7 @@ def _powers(*powers: int) -> CandidateShape:
 
 
 def _waves(*orders: int, form: str = "waves") -> CandidateShape:
-    """Return the sines and cosines of an angle for the given orders."""
+    """Return the harmonics (sines and cosines) of an angle for given orders."""
     names = tuple(f"{k}.{w}" for k in orders for w in ("sine", "cosine"))
     return CandidateShape(form, names)
 
@@ -81,7 +81,7 @@ def _waves(*orders: int, form: str = "waves") -> CandidateShape:
 def _at_each(
     form: str, names: tuple[str, ...], key: str, values: Iterable[float]
 ) -> list[CandidateShape]:
-    """Return the form once for each value of its shape parameter."""
+    """Return one form for each value of its shape parameter."""
     return [CandidateShape(form, names, ((key, float(v)),)) for v in values]
 
 
@@ -97,7 +97,7 @@ def is_angle(robot: Robot, name: str) -> bool:
 
 
 def first(conditions: Conditions, name: str) -> list[CandidateShape]:
-    """Return general forms that test whether a variable influences the readings."""
+    """Return general forms that test whether a variable affects the readings."""
     if name == "approach":
         return [STRAIGHT]
     cubic, memory = _powers(0, 1, 2, 3), _reversals(conditions, name, _DEPTHS)
@@ -138,7 +138,7 @@ def every(conditions: Conditions, name: str) -> list[CandidateShape]:
 
 
 def uneven(conditions: Conditions, name: str) -> list[CandidateShape]:
-    """Return the forms of a compliance that varies over a turn."""
+    """Return the forms of a compliance that varies over one turn."""
     if not is_angle(conditions.robot, name):
         return []
     names = [("0.cosine", f"{k}.sine", f"{k}.cosine") for k in range(1, 5)]
@@ -149,7 +149,7 @@ def screw(
     conditions: Conditions, name: str, form: str = "waves",
     names: tuple[str, ...] = _WAVE,
 ) -> list[CandidateShape]:  # fmt: skip
-    """Return waves of a slide's coordinate with the lead of its screw as period."""
+    """Return harmonics of a slide's coordinate whose period is its screw lead."""
     if not name.startswith("q.") or is_angle(conditions.robot, name):
         return []
     x = variable(conditions, name)
@@ -159,12 +159,12 @@ def screw(
 
 
 def is_screw(shape: CandidateShape) -> bool:
-    """Return whether a form is a wave with a given period, as from :func:`screw`."""
+    """Return whether a form is a harmonic of given period, as from :func:`screw`."""
     return shape.form.endswith("waves") and bool(shape.given)
 
 
 def of_direction(conditions: Conditions, name: str) -> list[CandidateShape]:
-    """Return forms of backlash that varies over a turn of a drive or of its screw."""
+    """Return forms of backlash that varies over one turn of a drive or its screw."""
     if is_angle(conditions.robot, name):
         return [CandidateShape("reversal_waves", _ANGLE)]
     return screw(conditions, name, "reversal_waves", _ANGLE)
@@ -175,7 +175,7 @@ def of_two(
 ) -> tuple[tuple[str, str], list[CandidateShape]] | None:
     """Return the forms of functions of two variables, and the variables in order.
 
-    The result is None if functions of these two variables are not considered.
+    Return None if functions of these two variables are not considered.
     """
     angles = [is_angle(conditions.robot, name) for name in (first, second)]
     if {first, second} == set(_CLOCKS):
@@ -198,7 +198,7 @@ def of_two(
 
 
 def knees(load: NDArray, *, jump: bool) -> list[CandidateShape]:
-    """Return spring laws with a knee at some loads, also with a jump at load zero."""
+    """Return spring laws with a knee at some load, also with a jump at zero load."""
     least = _NO_LOAD * float(load.max(initial=0.0))
     levels = np.unique(np.quantile(load, _INNER))
     levels = levels[levels > least]
@@ -211,7 +211,7 @@ def knees(load: NDArray, *, jump: bool) -> list[CandidateShape]:
 def near(
     conditions: Conditions, variables: Sequence[str], shape: CandidateShape, part: float
 ) -> list[CandidateShape]:
-    """Return a form with its shape parameter slightly smaller and slightly larger.
+    """Return a form with slightly smaller and slightly larger shape parameter.
 
     The change is ``part`` times half the step of the first search.  The result is empty
     for a step function and for a form without shape parameter.
@@ -237,7 +237,7 @@ def _steps(conditions: Conditions, name: str, count: int) -> list[CandidateShape
 def _reversals(
     conditions: Conditions, name: str, depths: Sequence[float]
 ) -> list[CandidateShape]:
-    """Return forms with memory: reversal of the motion, and slip."""
+    """Return forms with memory: motion reversal and slip."""
     if not name.startswith(("q.", "load.")) or name == "load.force":
         return []
     size = float(np.ptp(variable(conditions, name)))
@@ -262,7 +262,7 @@ def _weight(shape: CandidateShape) -> float:
 
 
 def falling(shape: CandidateShape, count: int) -> NDArray:
-    """Return (count,) relative prior standard deviations of the columns of a form."""
+    """Return relative prior standard deviations (count,) of the columns of a form."""
     if shape.form != "waves" or count != len(shape.names):
         return np.ones(count)
     order = np.array(_orders(shape))
@@ -270,6 +270,6 @@ def falling(shape: CandidateShape, count: int) -> NDArray:
 
 
 def _orders(shape: CandidateShape) -> list[int]:
-    """Return the order of each column of waves; for two orders, the larger one."""
+    """Return the order of each harmonic column; of two orders, the larger one."""
     parts = [name.split(".")[:-1] for name in shape.names]
     return [max(abs(int(part)) for part in orders) for orders in parts]

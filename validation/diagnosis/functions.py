@@ -1,8 +1,8 @@
-"""Score candidate functions (all combinations of places and forms) in batches.
+"""Score candidate functions, that is, all combinations of places and forms.
 
-A column of a function is a product: B_(rc)q = a_rc P_rq. a_rc is the response of
-reading c of row r to a screw component.  P_rq is the value of column q of the form in
-row r.  Inner products of columns therefore factor:
+A column of a function is a product B_(rc)q = a_rc P_rq, where a_rc is the response of
+reading c in row r to a screw component, and P_rq is column q of the form in row r.
+Inner products of columns therefore factor:
 
 ======  ===============  ===========  ================================================
 symbol  code             shape        meaning
@@ -41,18 +41,18 @@ from forcefit.validation.diagnosis.places import Places, Weighted, Where
 from forcefit.validation.diagnosis.sensitivities import Sensitivities, in_cells
 
 Variables = tuple[str, ...]
-# A request: the variables of a function, and the forms to be scored.
+# A request consists of the variables of a function and the forms to score.
 Request = tuple[Variables, tuple[CandidateShape, ...]]
-# Largest number of columns of a function: six columns for each of six components.
+# Largest number of columns of a function: six for each of six components.
 _WIDEST = 36
-# Number of functions with the highest scores that are kept; requests select from these.
+# Number of top-scoring functions that are retained; requests select from these.
 _LISTED = 2000
 _BATCH = 2_000_000  # number of values in a batch, 16 MB
 
 
 @dataclass(frozen=True)
 class ScoredFunction:
-    """A function that may be added to a model, and its score."""
+    """A function that may be added to a model, with its score."""
 
     score: float
     candidate: Candidate
@@ -75,14 +75,14 @@ class Functions:
     def __init__(
         self, campaign: Campaign, sensitivities: Sensitivities, variables: list[str]
     ) -> None:
-        """List the places of a design; measured values are not used."""
+        """List the places of a design, without using measured values."""
         self.campaign, self.sensitivities = campaign, sensitivities
         self.conditions = sensitivities.conditions
         self.places = Places(campaign, sensitivities)
         self._depend_on(variables)
 
     def _depend_on(self, variables: list[str]) -> None:
-        """Set the variables on which functions depend; compute each response once."""
+        """Set the variables on which functions depend, computing each response once."""
         self.variables = variables
         self.shapes_of = cache(self._shapes_of)
         self.prior = cache(self._prior)
@@ -95,19 +95,19 @@ class Functions:
         return other
 
     def at_rows(self, rows: NDArray) -> "Functions":
-        """Return the candidate functions, with their columns for selected rows only."""
+        """Restrict the columns of the candidate functions to selected rows."""
         other = copy(self)
         other.campaign = self.campaign.take(rows)
         other.sensitivities = self.sensitivities.take(rows)
         return other
 
     def known(self, *names: str) -> Conditions:
-        """Return the conditions of the rows in which all given variables are known."""
+        """Return the conditions of the rows in which all variables are known."""
         rows = is_known(self.conditions, *names)
         return self.conditions if rows.all() else self.conditions.take(rows)
 
     def _shapes_of(self, variables: Variables) -> dict[CandidateShape, float]:
-        """Return all forms of one or two variables with their log priors."""
+        """Return all forms of one or two variables and their log priors."""
         known = self.known(*variables)
         if len(variables) == 1:
             shapes = forms.every(known, variables[0])
@@ -131,7 +131,7 @@ class Functions:
         return known.get(shape, min(known.values(), default=-math.inf))
 
     def first_look(self) -> list[Request]:
-        """Return the requests to score first: general forms of every variable."""
+        """Return the requests to score first, the general forms of every variable."""
         requests: list[Request] = []
         for name in self.variables:
             shapes = forms.first(self.known(name), name)
@@ -140,7 +140,7 @@ class Functions:
         return requests
 
     def products(self, names: Iterable[str]) -> list[Request]:
-        """Return requests for functions of two variables, of which one is given."""
+        """Return requests for functions of two variables, one of which is given."""
         requests: dict[Variables, tuple[CandidateShape, ...]] = {}
         for name in names:
             for other in self.variables:
@@ -158,7 +158,7 @@ class Functions:
         self, marginal: Marginal, weighted: Weighted,
         requests: Sequence[Request], most: int,
     ) -> list[ScoredFunction]:  # fmt: skip
-        """Return the functions that improve a model most, the best first.
+        """Return the functions that improve a model most, best first.
 
         The model was fitted to the cells of ``weighted``.  At most ``most`` functions
         of each request are returned.
@@ -258,7 +258,7 @@ class Functions:
         return columns * forms.falling(shape, columns.shape[1])
 
     def equivalents(self, one: Candidate) -> list[tuple[CandidatePart, ...]]:
-        """Return the other places at which a candidate function has equal columns."""
+        """Return other places at which a candidate function has equal columns."""
         if len(one.parts) > 1:
             return []
         part = one.parts[0]
@@ -268,7 +268,7 @@ class Functions:
         return [_at(p, part.variables, one.shape).parts for p in same]
 
     def element(self, one: Candidate, log_prior: float) -> Element | None:
-        """Return the element of a candidate function; None if no reading shows it."""
+        """Return the element of a candidate function, or None if it is invisible."""
         columns = in_cells(self.sensitivities, one, self.campaign)
         axes = self.sensitivities.axes(one)
         each = columns.shape[1] // sum(len(p.components) for p in one.parts)

@@ -1,4 +1,4 @@
-r"""Score Gaussian linear models whose unknowns are marginalised.
+r"""Score Gaussian linear models with marginalised unknowns.
 
 The readings are z = X u + noise with u ~ N(0, s^2) and noise ~ N(0, 1).  Both are in
 units of the noise scale tau.  With S = diag(s) and C = 1 + X S^2 X':
@@ -30,11 +30,11 @@ from scipy.special import log_ndtr
 # Degrees of freedom of the prior of tau^2; the prior allows a true sigma between 1/2
 # and 3 times the declared sigma.
 FREEDOM = 20.0
-# [sigma] Prior standard deviations of a candidate's contribution to the readings.  The
-# evidence is averaged over these values.
+# [sigma] Prior standard deviations of a candidate's contribution to the readings, over
+# which the evidence is averaged.
 SIZES = 10.0 ** np.arange(-0.5, 4.1, 0.5)
 SPAN = math.log(SIZES[-1] / SIZES[0])
-_SEEN = 1e-8  # smaller eigenvalues of a scaled candidate are rounding errors
+_SEEN = 1e-8  # smaller eigenvalues of a scaled candidate are round-off
 
 
 def deviance(squares: NDArray | float, count: int) -> NDArray | float:
@@ -43,7 +43,7 @@ def deviance(squares: NDArray | float, count: int) -> NDArray | float:
 
 
 def scale(squares: float, count: int) -> tuple[float, float]:
-    """Return the estimated noise scale tau and the standard deviation of tau."""
+    """Return the estimated noise scale tau and its standard deviation."""
     freedom = FREEDOM + count
     tau = np.sqrt((FREEDOM + squares) / max(freedom - 2.0, 1.0))
     return float(tau), float(tau / np.sqrt(2 * freedom))
@@ -79,7 +79,7 @@ def marginalise(columns: NDArray, std: NDArray, z: NDArray, flat: NDArray) -> Ma
 def leave_block_out(
     marginal: Marginal, blocks: NDArray, tau: float = 1.0
 ) -> tuple[NDArray, NDArray]:
-    """Predict each block of readings (n,) exactly by a fit to all other blocks.
+    """Predict each block of readings (n,) by an exact fit to all other blocks.
 
     Returns:
         (n,) prediction errors, and (blocks,) logarithms of the predictive densities.
@@ -103,7 +103,7 @@ def evidence_gains(
     gram: NDArray, along: NDArray, most: NDArray, bounded: NDArray | bool,
     marginal: Marginal,
 ) -> NDArray:  # fmt: skip
-    """Return log evidence ratios of candidates, averaged over prior sizes.
+    """Return the log evidence ratios of candidates, averaged over prior sizes.
 
     Args:
         gram: (c, m, m) matrices B'C^-1 B of c candidates, with columns scaled to a norm

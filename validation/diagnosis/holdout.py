@@ -1,10 +1,9 @@
-"""Choose the held-out rows: whole configurations or time spans.
+"""Choose held-out rows as whole configurations or time spans.
 
 A campaign of at least 60 configurations is split once into fitted and held-out rows.  A
 smaller campaign is tested by nested cross-validation, because a quarter of few
-configurations is too small a sample.  In each fold, the whole diagnosis is repeated
-without the held-out rows of this fold.  No reading of a held-out row is used before the
-verdict.
+configurations is too small a sample: in each fold, the whole diagnosis is repeated
+without the fold's held-out rows.  No held-out reading is used before the verdict.
 """
 
 from dataclasses import dataclass, replace
@@ -15,7 +14,7 @@ from numpy.typing import NDArray
 from forcefit.validation.campaign.campaign import Campaign
 
 FEWEST = 8  # smallest number of blocks (configurations or time spans) for a test
-# Number of configurations from which a single part of the rows is held out.
+# Number of configurations from which a single split is used.
 _SPLIT = 60
 # Fraction of held-out blocks for 60 blocks, and for many blocks.
 _SHARES = (1 / 4, 1 / 10)
@@ -28,12 +27,11 @@ SPANS = "spans of time"
 
 @dataclass(frozen=True, eq=False)
 class HeldOut:
-    """The held-out rows, and the method of holding out.
+    """The held-out rows and how they were chosen.
 
     Attributes:
         how: ``"split"``, ``"folds"`` or ``"none"``.
-        folds: for each fold (R,) bool, True for its held-out rows.  A split consists of
-            one fold.
+        folds: (R,) mask of the held-out rows of each fold; a split has a single fold.
         words: description of the method.
     """
 
@@ -43,7 +41,7 @@ class HeldOut:
 
     @property
     def rows(self) -> NDArray:
-        """(R,) bool, True for rows that are held out in any fold."""
+        """(R,) bool, True for rows held out in any fold."""
         return np.any(self.folds, axis=0)
 
 
@@ -51,8 +49,8 @@ def hold_out(campaign: Campaign) -> HeldOut:
     """Choose the held-out rows of a diagnosis.
 
     Returns:
-        The held-out rows, which are reproducible.  The method is ``"none"`` for fewer
-        than two blocks.  All rows are then both fitted and tested.
+        The held-out rows, chosen reproducibly.  The method is ``"none"`` for fewer than
+        two blocks; all rows are then both fitted and tested.
     """
     blocks, kind = blocks_of(campaign)
     names = np.random.default_rng(0).permutation(np.unique(blocks))
@@ -71,37 +69,37 @@ def hold_out(campaign: Campaign) -> HeldOut:
         return HeldOut("split", (held,), words)
     parts = np.array_split(names, min(_FOLDS, count))
     words = (
-        f"{len(parts)} folds over {count} {kind}: in each the whole diagnosis is "
-        "made without its rows"
+        f"{len(parts)} folds over {count} {kind}: in each, the whole diagnosis is "
+        "repeated without its rows"
     )
     return HeldOut("folds", tuple(np.isin(blocks, part) for part in parts), words)
 
 
 def hidden(campaign: Campaign, rows: NDArray) -> Campaign:
-    """Return a campaign in which the readings of selected rows (R,) bool are NaN."""
+    """Return a campaign in which the readings of selected rows (R,) are NaN."""
     readings = np.where(rows[:, None], np.nan, campaign.measured)
     return replace(campaign, measured=readings)
 
 
 def drawn(visit: NDArray, most: int) -> NDArray:
-    """Return (R,) bool: about ``most`` random rows; rows of one visit stay together."""
+    """Return a mask (R,) of about ``most`` random rows; visits are not split."""
     listed = np.unique(visit)
     count = most * len(listed) // max(len(visit), 1)
     return np.isin(visit, np.random.default_rng(0).permutation(listed)[:count])
 
 
 def blocks_of(campaign: Campaign) -> tuple[NDArray, str]:
-    """Return the blocks that are either fitted or predicted as a whole.
+    """Return the blocks that are fitted or predicted as a whole.
 
     Returns:
-        (R,) number of the configuration, or of the time span if there are too few
+        (R,) index of the configuration, or of the time span if there are too few
         configurations; and the kind of block as text.
     """
     blocks = campaign.configuration
     if len(np.unique(blocks)) >= FEWEST:
         return blocks, "configurations"
     time = campaign.covariates.get("time", np.arange(len(campaign)))
-    # Points that are measured together belong to one time span.
+    # Points measured together belong to one time span.
     _, first, visit = np.unique(
         campaign.measured_at_once, return_index=True, return_inverse=True
     )

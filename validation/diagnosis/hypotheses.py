@@ -1,14 +1,13 @@
-"""List hypotheses: an effect of the library at certain frames, with its unknowns.
+"""List the hypotheses of a diagnosis: library effects at certain frames.
 
 An effect may act at one frame, at several frames with separate parameters, or at
-several frames with a common parameter.  Such groups are all frames, or all frames of
-one kind (``leg1.rod``, ``leg2.rod``).  Each case is a separate hypothesis.  Each fitted
-parameter of a hypothesis is called a slot.
+several frames with a common parameter, where a group consists of all frames or of all
+frames of one kind (``leg1.rod``, ``leg2.rod``).  Each case is a separate hypothesis.
+Each fitted parameter of a hypothesis is called a slot.
 
-Between sessions a machine may be homed again, its tool may be changed or its device may
-be moved.  Therefore an effect may have different parameters in each session.  Such a
-hypothesis contains a copy of every slot for each session, and each copy acts only in
-the rows of its session.
+Between sessions, the machine may be homed again, its tool changed or the device moved,
+so an effect may have different parameters in each session.  Such a hypothesis contains
+one copy of every slot per session, which acts only in the rows of this session.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -23,14 +22,14 @@ from forcefit.assembly.measurement.conditions import Conditions
 from forcefit.assembly.model.robot import Robot
 
 PER_SESSION = ("registration", "encoder_offset", "drift")
-# Largest number of unknowns of one effect; if an effect requires more, frames of the
-# same kind share one unknown.
+# Largest number of unknowns of one effect; if an effect requires more, frames of one
+# kind share an unknown.
 _MOST_UNKNOWNS = 24
 
 
 @dataclass(frozen=True)
 class Slot:
-    """A fitted parameter, which is the value of one or several unknowns of an effect.
+    """A fitted parameter, which sets one or several unknowns of an effect.
 
     Attributes:
         names: names of the unknowns with this value.
@@ -51,12 +50,12 @@ class Slot:
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """Assumption that an effect acts at certain frames, with parameters to be fitted.
+    """Assumption that an effect acts at certain frames, with parameters to fit.
 
     Attributes:
         effect: name of the effect.
         where: frames at which the effect acts; empty for effects of the whole machine.
-        slots: the parameters to be fitted.
+        slots: parameters to fit.
     """
 
     effect: str
@@ -64,7 +63,7 @@ class Hypothesis:
     slots: tuple[Slot, ...]
 
     def public(self, robot: Robot, x: Sequence[float] | NDArray) -> dict[str, float]:
-        """Return the parameters by public name in SI units, for slot values x."""
+        """Return the parameters by public name, in SI units, for slot values x."""
         values = {
             name: float(value)
             for slot, value in zip(self.slots, x, strict=True)
@@ -87,7 +86,7 @@ class Hypothesis:
 
 
 def hypotheses(conditions: Conditions, loads: Sequence[str]) -> list[Hypothesis]:
-    """Return all hypotheses that the declared conditions can test, ordered by effect.
+    """Return all hypotheses that given conditions can test, ordered by effect.
 
     ``loads`` contains the load components that the campaign records, such as
     ``["fx"]``.
@@ -130,8 +129,7 @@ def _choices(
 ) -> Iterator[list[Unknown]]:
     """Yield subsets of the unknowns of an effect without frames, the full set first."""
     if effect.follows_load:
-        # An offset in a direction without recorded load belongs to a different
-        # candidate model.
+        # A load offset in a direction without recorded load is not a candidate.
         kept = {f"offset.{name}" for name in loads}
         unknowns = tuple(
             u for u in unknowns if u.name in kept or "offset." not in u.name
@@ -170,7 +168,7 @@ def _scanned(
     effect: Effect, where: tuple[str, ...],
     slots: list[tuple[tuple[str, ...], Unknown]], conditions: Conditions,
 ) -> Iterator[Hypothesis]:  # fmt: skip
-    """Yield one hypothesis for each start value of a shape parameter, or only one."""
+    """Yield one hypothesis per start value of a shape parameter, or a single one."""
     scan: tuple[float, ...] = next((u.scan for _, u in slots if u.scan), (0.0,))
     by = next((u.scan_by for _, u in slots if u.scan_by), "")
     size = float(np.ptp(getattr(conditions, by))) if by else 1.0
@@ -188,11 +186,11 @@ def _scanned(
 
 
 def with_declared(listed: Sequence[Hypothesis], robot: Robot) -> list[Hypothesis]:
-    """Return the hypotheses that can be added to the declared effects.
+    """Return the hypotheses that can be combined with the declared effects.
 
     A declared effect and a hypothesis of the same effect must combine to a single
-    effect.  Contact laws and delays are omitted if one is declared.  The time constant
-    of a drift equals the declared one.  Springs may be stiffer than declared.
+    effect.  Contact laws and delays are therefore omitted if one is declared, and a
+    drift has the declared time constant.  Springs may be stiffer than declared.
     """
     curved = {
         (name, key.removesuffix(".coefficient").removesuffix(".time_constant"))
@@ -213,13 +211,13 @@ def with_declared(listed: Sequence[Hypothesis], robot: Robot) -> list[Hypothesis
     return list(kept)
 
 
-# Nonlinear effects: two instances of one of them do not combine to one effect.
+# Two instances of one of these nonlinear effects do not combine to a single effect.
 _CURVED = ("contact_stiffening", "delayed_expansion")
 _SPRINGS = ("drive_compliance", "base_compliance")
 
 
 def _stiffer(slot: Slot, soft: Mapping[str, float]) -> Slot:
-    """Return a slot of compliances that may compensate declared compliances."""
+    """Return a slot whose compliances may offset declared compliances."""
     names = [
         n.removesuffix(".compliance").replace("compliance.", "stiffness.")
         for n in slot.names
@@ -239,7 +237,7 @@ def _held(slot: Slot, constant: float) -> Slot:
 def with_sessions(
     listed: Sequence[Hypothesis], sessions: Sequence[str], further: Sequence[str] = ()
 ) -> list[Hypothesis]:
-    """Return the hypotheses, and additional ones with parameters for each session.
+    """Return the hypotheses and, in addition, those with parameters per session.
 
     The additional hypotheses exist only for several sessions.  They cover each effect
     of :data:`PER_SESSION` and ``further`` whose parameters are not shared among frames.
@@ -262,7 +260,7 @@ def _each(h: Hypothesis, sessions: Sequence[str]) -> Hypothesis:
 
 
 def sessions_of(h: Hypothesis) -> tuple[str | None, ...]:
-    """Return the sessions of the parameters; (None,) if they apply to all rows."""
+    """Return the sessions of the parameters, or (None,) if they apply to all rows."""
     return tuple(dict.fromkeys(slot.session for slot in h.slots)) or (None,)
 
 

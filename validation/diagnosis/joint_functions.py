@@ -1,7 +1,7 @@
 """List functions that act at several places, and cubic springs.
 
-For example, all bodies swell with humidity, or all drives have backlash.  All places
-have the same form with separate coefficients.
+For example, all bodies may swell with humidity, or all drives may have backlash.  All
+places share a form but have separate coefficients.
 """
 
 import math
@@ -26,15 +26,15 @@ from forcefit.validation.diagnosis.function_forms import CandidateShape, is_angl
 from forcefit.validation.diagnosis.functions import Functions
 from forcefit.validation.diagnosis.gaussian import SIZES
 
-# A compliance that is proportional to the square of the wrench.
+# Compliance proportional to the square of the wrench.
 _CUBIC = CandidateShape("powers", ("2",))
 Parts = tuple[CandidatePart, ...]
 
 
 def joint_functions(functions: Functions, rows: NDArray) -> list[Element]:
-    """Return functions at several places, and cubic springs, that affect the readings.
+    """Return visible functions at several places and cubic springs.
 
-    The columns of these functions contain the cells of the given rows.
+    Their columns contain the cells of the given rows.
     """
     some = functions.at_rows(rows)
     listed: list[tuple[Candidate, float]] = []
@@ -47,7 +47,7 @@ def joint_functions(functions: Functions, rows: NDArray) -> list[Element]:
 
 
 def _of_wrench(functions: Functions) -> list[tuple[Candidate, float]]:
-    """Return backlash, and cubic springs or springs with a knee at all joints."""
+    """Return backlash, cubic springs and springs with a knee at all joints."""
     names = functions.places.names
     joints = [p[0] for p in names if len(p) == 1 and p[0][2] == "compliance"]
     prior = -math.log(4.0 * max(len(functions.variables), 1) * max(len(joints), 1))
@@ -66,7 +66,7 @@ def _of_wrench(functions: Functions) -> list[tuple[Candidate, float]]:
 
 
 def _knees(functions: Functions, name: str, component: str) -> list[CandidateShape]:
-    """Return laws with a knee for the load of a drive or spring along its motion."""
+    """Return spring laws with a knee for the load of a drive or spring."""
     robot = functions.conditions.robot
     frame, axis = robot.frame(name), AXES.index(component)
     if frame.pitch:  # the wrench along a thread is not a variable

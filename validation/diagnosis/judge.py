@@ -1,4 +1,4 @@
-"""Compute the verdict of a diagnosis and the errors on the held-out rows."""
+"""Determine the verdict of a diagnosis and the errors on held-out rows."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -55,7 +55,7 @@ _SHARE = 0.5
 
 @dataclass(frozen=True, eq=False)
 class Judged:
-    """A machine and the held-out rows on which it is tested.
+    """A fitted machine and the held-out rows on which it is tested.
 
     Attributes:
         fit: the machine.
@@ -72,7 +72,7 @@ def judge(
     campaign: Campaign, traced: Traced, fit: MachineFit, held: HeldOut,
     folds: Sequence[Judged],
 ) -> Diagnosis:  # fmt: skip
-    """Return the diagnosis: the errors on the held-out rows, and the verdict.
+    """Return the diagnosis, with errors on held-out rows and the verdict.
 
     Args:
         campaign: campaign of R rows, as measured.
@@ -162,8 +162,8 @@ def judge(
 
 
 def _noisy(campaign: Campaign, traced: Traced) -> Campaign:
-    """Return the campaign with the noise level that residuals are compared with."""
-    # The declared sigma is used, unless a part of sigma is the noise that points share.
+    """Return the campaign with the noise level against which residuals are tested."""
+    # The declared sigma is used unless part of it is common noise of points.
     common = traced.campaign.common
     if common is None:
         return campaign
@@ -186,7 +186,7 @@ def _outlying_held(
 def _of_all_rows(
     believed: Campaign, traced: Traced, fit: MachineFit, rows: NDArray
 ) -> tuple[MachineFit, NoiseInTime | None]:
-    """Return a fit of the same unknowns to more rows, with the estimated noise."""
+    """Refit the same unknowns to more rows with the estimated noise."""
     more = believed.cells & ~traced.campaign.cells
     sigma = np.where(more, traced.selected.noise.tau, 1.0) * believed.sigma
     believed = replace(believed, sigma=sigma)
@@ -197,7 +197,7 @@ def _of_all_rows(
 def _with_noise_in_time(
     fitting: Campaign, fit: MachineFit
 ) -> tuple[MachineFit, NoiseInTime | None]:
-    """Return the fit with a larger covariance if its noise is correlated in time."""
+    """Enlarge the covariance of a fit if its noise is correlated in time."""
     noise = noise_in_time(fitting, fit.residual)
     if noise is None or not len(fit.x):
         return fit, noise
@@ -209,7 +209,7 @@ def _fails(
     campaign: Campaign, folds: Sequence[Judged], residual: NDArray, rows: NDArray,
     lack: LackOfFit,
 ) -> bool:  # fmt: skip
-    """Return whether held-out residuals exceed the noise and the fit's uncertainty."""
+    """Return whether held-out residuals exceed noise and fit uncertainty."""
     squares, count = 0.0, 0
     for one in folds:
         own = campaign.cells & (one.held & rows)[:, None] & np.isfinite(residual)
@@ -237,7 +237,7 @@ def _too_few(campaign: Campaign, used: NDArray, determined: float, fails: bool) 
 
 
 def _needed(campaign: Campaign, fit: MachineFit) -> str:
-    """Return a description of the additional rows that a verdict requires."""
+    """Describe the additional rows that a verdict requires."""
     components = max(1, int(campaign.cells.any(axis=0).sum()))
     wanted = float(fit.determined.sum()) / _SHARE / components
     blocks = len(np.unique(campaign.configuration))
@@ -250,7 +250,7 @@ def _needed(campaign: Campaign, fit: MachineFit) -> str:
 
 
 def _uncertainty(campaign: Campaign, residual: NDArray, rows: NDArray) -> float:
-    """Return the standard error of the held-out rms [sigma], from scatter of blocks."""
+    """Return the standard error of the held-out rms [sigma], from the block scatter."""
     z = np.where(campaign.cells, residual / campaign.sigma, np.nan)[rows]
     _, block = np.unique(blocks_of(campaign)[0][rows], return_inverse=True)
     sums = np.bincount(block, np.nansum(z**2, axis=1))
@@ -262,7 +262,7 @@ def _uncertainty(campaign: Campaign, residual: NDArray, rows: NDArray) -> float:
 
 
 def _impossible(campaign: Campaign) -> tuple[str, ...]:
-    """Return a remark about rows with impossible readings; empty if there are none."""
+    """Return a remark on rows with impossible readings; empty if there are none."""
     ids = [campaign.ids[i] for i in np.flatnonzero(impossible_rows(campaign))]
     if not ids:
         return ()

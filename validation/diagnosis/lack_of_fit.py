@@ -1,9 +1,9 @@
-"""Test whether a residual is noise, and find its outliers and trends.
+"""Test whether a residual is noise and find its outliers and trends.
 
 The residual is compared with the declared sigma and with the scatter of repeats.  A
-trend is a dependence of the residual on one variable, such as a component of the pose,
-a load or a covariate.  The trend is fitted to all six components of the reading with
-separate coefficients.
+trend is a dependence of the residual on one variable, for example a pose component, a
+load or a covariate.  It is fitted to all six reading components with separate
+coefficients.
 
 Sources:
     Draper, Smith, Applied Regression Analysis, 3rd ed., section 2.1 (lack of fit and
@@ -23,10 +23,10 @@ from forcefit.validation.campaign.campaign import LOAD, Campaign, number_rows
 from forcefit.validation.diagnosis.noise import repeat_scatter
 from forcefit.validation.diagnosis.separability import orthonormal_basis
 
-SIGNIFICANT = 1e-4  # probability below which a residual is not noise
-UNLIKELY = 1e-3  # probability below which one of many tested residuals is unlikely
+SIGNIFICANT = 1e-4  # p-value below which a residual is not noise
+UNLIKELY = 1e-3  # p-value below which one of many tested residuals is unlikely
 OUTLIERS = 20  # one outlier is accepted per this number of rows
-# Number of bins of a covariate's range; rows in one bin count as replicates.
+# Number of bins per covariate range; rows in one bin count as replicates.
 _LEVELS = 30
 _OUTLYING = 5.5  # smallest ratio of an outlying row's rms to the median rms of all rows
 _MOST = 6  # largest number of reported trends
@@ -38,15 +38,13 @@ class LackOfFit:
 
     Attributes:
         rms: [-] rms of the whitened residual, computed with its degrees of freedom.
-        probability: p-value, the probability that noise with the declared sigma causes
-            a residual at least as large.
+        probability: p-value of the residual for noise with the declared sigma.
         repeats: [-] rms of the whitened scatter between repeats; NaN without repeats.
         repeats_freedom: [-] degrees of freedom of this scatter.
-        against_repeats: probability that noise with the scatter of the repeats causes a
-            residual at least as large.
-        common: whether the noise that points of one measurement share was estimated
-            from the residual itself.  The residual is then significant only if it also
-            exceeds the scatter of repeats.
+        against_repeats: p-value of the residual for noise with the scatter of the
+            repeats.
+        common: whether common noise of points was estimated from the residual itself,
+            which is then significant only if it also exceeds the scatter of repeats.
     """
 
     rms: float
@@ -78,7 +76,7 @@ def lack_of_fit(campaign: Campaign, residual: NDArray, unknowns: int) -> LackOfF
 
     Args:
         campaign: campaign of R rows with N measured cells.
-        residual: (N,) whitened residual, whose values are independent if it is noise.
+        residual: (N,) whitened residual, with independent values if it is noise.
         unknowns: number of fitted unknowns.
 
     Returns:
@@ -93,8 +91,8 @@ def lack_of_fit(campaign: Campaign, residual: NDArray, unknowns: int) -> LackOfF
     repeats, between = repeat_scatter(residual, group)
     against = 1.0
     if between and freedom > between:
-        # Lack of fit over pure error.  The scatter of repeats is zero if the device
-        # rounds its readings to equal values.
+        # Lack of fit over pure error.  If the device rounds, repeats may have zero
+        # scatter.
         excess = (rss - between * repeats**2) / (freedom - between)
         ratio = excess / repeats**2 if repeats else (np.inf if excess > 0 else 0.0)
         against = float(f.sf(ratio, freedom - between, between))
@@ -106,8 +104,8 @@ def lack_of_fit(campaign: Campaign, residual: NDArray, unknowns: int) -> LackOfF
 
 
 def _alike(campaign: Campaign) -> NDArray:
-    """Return (R,) group numbers: equal for equal command, load and covariates."""
-    # The time is ignored.  Other covariates count as equal if they differ by at most a
+    """Return group numbers (R,) by command, load and covariates."""
+    # Time is ignored.  Other covariates count as equal if they differ by at most a
     # thirtieth of their range.  Then an effect that is not modelled does not count as
     # noise.
     parts = [campaign.repeat]
@@ -119,7 +117,7 @@ def _alike(campaign: Campaign) -> NDArray:
 
 
 def outlying(campaign: Campaign, residual: NDArray, most: int | None = None) -> NDArray:
-    """Return the rows whose residuals are outliers.
+    """Return a mask of the rows whose residuals are outliers.
 
     Args:
         campaign: campaign of R rows with N measured cells.
@@ -138,7 +136,7 @@ def outlying(campaign: Campaign, residual: NDArray, most: int | None = None) -> 
     cells = np.bincount(rows, minlength=len(campaign))
     rms = np.sqrt(squares / np.maximum(cells, 1))
     # A row with few cells scatters more, so its rms is compared with the largest rms
-    # that noise causes in as many cells.
+    # that noise causes in that many cells.
     far = rms > _OUTLYING * max(float(np.median(rms)), 1.0)
     most = len(campaign) // OUTLIERS if most is None else most
     if far.sum() > most:
@@ -153,8 +151,8 @@ class Trend:
     Attributes:
         against: description of the variable.
         share: [-] fraction of the squared whitened residual that the variable explains.
-        probability: probability that noise causes a fraction at least as large in any
-            of the tested trends.
+        probability: probability that noise causes a fraction this large in any tested
+            trend.
     """
 
     against: str
@@ -165,7 +163,7 @@ class Trend:
 def trends(
     campaign: Campaign, conditions: Conditions, residual: NDArray
 ) -> list[Trend]:
-    """Return the variables on which a residual depends, the strongest first.
+    """Return the variables on which a residual depends, strongest first.
 
     Args:
         campaign: campaign of R rows.
@@ -185,7 +183,7 @@ def trends(
 def _candidates(
     campaign: Campaign, conditions: Conditions
 ) -> Iterator[tuple[str, NDArray]]:
-    """Yield the name of each variable, and functions (R, p) without the constant."""
+    """Yield the name of each variable and its functions (R, p), without constants."""
     loads = campaign.loads
     force = loads[:, 3:]
     size = np.linalg.norm(force, axis=1)
@@ -217,13 +215,13 @@ def _candidates(
 
 
 def _powers(x: NDArray) -> NDArray:
-    """Return (R, 2): a variable minus its mean, and the square of this difference."""
+    """Return a variable minus its mean, and the square of this difference (R, 2)."""
     centred = x - x.mean()
     return np.column_stack([centred, centred**2])
 
 
 def _test(name: str, X: NDArray, z: NDArray, tried: int) -> Trend | None:
-    """Return the F test of whether functions of a variable explain the residual."""
+    """Test whether functions of a variable explain the residual (F test)."""
     before = after = 0.0
     extra = freedom = 0
     for column in z.T:

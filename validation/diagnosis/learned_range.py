@@ -1,9 +1,8 @@
-"""Range of the data a model was identified on, and rows that extrapolate beyond it.
+"""Determine the range on which a model was identified and rows outside it.
 
 An identified effect is known only in the range of the covariates on which it was
-identified.  If a joint made a full turn, its angle is compared modulo a turn.  An
-exception is a robot file with a function of the angle that does not repeat after a
-turn.
+identified.  If a joint made a full turn, its angle is compared modulo a turn, unless
+the robot file contains a function of the angle that does not repeat.
 """
 
 from collections.abc import Iterator
@@ -20,7 +19,7 @@ from forcefit.validation.campaign.campaign import LOAD, Campaign
 
 _MARGIN = 0.05  # accepted extrapolation beyond the range, relative to its width
 _SAME = 1e-3  # accepted relative difference if the variable never varied
-# Forms that repeat after a turn of any variable, then forms that repeat only after a
+# Forms that repeat after a turn of any variable, and forms that repeat only after a
 # turn of the first variable.
 _PERIODIC = ("waves", "reversal_waves", "scaled_waves", "reversal", "slip")
 
@@ -31,10 +30,10 @@ class Beyond:
 
     Attributes:
         variable: public name of the variable.
-        learned: smallest and largest value in the identification.
-        now: smallest and largest value in the present rows.
+        learned: smallest and largest value during identification.
+        now: smallest and largest value in the given rows.
         rows: number of rows outside the range.
-        count: number of all rows.
+        count: total number of rows.
     """
 
     variable: str
@@ -59,10 +58,10 @@ class Beyond:
 
 
 def learned_range(campaign: Campaign, rows: NDArray) -> dict[str, tuple[float, float]]:
-    """Return the smallest and largest value of every variable in selected rows.
+    """Return the range of every variable in selected rows.
 
-    The variables are drives, load components and all covariates except time.  The
-    result maps their public names to the values.
+    Variables are drives, load components and all covariates except time.  The result
+    maps their public names to the smallest and largest value.
     """
     ranges = {}
     for name, values in _variables(campaign).items():
@@ -75,7 +74,7 @@ def learned_range(campaign: Campaign, rows: NDArray) -> dict[str, tuple[float, f
 def beyond(robot: Robot, campaign: Campaign) -> tuple[Beyond, ...]:
     """Return the variables outside the range in which a robot was identified.
 
-    A variable is listed if it exceeds its range by more than a twentieth of the width.
+    A variable is listed if it exceeds its range by more than a twentieth of its width.
     The list is empty if the robot file contains no range.
     """
     left = []
@@ -87,7 +86,7 @@ def beyond(robot: Robot, campaign: Campaign) -> tuple[Beyond, ...]:
 
 
 def beyond_by_row(robot: Robot, campaign: Campaign) -> NDArray:
-    """Return (R,) texts: the names of variables outside their range; empty if none."""
+    """Return (R,) texts: the names of variables outside their range, if any."""
     names = np.full(len(campaign), "", dtype=object)
     for name, _, outside in _outside(robot, campaign):
         names[outside] = [f"{before} {name}".strip() for before in names[outside]]
@@ -97,7 +96,7 @@ def beyond_by_row(robot: Robot, campaign: Campaign) -> NDArray:
 def _outside(
     robot: Robot, campaign: Campaign
 ) -> Iterator[tuple[str, NDArray, NDArray]]:
-    """Yield the name, (R,) values and (R,) bool of each variable outside its range."""
+    """Yield the name, values (R,) and mask (R,) of each variable outside its range."""
     variables = _variables(campaign)
     for name, (low, high) in robot.learned_range.items():
         values = variables.get(name, np.zeros(0))
@@ -127,7 +126,7 @@ def _turns_over(function: Function, name: str) -> bool:
 
 
 def _variables(campaign: Campaign) -> dict[str, NDArray]:
-    """Return the (R,) values of all variables by public name."""
+    """Return the values (R,) of all variables by public name."""
     robot = campaign.robot
     variables = {
         f"q.{name}": campaign.coordinates[:, robot.index(name)]

@@ -1,14 +1,14 @@
 """Find the measurement that best discriminates between two candidate models.
 
-If model A is true, a further measurement differs by d from the prediction of model B,
-which was fitted to the same readings.  J C J' is the covariance of the prediction of B
+If model A is true, an additional measurement differs by d from the prediction of model
+B, which was fitted to the same readings.  J C J' is the covariance of B's prediction
 due to the uncertainty of its parameters.  The measurement with the largest
 non-centrality
 
     d' (I + J C J')^-1 d     (whitened)
 
-discriminates best between the models.  The non-centrality is computed with A as the
-true model and with B as the true model, and the smaller value is used.
+discriminates best between the models.  The smaller of the non-centralities with A and
+with B as the true model is used.
 
 Sources:
     Atkinson, Fedorov (1975), The design of experiments for discriminating between two
@@ -32,8 +32,8 @@ from forcefit.assembly.measurement.predict import predict
 from forcefit.validation.campaign.campaign import LOAD, Campaign
 from forcefit.validation.diagnosis.fit import MachineFit
 
-_TRIED = 240  # number of measuring conditions that are compared
-# Ratio of the tried range of loads and covariates to the measured range.
+_TRIED = 240  # number of measuring conditions compared
+# Ratio of the tested to the measured range of loads and covariates.
 _FURTHER = 1.5
 # step of numerical derivatives relative to a parameter's standard deviation
 _STEP = 1e-3
@@ -51,9 +51,9 @@ class NextMeasurement:
         why: the reason as text.
         configuration: commanded coordinates or pose by column name.
         load: (6,) [N m, N] at the reference point, base axes.
-        covariates: values of covariates to be set, such as a temperature.
-        power: [-] non-centrality of one reading under these conditions.  A measurement
-            with a value of 10 nearly always decides between the models.
+        covariates: values of covariates to set, for example a temperature.
+        power: [-] non-centrality of one reading under these conditions.  With a value
+            of 10, the measurement nearly always decides between the models.
     """
 
     why: str
@@ -71,10 +71,10 @@ def next_measurement(
 ) -> NextMeasurement | None:
     """Return the measurement that discriminates between a fit and a rival model.
 
-    The search covers the measured configurations, and reachable configurations between
-    any two of them.  Loads and covariates may exceed their measured ranges by half.  If
-    a rival is indistinguishable from the fit (for example a longer bar and a rotated
-    encoder), the next rival is used.
+    The search covers the measured configurations and reachable ones between any two of
+    them.  Loads and covariates may exceed their measured ranges by half.  If a rival is
+    indistinguishable from the fit (for example a longer bar and a rotated encoder), the
+    next rival is used.
 
     Args:
         campaign: the measurements.
@@ -83,8 +83,8 @@ def next_measurement(
         rivals: other models, most probable first.
 
     Returns:
-        The measurement; None if none of the tried measurements distinguishes any rival
-        from the fit.
+        The measurement, or None if none of those tested distinguishes a rival from the
+        fit.
     """
     tried = _conditions_tried(conditions)
     sigma = np.nanmedian(campaign.sigma, axis=0)
@@ -107,7 +107,7 @@ def _measurement(
     campaign: Campaign, tried: Conditions, best: int, power: float,
     fits: Sequence[MachineFit],
 ) -> NextMeasurement:  # fmt: skip
-    """Return one of the tried conditions as text and as numbers."""
+    """Convert one of the tested conditions to text and numbers."""
     sets = [sorted({e.hypothesis.effect for e in one.effects}) for one in fits]
     names = [" + ".join(effects) or "nothing" for effects in sets]
     why = (
@@ -122,7 +122,7 @@ def _measurement(
 
 
 def _conditions_tried(conditions: Conditions) -> Conditions:
-    """Return reachable conditions with wider ranges of loads and covariates."""
+    """Return reachable conditions with extended ranges of loads and covariates."""
     rng = np.random.default_rng(0)
     tried = _between(conditions.take(rng.integers(0, len(conditions), _TRIED)), rng)
     largest = np.abs(conditions.load).max(axis=0)
@@ -146,7 +146,7 @@ def _conditions_tried(conditions: Conditions) -> Conditions:
 
 
 def _between(measured: Conditions, rng: np.random.Generator) -> Conditions:
-    """Return conditions with half of the configurations moved towards other ones."""
+    """Return conditions with half of the configurations moved towards others."""
     # Rest positions of clearances are known only for the measured configurations.
     if measured.rest is not None:
         return measured
@@ -171,7 +171,7 @@ def _model(
     tried: Conditions, fit: MachineFit, sigma: NDArray
 ) -> tuple[NDArray, NDArray, NDArray]:
     """Return (S, 6) whitened predictions with a machine's effects, and derivatives."""
-    # Parameters of one session do not apply to another measurement.
+    # Parameters of one session do not apply to a new measurement.
     parts = [one for one in fit.effects if one.session is None]
     places = [fit.unknowns.place(one) for one in parts]
     chosen = np.concatenate([np.arange(len(fit.x))[own] for own in [slice(0), *places]])
@@ -187,8 +187,8 @@ def _model(
         return predict(conditions).deviation / sigma
 
     model = read(fit.x, finite)
-    # Finite motions hardly change the derivatives, but their computation takes a
-    # hundred times longer.
+    # Finite motions hardly change the derivatives but take a hundred times longer to
+    # compute.
     middle = read(fit.x, False) if finite else model
     J = np.zeros((*middle.shape, len(chosen)))
     for k, place in enumerate(chosen):
@@ -202,12 +202,11 @@ def _model(
 
 
 def _power(d: NDArray, J: NDArray, C: NDArray) -> NDArray:
-    """Return (S,) non-centrality of the difference d; 0 where it is not finite."""
+    """Return the non-centrality (S,) of the difference d; 0 where it is not finite."""
     S = np.eye(d.shape[1]) + np.einsum("sik,kl,sjl->sij", J, C, J)
     good = np.isfinite(d).all(axis=1) & np.isfinite(S).all(axis=(1, 2))
     powers = np.zeros(len(d))
-    # S is 1 plus a positive semidefinite matrix, apart from rounding errors, which may
-    # be large.
+    # S is 1 plus a positive semidefinite matrix up to round-off, which may be large.
     values, vectors = np.linalg.eigh(S[good])
     along = np.einsum("sij,si->sj", vectors, d[good])
     powers[good] = np.sum(along**2 / np.maximum(values, 1.0), axis=1)
@@ -215,7 +214,7 @@ def _power(d: NDArray, J: NDArray, C: NDArray) -> NDArray:
 
 
 def _configuration(campaign: Campaign, tried: Conditions, row: int) -> dict[str, float]:
-    """Return the command of a tried condition in the columns of the campaign."""
+    """Return the command of a tested condition in the columns of the campaign."""
     if campaign.commanded == "joints":
         return {
             f"q.{frame.name}": float(tried.coordinates[row, i])
@@ -230,6 +229,6 @@ def _configuration(campaign: Campaign, tried: Conditions, row: int) -> dict[str,
 
 
 def load_text(load: Sequence[float]) -> str:
-    """Return a load in the format of command-line options."""
+    """Format a load as a command-line option."""
     parts = [f"{name}={w:g}" for name, w in zip(LOAD, load, strict=True) if w]
     return ",".join(parts) or "none"

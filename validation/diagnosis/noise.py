@@ -1,4 +1,4 @@
-"""Estimate the scale of the noise relative to the declared sigma, and blunders.
+"""Estimate the noise relative to the declared sigma, and detect blunders.
 
 The noise of a good reading is distributed as N(0, tau^2).  One reading in five thousand
 is expected to be a blunder, whose standard deviation is thirty times larger.
@@ -18,9 +18,9 @@ from forcefit.results.text import readings_text
 _BLUNDERS = 2e-4  # prior probability of a blunder
 _WIDTH = 30.0  # ratio of the standard deviation of a blunder to tau
 _LEFT_OUT = 1e-12  # weight of a blunder relative to a good reading
-# smallest ratio of a blunder's residual to tau while no model has been fitted
+# Smallest ratio of a blunder's residual to tau before a model has been fitted.
 _CLEAR = 10.0
-# Largest fraction of blunders, as in the final test; more outliers indicate an effect.
+# Largest fraction of blunders, as in the final test; more indicate an effect.
 _MANY = 0.05
 _UNLIKE = 4.0  # standard deviations by which tau must differ from 1 to be reported
 _CLOSE = 0.2  # smallest abs(ln tau) that is reported
@@ -36,8 +36,8 @@ class Noise:
         tau: ratio of true to declared sigma.
         tau_std: standard deviation of tau.
         findings: sentences about the noise for the user.
-        common: [rad, m] standard deviations of rotation and translation of the motion
-            that the points of one measurement share.
+        common: [rad, m] standard deviations of rotation and translation of the common
+            motion of the points of one measurement.
     """
 
     tau: float
@@ -47,12 +47,11 @@ class Noise:
 
 
 def probability_good(squares: NDArray, *, clearly: bool = False) -> NDArray:
-    """Return (n,) probabilities that readings are good, from expected squares.
+    """Return the probabilities (n,) that readings are good, from expected squares.
 
-    The probability is set to 1 for a reading that is more probably good than not.  If
-    there are too many outliers, it is set to 1 for all readings.  If ``clearly`` is
-    true, only large residuals count as outliers, because effects have not been fitted
-    yet.
+    It is set to 1 for readings that are more probably good than not, and for all
+    readings if there are too many outliers.  If ``clearly`` is true, only large
+    residuals count as outliers, because effects have not been fitted yet.
     """
     v = max(float(np.median(squares)) / _MEDIAN, 1e-12)
     with np.errstate(over="ignore", under="ignore"):
@@ -66,12 +65,12 @@ def probability_good(squares: NDArray, *, clearly: bool = False) -> NDArray:
 
 
 def cell_weights(good: NDArray) -> NDArray:
-    """Return (n,) relative precisions: 1 for good readings, nearly 0 for blunders."""
+    """Return relative precisions (n,): 1 for good readings, nearly 0 for blunders."""
     return np.maximum(good, _LEFT_OUT)
 
 
 def repeat_scatter(z: NDArray, group: NDArray) -> tuple[float, int]:
-    """Return the rms [sigma] of residuals within groups of repeats, and its freedom."""
+    """Return the rms [sigma] within groups of repeats and its degrees of freedom."""
     _, number, count = np.unique(group, return_inverse=True, return_counts=True)
     mean = np.bincount(number, weights=z) / count
     freedom = len(z) - len(count)
@@ -83,14 +82,14 @@ def findings(
     tau: float, tau_std: float, repeats: tuple[float, int], *, memory: bool,
     common: tuple[float, float] = (0.0, 0.0),
 ) -> tuple[str, ...]:  # fmt: skip
-    """Return sentences about the noise; none if it agrees with the declared sigma.
+    """Return sentences about the noise, none if it agrees with the declared sigma.
 
     Args:
         tau: ratio of true to declared sigma.
         tau_std: standard deviation of tau.
         repeats: result of :func:`repeat_scatter` for the residual.
         memory: whether the model depends on earlier rows.
-        common: [rad, m] noise that the points of a measurement share.
+        common: [rad, m] common noise of the points of a measurement.
     """
     told = []
     if any(common):

@@ -1,4 +1,4 @@
-r"""Estimate noise that is correlated in time, and its effect on uncertainties.
+r"""Estimate noise that is correlated in time and its effect on uncertainties.
 
 Within a session, the noise of each component of a reading is partly white and partly an
 Ornstein-Uhlenbeck process.  Its correlation between times t_i and t_j is
@@ -46,7 +46,7 @@ class NoiseInTime:
     Attributes:
         share: [-] fraction of the variance that is correlated.
         constant: [s] correlation time.
-        probability: probability that white noise shows a correlation at least as large.
+        probability: probability that white noise shows a correlation this large.
     """
 
     share: float
@@ -62,9 +62,9 @@ def noise_in_time(campaign: Campaign, residual: NDArray) -> NoiseInTime | None:
         residual: (N,) whitened residual.
 
     Returns:
-        The fraction and the time constant of maximum likelihood.  None if there are too
-        few rows with a time, or if white noise shows this correlation more often than
-        once in 10^4 cases.
+        The maximum-likelihood fraction and time constant.  None if too few rows have a
+        time, or if white noise shows this correlation more often than once in 10^4
+        cases.
     """
     if "time" not in campaign.covariates or len(campaign) < _FEWEST:
         return None
@@ -78,8 +78,8 @@ def noise_in_time(campaign: Campaign, residual: NDArray) -> NoiseInTime | None:
     for times, z in series:
         more = _innovations(times, z, constants)
         squares, logs = squares + more[0], logs + more[1]
-    # The variance of the noise is estimated too, because white noise with an
-    # overestimated sigma does not appear white.
+    # The noise variance is also estimated, because white noise with an overestimated
+    # sigma does not appear white.
     count = len(residual)
     gain = count * np.log(residual @ residual / squares) - logs
     best = np.unravel_index(np.argmax(gain), gain.shape)
@@ -92,7 +92,7 @@ def noise_in_time(campaign: Campaign, residual: NDArray) -> NoiseInTime | None:
 def widened(
     covariance: NDArray, slopes: NDArray, campaign: Campaign, noise: NoiseInTime
 ) -> NDArray:
-    """Return the (k, k) covariance for correlated noise of a fit for white noise.
+    """Return the covariance (k, k) under correlated noise of a white-noise fit.
 
     Args:
         covariance: (k, k) covariance for white noise.
@@ -113,7 +113,7 @@ def widened(
 
 
 def _series(campaign: Campaign) -> Iterator[tuple[NDArray, NDArray]]:
-    """Yield the times and cells of each time series: component, point and session."""
+    """Yield the times and cells of each series of one component, point and session."""
     rows, columns = np.nonzero(campaign.cells)
     time = campaign.covariates["time"][rows]
     own = [

@@ -1,9 +1,9 @@
-"""Describe nuisance parameters: geometric errors and compliances of every machine.
+"""Describe nuisance parameters, the geometric errors and compliances of any machine.
 
 No frame is manufactured exactly as drawn, and no part is rigid.  Each of these unknowns
-has a Gaussian prior about its declared value.  The prior standard deviation is the
-``tolerance`` of the frame, or it is common to a group of unknowns and determined by the
-readings.
+has a Gaussian prior about its declared value.  Its standard deviation is the
+``tolerance`` of the frame, or a value common to a group of unknowns that the readings
+determine.
 """
 
 from collections.abc import Container
@@ -25,8 +25,7 @@ KINDS = ("rotation", "translation")
 LARGEST_TURN = 0.2  # [rad] largest error of a drive, a frame or a device
 # Largest plausible translation of a frame, relative to the size of the robot.
 LARGEST_SHIFT = 0.1
-# A column that is smaller than this fraction of the largest column of its group changes
-# no reading.
+# Columns below this fraction of the largest one in their group affect no reading.
 _ROUNDING = 1e-9
 _SAME = 1 - 1e-6  # cosine above which two columns are equal
 
@@ -73,12 +72,11 @@ def nuisance(
     campaign: Campaign, conditions: Conditions, response: Responses, named: NDArray,
     kinds: Container[str] = (GEOMETRY, SPRINGS),
 ) -> Nuisance:  # fmt: skip
-    """Return the geometric errors and springs that affect a campaign's readings.
+    """Return the geometric errors and springs that affect the readings.
 
-    The springs describe compliance that is distributed over many joints.  A spring is
-    omitted if its column is parallel to a column of ``named`` (N, c), which belongs to
-    a library effect with a single unknown.  ``response`` is the response under declared
-    conditions.
+    Springs describe compliance distributed over many joints.  A spring is omitted if
+    its column is parallel to one of ``named`` (N, c), which belongs to a library effect
+    with a single unknown.  ``response`` is the response under declared conditions.
     """
     robot, n = campaign.robot, len(campaign.robot.frames)
     own = [conditions.robot.index(frame.name) for frame in robot.frames]
@@ -112,23 +110,23 @@ def _may_give(robot: Robot, name: str) -> bool:
 
 
 def visible(small: Nuisance) -> NDArray:
-    """Return (k,) bool, True for unknowns that visibly change a reading."""
+    """Return a mask (k,) of the unknowns that visibly change a reading."""
     size = np.linalg.norm(small.columns, axis=0)
     largest = np.zeros(4)
     np.maximum.at(largest, small.group, size)
-    # A tolerance of zero declares that a direction is exact.
+    # A tolerance of zero declares a direction exact.
     shown = (size > _ROUNDING * largest[small.group]) & ~(small.given == 0.0)
     return np.asarray(shown & (size > UNSEEN / small.most))
 
 
 def _is_among(columns: NDArray, named: NDArray) -> NDArray:
-    """Return (k,) bool, True for columns (N, k) that are parallel to a named column."""
+    """Return a mask (k,) of the columns (N, k) that are parallel to a named column."""
     unit = [c / np.maximum(np.linalg.norm(c, axis=0), 1e-300) for c in (named, columns)]
     return np.asarray((np.abs(unit[0].T @ unit[1]) > _SAME).any(axis=0))
 
 
 def with_error(robot: Robot, frame: NDArray, axis: NDArray, x: NDArray) -> Robot:
-    """Return a robot with geometric errors increased by x (k,) [rad, m].
+    """Return a robot with x (k,) [rad, m] added to its geometric errors.
 
     x acts at the frames with indices ``frame`` (k,), in the screw components ``axis``
     (k,), 0 to 5.
@@ -139,10 +137,10 @@ def with_error(robot: Robot, frame: NDArray, axis: NDArray, x: NDArray) -> Robot
 
 
 def with_compliance(robot: Robot, frame: NDArray, axis: NDArray, x: NDArray) -> Robot:
-    """Return a robot with x (k,) [rad/(N m), m/N] in series with its joints.
+    """Return a robot with compliances x (k,) in series with its joints.
 
-    x acts at the frames with indices ``frame`` (k,), in the screw components ``axis``
-    (k,), 0 to 5.  A value of 0 changes nothing.
+    x [rad/(N m), m/N] acts at the frames with indices ``frame`` (k,), in the screw
+    components ``axis`` (k,), 0 to 5.  A value of 0 changes nothing.
     """
     frames = list(robot.frames)
     for i, a, c in zip(frame.tolist(), axis.tolist(), x.tolist(), strict=True):

@@ -1,8 +1,8 @@
-"""List the places at which a function can act, with the responses of the readings.
+"""List the places at which a function can act, with the reading responses.
 
-A place is one of three things: a screw component at a frame, at the base or in the
-reading; a component of the load; or several components at the same frame.  Places with
-equal responses are listed only once.
+A place is a screw component at a frame, at the base or in the reading; a component of
+the load; or several components at one frame.  Places with equal responses are listed
+only once.
 """
 
 from dataclasses import dataclass, field
@@ -37,11 +37,11 @@ class Weighted:
     """Weighted responses at all places, in selected cells.
 
     Attributes:
-        rows: (R,) rows that contain a selected cell.
+        rows: (R,) rows that contain selected cells.
         answers: (S, R, 6) responses, zero in cells that are not selected.
-        squares: (S, R) sums of squares over the cells of a row.
-        pair_products: (pairs, R) sums of products of two components that act at the
-            same place.
+        squares: (S, R) sums of squares over the cells of each row.
+        pair_products: (pairs, R) sums of products of two components that act at one
+            place.
         cells: row and component of the selected cells.
         known: cache of inner products of each form.
     """
@@ -67,7 +67,7 @@ class Weighted:
 
 
 class Places:
-    """Places at which a function would change the readings of a campaign.
+    """Places at which functions would change the readings of a campaign.
 
     Attributes:
         names: components of each place.
@@ -78,7 +78,7 @@ class Places:
     """
 
     def __init__(self, campaign: Campaign, sensitivities: Sensitivities) -> None:
-        """List the places of a design; measured values are not used."""
+        """List the places of a design, without using measured values."""
         self._campaign, self._sensitivities = campaign, sensitivities
         self._plausible = LARGEST_TURN, LARGEST_SHIFT * size_of(campaign.robot)
         singles, combined = self._listed()
@@ -112,7 +112,7 @@ class Places:
         return sorted(singles, key=self._preference), combined
 
     def _list_singles(self, singles: list[Where]) -> None:
-        """List the single screw components whose responses of the readings differ."""
+        """List the single screw components with distinct responses."""
         over_sigma = np.where(self._campaign.cells, 1 / self._campaign.sigma, 0.0)
         shown, answers = [], []
         for where in singles:
@@ -148,7 +148,7 @@ class Places:
                 self.equal.append([])
 
     def _preference(self, where: Where) -> tuple[bool, bool, bool]:
-        """Return a sort key: motions of drives, other frames, other places."""
+        """Return a sort key that puts drives first, then frames, then other places."""
         name, component, kind = where
         frames = {f.name: f for f in self._campaign.robot.frames}
         frame = frames.get(name)
@@ -174,8 +174,8 @@ class Places:
     def weighted(self, cells: NDArray, whiten: Whitening) -> Weighted:
         """Return the weighted responses at all places in cells (N,) bool.
 
-        Rows of one measurement have equal variables.  Therefore the product of a
-        response and a function is whitened like the response itself.
+        Rows of one measurement have equal variables, so the product of a response and a
+        function is whitened like the response itself.
         """
         row, component = (axis[cells] for axis in np.nonzero(self._campaign.cells))
         rows, row = np.unique(row, return_inverse=True)

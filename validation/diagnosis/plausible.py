@@ -1,9 +1,9 @@
-"""Find implausible parameters of a machine, and impossible readings of a sensor.
+"""Find implausible machine parameters and impossible sensor readings.
 
-A fit may explain readings by absurd parameters.  An example is a base at a distance of
-29 m on a foundation as soft as rubber.  The plausible ranges are wide and depend on the
-size of the robot and on the largest load.  If a parameter is outside its range, the
-deviation probably has another cause, and no effect is claimed.
+A fit may explain readings by absurd parameters, for example a base 29 m away on a
+foundation as soft as rubber.  The plausible ranges are wide and depend on the size of
+the robot and on the largest load.  If a parameter is outside its range, the deviation
+probably has a different cause, and no effect is claimed.
 
 Sources:
     Ashby, Materials Selection in Mechanical Design, 4th ed., figure 4.11 (expansion of
@@ -39,7 +39,7 @@ _LIKELY = "check the declared stiffness, the units and the registration"
 
 
 def impossible_rows(campaign: Campaign) -> NDArray:
-    """Return (R,) bool, True for rows with an impossible temperature."""
+    """Return a mask (R,) of rows with an impossible temperature."""
     wrong = np.zeros(len(campaign), dtype=bool)
     for name, values in campaign.covariates.items():
         if "temperature" in name:
@@ -60,8 +60,7 @@ def _implausible(campaign: Campaign, fit: MachineFit) -> Iterator[str]:
     moment = float(np.abs(campaign.loads[:, :3]).max()) + force * size
     reach = ", so compliant that the loads move the platform out of its workspace"
     shift = LARGEST_SHIFT * size
-    # For each unit: smallest and largest plausible value, and the statement outside
-    # this range.
+    # Smallest and largest plausible value for each unit, and the statement otherwise.
     ranges = {
         "rad": (-LARGEST_TURN, LARGEST_TURN, f", larger than {LARGEST_TURN:.2g}"),
         "m": (-shift, shift, f", larger than {shift:.2g}"),
@@ -90,7 +89,7 @@ def _implausible(campaign: Campaign, fit: MachineFit) -> Iterator[str]:
 def _parameters(
     campaign: Campaign, fit: MachineFit
 ) -> Iterator[tuple[str, str, float]]:
-    """Yield effect, parameter and value; the value of a drift is that at its end."""
+    """Yield effect, parameter and value, for a drift the value at its end."""
     bare = campaign.robot.without_effects()
     for one in fit.effects:
         values = one.hypothesis.public(bare, fit.own(one)[0])

@@ -1,7 +1,7 @@
-"""Predict the readings of a saved robot, with the function that fits and tests use.
+"""Predict the readings of a robot, in fits, tests and for saved files.
 
-A diagnosis fits a robot and computes its errors with this function.  The command
-``forcefit validation predict`` computes the readings of the saved file with it.
+A diagnosis uses the same function to fit a robot and to compute its errors as
+``forcefit validation predict`` uses for the saved file.
 """
 
 from dataclasses import replace
@@ -22,11 +22,11 @@ from forcefit.validation.diagnosis.signatures import conditions_of
 
 
 def finite_conditions(campaign: Campaign, rows: NDArray | None = None) -> Conditions:
-    """Return the conditions of a campaign with finite motions, as in a real machine.
+    """Return the conditions of a campaign under finite motions.
 
     Args:
         campaign: campaign of R rows.
-        rows: indices or mask of the rows to return.  Their readings may depend on
+        rows: indices or mask of the rows to return, whose readings may depend on
             earlier rows.
 
     Returns:
@@ -45,12 +45,12 @@ def finite_conditions(campaign: Campaign, rows: NDArray | None = None) -> Condit
 def predicted(
     campaign: Campaign, robot: Robot | None = None, *, linear: bool = False
 ) -> Prediction:
-    """Return the readings of a robot, with its registration, for a campaign's commands.
+    """Return the predicted readings of a robot for the commands of a campaign.
 
     Args:
-        campaign: campaign of R rows, whose readings are not used.
+        campaign: campaign of R rows; its readings are not used.
         robot: robot with the same frames and closures as the campaign's.
-        linear: whether motions are linearised.
+        linear: whether to linearise motions.
     """
     campaign = replace(campaign, robot=campaign.robot if robot is None else robot)
     return predict((conditions_of if linear else finite_conditions)(campaign))

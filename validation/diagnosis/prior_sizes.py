@@ -6,7 +6,7 @@ standard deviation s,
     d ln p(z) / d ln s = sum of [(mu^2 + V)/s^2 - 1],
 
 which is zero for s^2 = sum mu^2 / sum (1 - V/s^2).  MacKay's iteration repeats this
-formula; here the change of s in a step is limited.
+formula; here, the change in s per step is limited.
 
 Sources:
     MacKay (1992), Bayesian interpolation, Neural Computation 4, 415.
@@ -24,7 +24,7 @@ from forcefit.validation.diagnosis.gaussian import FREEDOM, deviance, size_penal
 
 Eigen = tuple[NDArray, NDArray]
 _STEPS = 25  # largest number of steps; about ten are needed
-# Change of ln s at which the iteration ends, because the evidence hardly changes there.
+# Change in ln s at which the iteration ends, because the evidence hardly changes.
 _SETTLED = 0.03
 _LEAP = 4.0  # largest factor on s in one step
 _BEGIN = 4.0  # [sigma] start value of a group's contribution to the readings
@@ -57,7 +57,7 @@ class Sizes:
 
     @property
     def determined(self) -> NDArray:
-        """(k,) 1 for an unknown determined by the readings, 0 by the prior only."""
+        """(k,) 1 for unknowns determined by the readings, 0 by the prior alone."""
         with np.errstate(divide="ignore", invalid="ignore"):
             share = 1 - np.diag(self.covariance) / self.std**2
         return np.where(self.std > 0, share, 0.0)
@@ -65,7 +65,7 @@ class Sizes:
 
 @dataclass(frozen=True, eq=False)
 class Grouped:
-    """Linear model with k unknowns, in groups that share a prior standard deviation.
+    """Linear model whose k unknowns share prior standard deviations in groups.
 
     Attributes:
         gram: (k, k) inner products of columns.

@@ -1,8 +1,8 @@
 """Estimate the errors of functions outside the range of their variable.
 
-The range of a function's variable is divided into five parts.  Each part is predicted
-by a fit to the other four parts.  The fit uses the prior standard deviations of the
-model and the leave-block-out identity (:mod:`.gaussian`) without iteration.  Random
+The range of a function's variable is divided into five parts, each of which is
+predicted by a fit to the other four.  The fit uses the prior standard deviations of the
+model and the leave-block-out identity (:mod:`.gaussian`), without iteration.  Random
 held-out rows do not test extrapolation, because they are surrounded by fitted rows.
 """
 
@@ -22,7 +22,7 @@ _DISTINCT = 4  # smallest number of different values in each part
 
 @dataclass(frozen=True)
 class RangeError:
-    """Errors of a function on parts of its variable's range that were not fitted.
+    """Errors of a function on unfitted parts of its variable's range.
 
     Attributes:
         variable: public name of the variable.
@@ -41,8 +41,8 @@ def range_error(
 ) -> RangeError | None:
     """Return the extrapolation error of a function in a model.
 
-    For several variables, the largest error is returned.  The result is None if no
-    variable has enough values.  ``without`` is the model without the function.
+    With several variables, the largest error is returned.  The result is None if no
+    variable has enough distinct values.  ``without`` is the model without the function.
     ``rows`` (n,) are the rows of the fitted cells.
     """
     conditions = best.readings.columns.conditions

@@ -1,4 +1,4 @@
-"""Estimate the pose of the measuring device if it is unknown."""
+"""Estimate the unknown pose of the measuring device."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,7 +36,7 @@ def register(campaign: Campaign, conditions: Conditions) -> Conditions:
             rows.
 
     Returns:
-        The conditions with the pose of the device (registration) in each session.
+        The conditions with the device pose (registration) of each session.
 
     Raises:
         BadInput: there are too few complete positions and rotations, or a session
@@ -59,7 +59,7 @@ def register(campaign: Campaign, conditions: Conditions) -> Conditions:
 
 
 def _device(campaign: Campaign, own: Conditions) -> dict[str, dict[str, float]]:
-    """Return the pose of the device that fits the declared model best, as an effect."""
+    """Return the best-fit pose of the device as an effect."""
     start, frame = coarse_frame(campaign, own), device_frame(own)
     begin = np.array([start[name] for name in BASE])
     unknowns = Unknowns(campaign.robot, (Acting(frame, begin, None, True),))
@@ -68,7 +68,7 @@ def _device(campaign: Campaign, own: Conditions) -> dict[str, dict[str, float]]:
 
 
 def coarse_frame(campaign: Campaign, conditions: Conditions) -> dict[str, float]:
-    """Return a start value of the device's pose: Kabsch's or a mean rotation."""
+    """Return a start value of the device pose (Kabsch or mean rotation)."""
     model = predict(conditions).deviation
     nominal = conditions.measured_points
     answered = np.isfinite(model).all(axis=1)
@@ -96,11 +96,11 @@ def coarse_frame(campaign: Campaign, conditions: Conditions) -> dict[str, float]
 def device_rotation(
     points: NDArray, seen: NDArray, turns: NDArray, seen_turns: NDArray
 ) -> NDArray:
-    """Return the rotation of the device, fitted to rotations or else to points.
+    """Return the device rotation, fitted to orientations or else to points.
 
     Args:
-        points: (P, 3) [m] points in the axes of the base.  Without rotations, the
-            points must not be on one line.
+        points: (P, 3) [m] points in base axes, not collinear if there are no
+            orientations.
         seen: (P, 3) [m] the same points in the axes of the device.
         turns: (T, 3, 3) orientations in the axes of the base.
         seen_turns: (T, 3, 3) the same orientations in the axes of the device.
@@ -117,7 +117,7 @@ def device_rotation(
 
 
 def off_one_line(points: NDArray) -> bool:
-    """Return whether (P, 3) points are not all on one line."""
+    """Return whether points (P, 3) are not collinear."""
     if len(points) < _FEWEST_POINTS:
         return False
     size = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)

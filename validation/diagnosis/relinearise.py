@@ -1,9 +1,9 @@
 """Linearise the effects of a model repeatedly at their estimates.
 
 Derivatives at the start values neglect products of two effects, nonlinear parameters (a
-time constant, an exponent) and finite motions.  Therefore the prediction with all
-effects of a model is compared with the sum of their linear contributions.  If they
-differ, all derivatives are computed again at the estimates.
+time constant, an exponent) and finite motions.  The prediction with all effects of a
+model is therefore compared with the sum of their linear contributions, and if they
+differ, all derivatives are recomputed at the estimates.
 """
 
 from collections.abc import Sequence
@@ -18,14 +18,14 @@ from forcefit.validation.diagnosis.signatures import Signature, Tangents
 from forcefit.validation.diagnosis.states import Models, State
 
 _ROUNDS = 3  # largest number of linearisations; they may oscillate
-MOVED = 0.3  # changes of the log posterior below this value change no decision
+MOVED = 0.3  # smaller changes of the log posterior affect no decision
 _LINEAR = 0.5  # largest squared whitened linearisation error
-# Largest factor on a nonlinear parameter in one linearisation.
+# Largest factor on a nonlinear parameter per linearisation.
 _SHIFT = 3.0
 
 
 class Relinearisation:
-    """Linearise models at their estimates; results are cached."""
+    """Linearises models at their estimates, caching the results."""
 
     def __init__(self, tangents: Tangents, models: Models) -> None:
         """Start with an empty cache; ``tangents`` are the derivatives of all cells."""
@@ -33,7 +33,7 @@ class Relinearisation:
         self._about: dict[object, list[Element] | None] = {}
 
     def relinearised(self, state: State) -> State:
-        """Linearise a model until the linearisation is valid at its estimates."""
+        """Relinearise a model until the linearisation is valid at its estimates."""
         for _ in range(_ROUNDS):
             elements = self._again(state)
             if elements is None:
@@ -44,7 +44,7 @@ class Relinearisation:
         return state
 
     def _again(self, state: State) -> tuple[Element, ...] | None:
-        """Return the elements linearised at the estimates, or None without a change."""
+        """Return the elements linearised at the estimates; None if nothing changes."""
         own = [
             (k, e)
             for k, e in enumerate(state.elements)
@@ -85,10 +85,10 @@ class Relinearisation:
     def again(
         self, elements: Sequence[Element], xs: Sequence[NDArray]
     ) -> list[Element]:
-        """Return effects that act together, linearised at given values of their slots.
+        """Return jointly acting effects, linearised at given values of their slots.
 
         The sum of the returned elements is exact at these values.  If the model has no
-        solution there, the given elements are returned.
+        solution there, the given elements are returned unchanged.
         """
         robot = self.tangents.campaign.robot
         middle = self.combined(elements, xs)
@@ -99,7 +99,7 @@ class Relinearisation:
                 return list(elements)
             middle = middle - signature.columns @ x
             made.append(replace(signature, offset=np.zeros_like(middle)))
-        # The offset of all elements together is stored in the first element.
+        # The first element stores the offset of all elements together.
         made[0] = replace(made[0], offset=middle)
         return [
             replace(effect_element(s, robot, e.log_prior, x), first=e.origin)
@@ -109,7 +109,7 @@ class Relinearisation:
     def _one(
         self, elements: Sequence[Element], xs: Sequence[NDArray], k: int
     ) -> Signature:
-        """Return the k-th effect, linearised at given values while the others act."""
+        """Return the k-th effect, linearised at given values while all others act."""
         h, offset = elements[k].hypothesis, np.zeros_like(self.tangents.declared)
         columns = np.zeros((len(offset), len(h.slots)))
         for session in _sessions(elements):
@@ -123,7 +123,7 @@ class Relinearisation:
         return Signature(h, offset, columns)
 
     def combined(self, elements: Sequence[Element], xs: Sequence[NDArray]) -> NDArray:
-        """Return the (N,) whitened contribution of effects that act together."""
+        """Return the whitened contribution (N,) of effects that act together."""
         total = np.zeros_like(self.tangents.declared)
         for session in _sessions(elements):
             effects = self._public(elements, xs, session)
@@ -149,12 +149,12 @@ def _sessions(elements: Sequence[Element]) -> tuple[str | None, ...]:
 
 
 def _has_shapes(e: Element) -> bool:
-    """Return whether nonlinear parameters are among the unknowns of an element."""
+    """Return whether any unknown of an element is a nonlinear parameter."""
     return all(j in e.slots for j, slot in enumerate(e.hypothesis.slots) if slot.shape)
 
 
 def _within(e: Element, x: NDArray) -> NDArray:
-    """Return values; nonlinear parameters change at most by the allowed factor."""
+    """Limit the change of nonlinear parameters to the allowed factor."""
     for j, slot in enumerate(e.hypothesis.slots):
         if slot.shape:
             x[j] = np.clip(x[j], e.begin[j] / _SHIFT, e.begin[j] * _SHIFT)

@@ -1,4 +1,4 @@
-"""Create the report page of a diagnosis, which is self-contained."""
+"""Create the self-contained report page of a diagnosis."""
 
 from pathlib import Path
 from typing import Any
@@ -25,10 +25,10 @@ from forcefit.validation.diagnosis.sentence import calibration_text, open_text
 _ASSUMED = (
     "Errors are computed on held-out rows, used neither to choose nor to fit models.",
     "The noise of the readings is their stated sigma, unless stated otherwise below.",
-    "An effect that the library lacks is found as a learned function, or as outside "
-    "the library; effects that the design cannot distinguish are named together.",
+    "Effects missing from the library appear as learned functions or as outside the "
+    "library; effects that the design cannot distinguish are named together.",
 )
-# Unfavourable verdicts; None if more rows could decide.
+# Unfavourable verdicts; None if additional rows could decide.
 _GOOD = {AMBIGUOUS: None, NOT_ENOUGH_ROWS: None, OUTSIDE_LIBRARY: False}
 NOWHERE = Provenance()
 Table = dict[str, Any]
@@ -40,7 +40,7 @@ def write_report(
     tally: Calibration | None = None,
     provenance: Provenance = NOWHERE,
 ) -> None:
-    """Write the report page of a diagnosis; a failed write leaves no incomplete file.
+    """Write the report page of a diagnosis; on failure, no incomplete file remains.
 
     Args:
         diagnosis: the diagnosis.
@@ -59,7 +59,7 @@ def report_page(
     tally: Calibration | None = None,
     provenance: Provenance = NOWHERE,
 ) -> str:
-    """Return the page as HTML that includes its charts; see :func:`write_report`."""
+    """Return the page as HTML including its charts; see :func:`write_report`."""
     campaign, answer = diagnosis.campaign, results.table(diagnosis, tally)
     body = [
         section("Errors before and after", figures.error_chart(diagnosis)),
@@ -109,12 +109,12 @@ def report_page(
 
 
 def _section(title: str, content: str) -> list[str]:
-    """Return a section, or an empty text if its content is empty."""
+    """Return a section, or an empty text if it has no content."""
     return [section(title, content)] if content else []
 
 
 def _tiles(diagnosis: Diagnosis) -> list[Tile]:
-    """Return tiles: verdict, errors, most probable effect and next measurement."""
+    """Return tiles for verdict, errors, most probable effect and next measurement."""
     before, after = diagnosis.before, diagnosis.after
     tiles = [Tile("Verdict", [diagnosis.verdict.replace("_", " ")])]
     for kind, unit in (("rotation", "rad"), ("position", "m")):
@@ -133,7 +133,7 @@ def _tiles(diagnosis: Diagnosis) -> list[Tile]:
 
 
 def _steps(answer: Table) -> str:
-    """Return the table of the model sequence."""
+    """Tabulate the model sequence."""
     rows: list[list[Cell]] = [
         [row["term"], f"{row['unknowns']:.0f}",
          Value(row["kept_aside_rms"], row["unit"], 3),
@@ -144,7 +144,7 @@ def _steps(answer: Table) -> str:
 
 
 def _sets(answer: Table) -> str:
-    """Return the table of the sets of effects with their probabilities."""
+    """Tabulate the sets of effects with their probabilities."""
     rows: list[list[Cell]] = [
         [" + ".join(one["names"]) or "none", one["probability"]]
         for one in answer["alternatives"]
@@ -153,7 +153,7 @@ def _sets(answer: Table) -> str:
 
 
 def _learned(answer: Table) -> str:
-    """Return the table of the learned functions."""
+    """Tabulate the learned functions."""
     rows = [
         [f"{one['where']} {', '.join(one['components'])}", ", ".join(one["variables"]),
          one["form"], one["formula"]]
@@ -164,7 +164,7 @@ def _learned(answer: Table) -> str:
 
 
 def _parameters(answer: Table) -> tuple[str, str]:
-    """Return the title and table of the parameters of the most probable set."""
+    """Tabulate the parameters of the most probable set, with a title."""
     rows: list[list[Cell]] = [
         [f"{effect['name']}: {p['name']}", Value(p["value"], p["unit"], 6),
          Value(p["std"], p["unit"], 2),
@@ -180,7 +180,7 @@ def _parameters(answer: Table) -> tuple[str, str]:
 
 
 def _structure(answer: Table) -> list[str]:
-    """Return the table of the variables on which the residual depends."""
+    """Tabulate the variables on which the residual depends."""
     rows: list[list[Cell]] = [
         [t["against"], f"{100 * t['share']:.0f} %", f"{t['probability']:.1g}"]
         for t in answer["structure"]
@@ -208,7 +208,7 @@ def _next(answer: Table) -> list[str]:
 
 
 def _noise(diagnosis: Diagnosis) -> list[str]:
-    """Return sentences about the noise and the outliers."""
+    """State the noise and the outliers."""
     lack = diagnosis.lack
     far = np.array(diagnosis.campaign.ids)[diagnosis.outliers]
     repeats = "the campaign contains no repeats"

@@ -1,9 +1,8 @@
-"""Compute the response of the readings to small screws at frames, and joint wrenches.
+"""Compute joint wrenches and the response of the readings to small screws.
 
-Both are computed with the linear model at the declared state, for all rows together.
-The change of the readings by a small geometric error is the response times the screw of
-the error.  The change by a spring is the response times the compliance times the wrench
-of the spring.
+Both are computed with the linear model at the declared state, for all rows together.  A
+small geometric error changes the readings by the response times its screw.  A spring
+changes them by the response times its compliance times its wrench.
 
 ======  =============  ============  =================================================
 symbol  code           shape         meaning
@@ -32,14 +31,14 @@ from forcefit.assembly.measurement.settled_clearance import (
 from forcefit.assembly.measurement.without_clearance import flexibility
 
 _STEP = 1e-5  # [rad, m] step of a central difference with error 1e-10
-# Wrenches below this fraction of the largest moment or force are rounding errors.
+# Wrenches below this fraction of the largest moment or force are round-off.
 _ROUNDING = 1e-9
 _AT_ONCE = 50  # number of postures computed together, which limits memory
 
 
 @dataclass(frozen=True, eq=False)
 class Responses:
-    """Responses of R readings of a robot with n frames; symbols as in this module."""
+    """Responses of R readings of a robot with n frames; see the module for symbols."""
 
     reading: NDArray
     screws: NDArray
@@ -47,7 +46,7 @@ class Responses:
 
 
 def responses(conditions: Conditions) -> Responses:
-    """Return the responses of R rows to small screws, with clearances at rest.
+    """Return the responses of R rows to small screws, with clearances in rest position.
 
     The responses are zero in rows without a solution.
     """
@@ -70,14 +69,14 @@ def responses(conditions: Conditions) -> Responses:
     screws = np.einsum("rij,rjk->rik", D, platform[which])
     good = np.isfinite(screws).all(axis=(1, 2)) & np.isfinite(wrenches).all(axis=1)
     screws[~good], wrenches[~good] = 0.0, 0.0
-    # Struts between ball joints transmit no moment; small computed moments are rounding
-    # errors.
+    # Struts between ball joints transmit no moment; small computed moments are
+    # round-off errors.
     wrenches[np.abs(wrenches) < _ROUNDING * np.abs(wrenches).max(initial=0.0)] = 0.0
     return Responses(D, screws.reshape(R, 6, n, 6), wrenches.reshape(R, n, 6))
 
 
 def _without_clearance(conditions: Conditions) -> Conditions:
-    """Return the rows with clearances at rest."""
+    """Return the rows with clearances in rest position."""
     if not virtual_joints(conditions.robot).cones.shape[1]:
         return conditions
     if conditions.rest is not None:
@@ -97,7 +96,7 @@ def _some(postures: Posture, rows: slice) -> Posture:
 
 
 def _reading(conditions: Conditions) -> NDArray:
-    """Return the (R, 6, 6) change of the readings per unit platform screw."""
+    """Return the change (R, 6, 6) of the readings per unit platform screw."""
     D = np.zeros((len(conditions), 6, 6))
     for k in range(6):
         screw = np.zeros((len(conditions), 6))

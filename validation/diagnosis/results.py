@@ -19,7 +19,7 @@ from forcefit.validation.diagnosis.sequence import LEARNED
 
 # Verdicts for which effects are listed.
 LISTED = {statuses.EXPLAINED, statuses.AMBIGUOUS, statuses.LEARNED}
-_HARDLY = 0.05  # number of determined combinations below which a frame is not listed
+_HARDLY = 0.05  # frames with fewer determined combinations are not listed
 # Half width [standard deviations] of the interval that contains 90 % of a normal
 # distribution.
 _INTERVAL = 1.645
@@ -27,7 +27,7 @@ _UNITS = {GEOMETRY: ("rad", "m"), SPRINGS: ("rad/(N m)", "m/N")}
 
 
 def table(diagnosis: Diagnosis, tally: Calibration | None = None) -> dict[str, Any]:
-    """Return the diagnosis in the public format, with simulated error rates if any."""
+    """Return a diagnosis in the public format, with simulated error rates if any."""
     listed = diagnosis.verdict in LISTED
     ids = np.array(diagnosis.campaign.ids)
     noise, held = diagnosis.traced.selected.noise, diagnosis.held
@@ -92,12 +92,12 @@ def table(diagnosis: Diagnosis, tally: Calibration | None = None) -> dict[str, A
 
 
 def _plain(one: Any) -> dict[str, Any] | None:
-    """Return a dataclass as plain values; None is returned unchanged."""
+    """Convert a dataclass to plain values; None stays None."""
     return None if one is None else asdict(one)
 
 
 def steps(diagnosis: Diagnosis) -> list[dict[str, Any]]:
-    """Return the model sequence; its rms is in m, or in rad without positions."""
+    """Return the model sequence, with rms in m, or in rad without positions."""
     rows = []
     for step in diagnosis.sequence:
         error = step.error
@@ -114,7 +114,7 @@ def steps(diagnosis: Diagnosis) -> list[dict[str, Any]]:
 
 
 def small(diagnosis: Diagnosis, name: str) -> dict[str, Any] | None:
-    """Return the geometric errors, or the springs, of all frames in the public format.
+    """Return the geometric errors or springs of all frames in the public format.
 
     Args:
         diagnosis: a diagnosis.
@@ -122,8 +122,8 @@ def small(diagnosis: Diagnosis, name: str) -> dict[str, Any] | None:
 
     Returns:
         Prior standard deviations, the number of combinations that the readings
-        determine, and for every unknown the fraction that they determine.  None if the
-        machine is as declared.
+        determine, and the determined fraction of every unknown.  None if the machine is
+        as declared.
     """
     fit = diagnosis.fit
     part = next((part for part in fit.unknowns.small if part.name == name), None)
@@ -162,8 +162,8 @@ def effects(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     """Return the identified effects with their parameters, in the public format.
 
     Returns:
-        The effects.  An effect that the robot file declares is listed with the saved
-        value, the declared value and the difference.
+        The effects.  An effect that the robot file declares is listed with its saved
+        value, declared value and difference.
     """
     bare, shown = diagnosis.campaign.robot.without_effects(), []
     for one in diagnosis.fit.effects:
@@ -173,7 +173,7 @@ def effects(diagnosis: Diagnosis) -> list[dict[str, Any]]:
         shown.append({
             "name": name,
             **({} if one.session is None else {"session": one.session}),
-            # A frame without an identified compliance or clearance is not listed.
+            # Frames without an identified compliance or clearance are not listed.
             "where": [frame for frame in one.hypothesis.where if frame in acting],
             "probability": diagnosis.probability.get(name, 0.0),
             "parameters": [
@@ -184,7 +184,7 @@ def effects(diagnosis: Diagnosis) -> list[dict[str, Any]]:
 
 
 def _parameter(p: Parameter, unit: str) -> dict[str, Any]:
-    """Return a parameter of the machine, with its declared value if there is one."""
+    """Return a machine parameter, with its declared value if there is one."""
     found = {"declared": p.declared, "difference": p.difference, "corrected": p.value}
     return {
         "name": p.name, "value": p.value, "std": p.std,
@@ -211,8 +211,8 @@ def _unnamed(diagnosis: Diagnosis) -> list[dict[str, Any]]:
 def learned(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     """Return the learned functions in the public format.
 
-    A function that does not decrease the error of the held-out rows is not reported:
-    outliers and other noise of the fitted rows also lead to functions.
+    Functions that do not reduce the error of the held-out rows are not reported,
+    because outliers and other noise in the fitted rows can also lead to functions.
     """
     if not diagnosis.better:
         return []

@@ -1,10 +1,10 @@
-"""Store the covariance of the parameters in a robot file in a separate file.
+"""Store the parameter covariance of a robot file in a separate file.
 
-A parameter is a geometric error, a compliance in series with a joint, a parameter of an
-effect or a coefficient of a function.  The covariance file contains the joint posterior
-covariance of all parameters.  Predicted readings therefore have a known uncertainty:
+Parameters are geometric errors, compliances in series with joints, effect parameters
+and function coefficients.  From their joint posterior covariance C follows the
+uncertainty of predicted readings:
 
-    covariance of the readings = J C J',  where J are their derivatives by the
+    covariance of the readings = J C J', where J contains their derivatives by the
     parameters.
 """
 
@@ -41,13 +41,13 @@ _STAYS = 1e-3
 
 @dataclass(frozen=True)
 class Number:
-    """Name of a parameter in a robot file.
+    """Identifier of a parameter in a robot file.
 
     Attributes:
         kind: one of the four kinds in the module's docstring.
         owner: the frame, the effect, or the index of the function in the file.
         name: name of the screw component or of the parameter.
-        session: session of an effect that acts in only one session, otherwise None.
+        session: session of an effect that acts in a single session, otherwise None.
     """
 
     kind: str
@@ -88,7 +88,7 @@ class Number:
         )
 
     def _softened(self, robot: Robot, by: float) -> Robot:
-        """Return the robot after changing the compliance of a joint component."""
+        """Change the compliance of a joint component."""
         row, axis = robot.index(self.owner), READING.index(self.name)
         K = robot.frames[row].resistance
         stiffness = np.inf if K is None else float(K[axis, axis])
@@ -120,7 +120,7 @@ class SavedCovariance:
 
 
 def covariance_of(fit: MachineFit, robot: Robot) -> SavedCovariance:
-    """Return the first-order covariance of the parameters in a fitted robot's file."""
+    """Return the first-order covariance of the parameters of a fitted robot."""
     numbers = _numbers(fit, robot)
     J = np.zeros((len(numbers), len(fit.x)))
     middle = np.array([n.of(robot) for n in numbers])
@@ -141,11 +141,11 @@ def covariance_of(fit: MachineFit, robot: Robot) -> SavedCovariance:
 
 
 def _value(number: Number, robot: Robot, saved: Robot) -> float:
-    """Return the value of a parameter in a robot near the saved one; 0 if absent."""
+    """Return the value of a parameter in a robot near the saved one, or 0 if absent."""
     if number.kind != FUNCTION:
         return number.of(robot)
-    # The nearby robot may contain an additional function, whose coefficients are 0 in
-    # the saved robot.
+    # The nearby robot may have an additional function, with zero coefficients in the
+    # saved robot.
     own = saved.functions[int(number.owner)]
     alike = [f for f in saved.functions if _names(f) == _names(own)]
     there = [f for f in robot.functions if _names(f) == _names(own)]
@@ -156,12 +156,12 @@ def _value(number: Number, robot: Robot, saved: Robot) -> float:
 
 
 def _names(function: Function) -> tuple[object, ...]:
-    """Return the properties by which the functions of a file are distinguished."""
+    """Return the properties that distinguish the functions of a file."""
     return function.where, function.variables, function.form, function.kind
 
 
 def _numbers(fit: MachineFit, robot: Robot) -> list[Number]:
-    """Return the parameters of a saved robot that depend on the unknowns."""
+    """Return those parameters of a saved robot that depend on the unknowns."""
     numbers = [n for part in fit.unknowns.small for n in _of_frames(part, robot)]
     for one in fit.unknowns.effects:
         effect = one.hypothesis.effect
@@ -199,14 +199,13 @@ def write_covariance(saved: SavedCovariance, path: Path | str) -> None:
 
 
 def read_covariance(robot: Robot) -> SavedCovariance | None:
-    """Read the covariance from the file that a robot file names.
+    """Read the covariance file that a robot file names.
 
     Returns:
-        The covariance; None if the robot file names no file.
+        The covariance, or None if the robot file names no file.
 
     Raises:
-        BadInput: the file does not exist, or its covariance does not belong to this
-            robot.
+        BadInput: the file does not exist, or belongs to a different robot.
     """
     path = robot.diagnosis.get("covariance")
     if not path:
@@ -231,15 +230,15 @@ def read_covariance(robot: Robot) -> SavedCovariance | None:
 
 
 def known_covariance(robot: Robot) -> SavedCovariance:
-    """Return the uncertainty of all parameters in a robot file.
+    """Return the covariance of all parameters in a robot file.
 
     Returns:
-        The covariance from the file that the robot file names.  Parameters that this
-        covariance does not contain are independent.  Their standard deviations are
-        ``tolerance`` of frames and ``std`` of functions.
+        The covariance from the file that the robot file names.  Parameters missing
+        there are independent, with standard deviations ``tolerance`` of frames and
+        ``std`` of functions.
 
     Raises:
-        BadInput: for the same reasons as in :func:`read_covariance`.
+        BadInput: as for :func:`read_covariance`.
     """
     saved = read_covariance(robot) or SavedCovariance((), np.zeros((0, 0)))
     further = {

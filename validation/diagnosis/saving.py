@@ -1,8 +1,8 @@
-"""Save the robot of a diagnosis: parameters, uncertainty, and range of validity.
+"""Save the robot of a diagnosis with its uncertainty and range of validity.
 
 The posterior covariance of all parameters is written to a separate file.  In the robot
-file, ``tolerance`` is the standard deviation of geometric errors, and ``std`` is the
-standard deviation of a function's coefficients.
+file, ``tolerance`` is the standard deviation of geometric errors, and ``std`` that of
+function coefficients.
 """
 
 import hashlib
@@ -34,8 +34,8 @@ def corrected(diagnosis: "Diagnosis") -> Robot:
     """Return the robot to be saved.
 
     Returns:
-        The fitted robot with the range of its data, the measured point, the uncertainty
-        of its geometric errors, and a record of the diagnosis.
+        The fitted robot, together with the range of its data, the measured point, the
+        uncertainty of its geometric errors, and a record of the diagnosis.
     """
     campaign, robot = diagnosis.campaign, _with_tolerances(diagnosis.fit)
     ranges = learned_range(campaign, ~diagnosis.outliers)
@@ -51,10 +51,10 @@ def corrected(diagnosis: "Diagnosis") -> Robot:
 
 
 def functions_of(diagnosis: "Diagnosis") -> list[list[Function]]:
-    """Return the learned functions, with coefficients and standard deviations.
+    """Return the learned functions with coefficients and standard deviations.
 
     Returns:
-        One or several functions of a robot file for every learned function.
+        One or several robot-file functions for every learned function.
     """
     fit, units = diagnosis.fit, diagnosis.campaign.motion_units
     learned = []
@@ -69,7 +69,7 @@ def functions_of(diagnosis: "Diagnosis") -> list[list[Function]]:
 
 
 def _named(one: Function, units: Mapping[str, str]) -> Function:
-    """Return a function; add a label if a frame moves in proportion to a variable."""
+    """Label a function by which a frame moves in proportion to a variable."""
     name = one.variables[0].removeprefix("cov.")
     kinds = {"rad" if component[0] == "r" else "m" for component in one.components}
     straight = one.form == "powers" and one.kind == "screw" and one.where != "load"
@@ -85,13 +85,13 @@ def _named(one: Function, units: Mapping[str, str]) -> Function:
 
 
 def _with_tolerances(fit: MachineFit) -> Robot:
-    """Return the robot with standard deviations of geometric errors as tolerances."""
+    """Store the standard deviations of geometric errors as tolerances."""
     robot = fit.robot
     for part, own in fit.unknowns.places:
         if not isinstance(part, Small) or part.name != GEOMETRY:
             continue
-        # If no reading depends on a component, its standard deviation is the prior one
-        # of the other components of its kind.
+        # A component on which no reading depends gets the prior standard deviation of
+        # the other components of its kind.
         unseen = np.repeat(
             [part.std[part.axis // 3 == kind].max(initial=0.0) for kind in (0, 1)], 3
         )
@@ -106,7 +106,7 @@ def _with_tolerances(fit: MachineFit) -> Robot:
 
 
 def _record(diagnosis: "Diagnosis") -> dict[str, Any]:
-    """Return the record of the diagnosis that the robot file contains."""
+    """Return the record of the diagnosis for the robot file."""
     campaign, noise = diagnosis.campaign, asdict(diagnosis.noise)
     record: dict[str, Any] = {
         "campaign": campaign.name,
@@ -127,7 +127,7 @@ def _record(diagnosis: "Diagnosis") -> dict[str, Any]:
 
 
 def _digest(campaign: Campaign) -> str:
-    """Return a digest of a campaign's commands and readings, which identifies it."""
+    """Return a digest that identifies a campaign by its commands and readings."""
     text = hashlib.sha256()
     for values in (campaign.coordinates, campaign.loads, campaign.measured):
         text.update(np.round(values, 12).tobytes())

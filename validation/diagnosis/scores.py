@@ -17,27 +17,27 @@ from forcefit.validation.diagnosis.states import MORE, State
 from forcefit.validation.diagnosis.weighted_readings import WeightedReadings
 from forcefit.validation.diagnosis.whitening import Whitening
 
-BEAM = 6  # largest number of candidate elements that are added to a model on trial
+BEAM = 6  # largest number of candidate elements added to a model on trial
 OF_NAME = 2  # largest number of these candidates with the same name
-_VARIABLES = 4  # number of variables whose products with other variables are scored
-# Largest number of columns of a function at several places, which limits memory.
+_VARIABLES = 4  # number of variables whose products with others are scored
+# Largest number of columns of a function at several places; limits memory.
 _WIDEST = 600
-# Number of halvings of a shape parameter's step; the final fit refines the parameter.
+# Number of halvings of a shape parameter's step before the final fit refines it.
 _HALVINGS = 6
 
 
 class Scores:
-    """Scores of all candidates for a given model of the same readings."""
+    """Scores of all candidates for models of the same readings."""
 
     def __init__(self, readings: WeightedReadings) -> None:
-        """Store the readings; scores are computed on first use."""
+        """Store the readings; scores are computed when first used."""
         self.readings, self.columns = readings, readings.columns
         self.functions = readings.columns.functions
         self._made: dict[object, Element | None] = {}
 
     @cached_property
     def _whiten_sample(self) -> tuple[NDArray, Whitening]:
-        """(N,) mask of the sampled cells, and the map to independent noise."""
+        """(N,) mask of the sampled cells, and their whitening map."""
         cells, some = self.readings.cells.copy(), self.readings.sampled
         cells[cells] = some
         root, common = self.readings.root[some], self.readings.common
@@ -70,7 +70,7 @@ class Scores:
     def best_to_add(
         self, state: State, *, functions: bool, products: bool = False
     ) -> list[tuple[float, Element]]:
-        """Return the best elements to add to a model, with estimated log posteriors."""
+        """Return the best elements to add to a model and estimated log posteriors."""
         listed = [*self._library.elements, *self._explicit.elements]
         some = self._explicit.gains(state.sample_marginal)
         gains = [self._library.gains(state.marginal), self._more * some]
@@ -123,17 +123,17 @@ class Scores:
 
     @property
     def _more(self) -> float:
-        """Ratio of the number of all readings to the number of sampled readings."""
+        """Ratio of the number of readings to the number of sampled readings."""
         return len(self.readings.sampled) / max(int(self.readings.sampled.sum()), 1)
 
     def _element(self, one: Candidate, log_prior: float) -> Element | None:
-        """Return the element of a function with columns of all cells, from a cache."""
+        """Return the element of a function with columns of all cells (cached)."""
         if one not in self._made:
             self._made[one] = self.functions.element(one, log_prior)
         return self._made[one]
 
     def forms_of(self, last: Element, base: State) -> list[Element | None]:
-        """Return the forms of a function's variables with the highest scores."""
+        """Return the highest-scoring forms of a function's variables."""
         one = last.candidate
         variables = one.parts[0].variables
         priors = self.functions.shapes_of(variables)
@@ -158,7 +158,7 @@ class Scores:
         return [e for _, e in best]
 
     def sharper(self, e: Element, base: State) -> Element:
-        """Return a function after a refined search for its best shape parameter."""
+        """Refine the search for the best shape parameter of a function."""
         one = e.candidate
         if not len(one.shape.bends):
             return e

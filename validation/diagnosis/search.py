@@ -1,12 +1,12 @@
-"""Search for the best model by a beam search with exchange of elements.
+"""Find the best model by a beam search with exchange of elements.
 
 Steps:
 
 1. Score adding every library effect and function to each model of the beam.
 2. Add the best candidates, and optimise the prior standard deviations.
-3. Try all forms of an added function; linearise effects again at their estimates.
+3. Try all forms of an added function; relinearise effects at their estimates.
 4. Repeat until no added element increases the log posterior.
-5. Exchange each element of the best model for any other until the model is stable.
+5. Exchange elements of the best model for others until the model is stable.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -18,26 +18,26 @@ from forcefit.validation.diagnosis.states import Models, State
 from forcefit.validation.diagnosis.weighted_readings import WeightedReadings
 
 Update = Callable[[str, int, int], None]
-# Elements to fit, and the model whose estimates are the start values.
+# Elements to fit, and the model whose estimates are start values.
 Tried = tuple[tuple[Element, ...], State]
 _MOST = 5  # largest number of elements in a model (docs/diagnosis.md)
-_KEPT = 3  # width of the beam: number of models that are kept
+_KEPT = 3  # width of the beam, the number of retained models
 _LOOKED = 2  # number of models to which functions are added
 _FORMS = 4  # number of models whose last function is tried in all forms
-# Largest accepted decrease of the log posterior when an element is added.  A decrease
-# is accepted because two elements may be effective only together.
+# Largest accepted decrease of the log posterior when an element is added, because two
+# elements may be effective only together.
 _DROP = 1.0
-# Largest number of rounds of exchanges.  They may not converge if no model describes
+# Largest number of rounds of exchanges, which may not converge if no model describes
 # the memory of the machine.
 _ROUNDS = 3
 _NEAR = 15.0  # largest error of a log posterior computed with fixed standard deviations
 
 
 class Search:
-    """Search among models for one set of readings and weights."""
+    """Beam search over models of one set of weighted readings."""
 
     def __init__(self, readings: WeightedReadings) -> None:
-        """Fit the models that contain no effects and no functions."""
+        """Fit the models without effects and functions."""
         self.readings, self.columns = readings, readings.columns
         self.models, self.scores = Models(readings), Scores(readings)
         self.empty = [self.models.state((), mode) for mode in self.models.modes()]
@@ -46,7 +46,7 @@ class Search:
         self.seen: dict[object, State] = {}
 
     def run(self, update: Update) -> list[State]:
-        """Run the search and return all visited models, best first."""
+        """Run the search; return all visited models, best first."""
         self._keep(self.empty)
         front = [self.begin]
         for level in range(_MOST):
@@ -100,7 +100,7 @@ class Search:
         return kept
 
     def _without_nuisance(self, states: Sequence[State]) -> list[State]:
-        """Return the models, and each model with fewer nuisance groups."""
+        """Return the models together with variants that have fewer nuisance groups."""
         less = [
             self.models.state(s.elements, mode, s)
             for s in states
@@ -110,7 +110,7 @@ class Search:
         return [*states, *less]
 
     def _reformed(self, state: State) -> list[State]:
-        """Return the model with its last function replaced by other forms."""
+        """Return variants of a model with other forms of its last function."""
         last = state.elements[-1]
         if last.name:
             return []
@@ -124,14 +124,14 @@ class Search:
         return [s for s in new if s.elements != state.elements]
 
     def _with_one_removed(self, state: State) -> list[State]:
-        """Return the models that result from removing one element."""
+        """Return the variants of a model with one element removed."""
         if len(state.elements) < 2:
             return []
         own = origins(state.elements)
         return [self._fitted(_without(own, out), state) for out in own]
 
     def _fitted(self, elements: tuple[Element, ...], start: State) -> State:
-        """Return a model with its best nuisance groups, linearised at its estimates."""
+        """Fit a model with its best nuisance groups, linearised at its estimates."""
         return self.relinearisation.relinearised(self.models.best(elements, start))
 
     def _best(self) -> State:
@@ -151,8 +151,8 @@ class Search:
             for less in self._without_nuisance([base])[1:]:
                 listed += self.scores.best_to_add(less, functions=False)
             listed.sort(key=lambda one: -one[0])
-            # Other forms of the same effect are always tried, because the errors of
-            # their estimates are similar.
+            # Other forms of the same effect are always tried, because their estimates
+            # have similar errors.
             near = {
                 e.origin: e
                 for w, e in listed

@@ -1,9 +1,9 @@
-"""Select a model of the deviations from library effects and functions.
+"""Select a model of the deviations, composed of library effects and functions.
 
 A model is a set of elements, with or without geometric errors and springs
 (:mod:`.states`).  The search (:mod:`.search`) computes the posterior weight of many
-models.  The result describes the best model.  The probability of an effect is the sum
-of the weights of all models that contain this effect.
+models.  The result describes the best one.  The probability of an effect is the summed
+weight of all models that contain it.
 """
 
 from collections.abc import Sequence
@@ -40,7 +40,7 @@ _EQUAL = 3.0
 # The best model must contain functions if the probability of functions exceeds this
 # value.
 _CLAIMED = 0.9
-# Two predictions are equal if their squared whitened difference is below this value.
+# Predictions are equal if their squared whitened difference is below this value.
 _SAME = 1.0
 _LISTED = 20  # number of listed models; others have negligible weight
 _COMPARED = 60  # number of models whose predictions are compared
@@ -48,8 +48,8 @@ _FEWEST = 5  # smallest number of blocks for cross-validation of functions
 # Number of searches with updated shared noise, which hardly changes after the first
 # search.
 _AGAIN = 3
-# Gain in prediction that a function must reach, in standard errors.  In tests, false
-# functions reached 1.8, and true functions at least 6.9.
+# Required predictive gain of a function, in standard errors.  In tests, false functions
+# reached 1.8 and true functions at least 6.9.
 _SURE = 2.0
 
 
@@ -58,7 +58,7 @@ def select(
     update: Update = lambda what, done, total: None,
     common: tuple[float, float] | None = None,
 ) -> Selected:  # fmt: skip
-    """Find the effects and functions that are missing in the declared model.
+    """Select the effects and functions that are missing in the declared model.
 
     Args:
         columns: columns of all N measured cells.
@@ -66,11 +66,11 @@ def select(
         cells: (N,) mask of the fitted cells; readings of other cells are not used.
         update: function called with the stage, the finished steps and the number of
             steps.
-        common: [rad, m] standard deviations of the noise that the cells of a
-            measurement share, divided by tau; None if they are unknown.
+        common: [rad, m] standard deviations of the common noise of a measurement's
+            cells, divided by tau; None if unknown.
 
     Returns:
-        The best model, and the posterior probabilities.
+        The best model and the posterior probabilities.
     """
     good, shared = np.ones(len(z)), common or NONE
 
@@ -98,13 +98,13 @@ def select(
 
 
 def _selected(search: Search, states: list[State], good: NDArray) -> Selected:
-    """Return the result from all visited models."""
+    """Summarise all visited models."""
     states = _confirmed(search, _merged(states))
     weights = np.array([s.score for s in states])
     weights = np.exp(weights - logsumexp(weights))
     learned = np.array([_functions(s) > 0 for s in states])
     if learned[0] and not learned.all() and weights[learned].sum() < _CLAIMED:
-        # Functions are dropped if the model without them predicts equally well.
+        # Functions are dropped if the model predicts equally well without them.
         first = int(np.argmin(learned))
         order = [first, *(k for k in range(len(states)) if k != first)]
         states, weights = [states[k] for k in order], weights[order]
@@ -135,7 +135,7 @@ def _selected(search: Search, states: list[State], good: NDArray) -> Selected:
 
 
 def _small(search: Search, best: State, tau: float) -> tuple[Small, ...]:
-    """Return the fitted nuisance parameters with their priors."""
+    """Return the fitted nuisance parameters and their priors."""
     small = search.columns.nuisance.take(best.used)
     std = best.sizes.std[: len(small.frame)] * tau
     return tuple(
@@ -146,7 +146,7 @@ def _small(search: Search, best: State, tau: float) -> tuple[Small, ...]:
 
 
 def _noise(search: Search, best: State, good: NDArray) -> Noise:
-    """Return the noise, with sentences about its scale, repeatability and memory."""
+    """Return the noise with sentences about its scale, repeatability and memory."""
     campaign, readings = search.columns.campaign, search.readings
     row, component = (axis[readings.cells] for axis in np.nonzero(campaign.cells))
     point = np.zeros(len(row), dtype=int)
@@ -164,7 +164,7 @@ def _noise(search: Search, best: State, good: NDArray) -> Noise:
 
 
 def _probability(name: str, states: Sequence[State], weights: NDArray) -> float:
-    """Return the probability of an effect; finite motions count only in sole use."""
+    """Return the probability of an effect; finite motions count only if alone."""
     has = [
         any(e.name == name for e in s.elements)
         and (len(s.elements) == 1 or not LIBRARY[name].finite)
@@ -174,12 +174,12 @@ def _probability(name: str, states: Sequence[State], weights: NDArray) -> float:
 
 
 def _confirmed(search: Search, states: list[State]) -> list[State]:
-    """Remove the best models with functions that fail cross-validation."""
+    """Drop the best models as long as their functions fail cross-validation."""
     blocks, models = search.columns.block[search.readings.cells], search.models
     while len(np.unique(blocks)) >= _FEWEST and len(states) > 1:
         best = states[0]
         learned = [e for e in best.elements if not e.name]
-        # Each function and all functions together are tested, because two functions can
+        # Functions are tested individually and jointly, because two of them may
         # compensate each other.
         rests = [best.without([e]) for e in learned]
         sure = [
@@ -199,10 +199,10 @@ def _confirmed(search: Search, states: list[State]) -> list[State]:
 def _merged(states: Sequence[State]) -> list[State]:
     """Return models with distinct predictions, the best first.
 
-    Of several models with equal predictions, the model with the fewest functions is
-    returned.  The reason is that a function with the columns of a library effect is the
-    same effect.  Errors of the measuring device are an exception, because the machine
-    may have the same error.
+    Of several models with equal predictions, the one with the fewest functions is
+    returned, because a function with the columns of a library effect is the same
+    effect.  Errors of the measuring device are an exception, because the machine may
+    have the same error.
     """
     every = _best_first(states)
     # Models without functions are included in case no function is confirmed.
@@ -242,7 +242,7 @@ def _best_first(states: Sequence[State]) -> list[State]:
 
 
 def _joined(one: State, other: State) -> State:
-    """Return a model with the weight of another model added to its own weight."""
+    """Add the weight of one model to that of another."""
     return replace(one, score=float(np.logaddexp(one.score, other.score)))
 
 
@@ -251,12 +251,12 @@ def _is_refined(state: State) -> bool:
 
 
 def _refined(e: Element) -> str:
-    """Return the simpler effect that an element's effect refines; empty if none."""
+    """Return the simpler effect that an element refines; empty if there is none."""
     return LIBRARY[e.name].refines if e.name else ""
 
 
 def _rank(state: State) -> int:
-    """Return the sort key by which models with equal predictions are preferred."""
+    """Return the preference of a model among those with equal predictions."""
     own = [e.name for e in state.elements if e.name]
     return _functions(state) + 2 * sum(LIBRARY[name].device_alone for name in own)
 
@@ -287,7 +287,7 @@ def _models(states: Sequence[State], weights: NDArray) -> tuple[Model, ...]:
 def _learned(
     search: Search, states: Sequence[State], weights: NDArray, k: int
 ) -> Learned:
-    """Return a function of the best model together with its equivalent functions."""
+    """Return a function of the best model together with its equivalents."""
     best, e = states[0], states[0].elements[k]
     rest = best.without([e])
     equal = list(search.columns.functions.equivalents(e.candidate))

@@ -1,4 +1,4 @@
-"""Result of the model selection of a diagnosis."""
+"""Define the result of model selection."""
 
 from dataclasses import dataclass
 
@@ -18,10 +18,10 @@ class Learned:
 
     Attributes:
         candidate: places, variables and form.
-        equivalent: other places and variables with the same predictions.
+        equivalent: other places and variables that give the same predictions.
         std: (m,) prior standard deviations of the unknowns of :class:`.Sensitivities`.
         probability: probability that a model contains a function of these variables.
-        range_error: error in extrapolation; None if it cannot be estimated.
+        range_error: extrapolation error; None if it cannot be estimated.
     """
 
     candidate: Candidate
@@ -36,7 +36,7 @@ class Model:
     """A model of the deviations and its probability.
 
     Attributes:
-        effects: names of the library's effects.
+        effects: names of its library effects.
         functions: descriptions of its functions.
         probability: posterior probability.
     """
@@ -51,15 +51,15 @@ class Selected:
     """Result of :func:`.select.select`.
 
     Attributes:
-        hypotheses: hypotheses of the best model; that of an unknown measuring frame is
-            first.
+        hypotheses: hypotheses of the best model, beginning with that of an unknown
+            measuring frame.
         values: (k,) estimates of the unknowns, in the order of the hypotheses.
         functions: functions of the best model.
         small: geometric errors and springs that the best model contains.
-        noise: scale of the noise, and sentences about the noise.
+        noise: noise scale, and sentences about the noise.
         weights: (n,) probability that a cell is good.
         models: models by the names of their effects, best first.
-        probability: probability of each effect of the library in any visited model.
+        probability: probability of each library effect in any visited model.
         unknowns: [-] number of well-determined unknowns, including the measuring frame.
         states: the visited models, best first.
     """

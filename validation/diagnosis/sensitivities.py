@@ -1,4 +1,4 @@
-"""Compute the responses of the readings to candidate functions.
+"""Compute the sensitivity of the readings to candidate functions.
 
 ======  ===============  =========  ==================================================
 symbol  code             shape      meaning
@@ -8,8 +8,8 @@ P       ``basis``        (R, p)     columns of a form in a variable
 T       ``mixed``        (p, q)     coefficients of the form per unknown of the search
 ======  ===============  =========  ==================================================
 
-The contribution of a candidate's component to the readings of a row is a times the row
-of P T times the unknowns.
+A component of a candidate contributes a times the row of P T times the unknowns to the
+readings of a row.
 """
 
 from collections.abc import Iterator
@@ -37,23 +37,22 @@ from forcefit.validation.diagnosis.candidates import (
 from forcefit.validation.diagnosis.function_forms import CandidateShape
 from forcefit.validation.diagnosis.responses import Responses
 
-# Prior size of the linear part of a spline per step between knots, relative to the size
-# of the spline.
+# Prior size of the linear part of a spline per knot interval, relative to the spline.
 _STIFF = 0.1
-# A power is dropped if its size after removing lower powers falls below this fraction.
+# Powers are dropped if their size after removing lower powers is below this fraction.
 _RANK = 1e-8
 # Step of the derivative relative to the largest load; the model is linear in the load.
 _STEP = 1e-3
 _BENT = 64  # number of cached columns of forms with a fitted shape parameter
-# Unknowns below this fraction of the largest one do not affect the readings.
+# Unknowns below this fraction of the largest one leave the readings unaffected.
 _NOTHING = 1e-9
 
 
 class Sensitivities:
-    """Derivatives of readings by components at any place, and values of variables."""
+    """Derivatives of the readings by components at any place, and variable values."""
 
     def __init__(self, conditions: Conditions, response: Responses) -> None:
-        """Store the declared conditions of R rows, and their responses."""
+        """Store the declared conditions of R rows and their responses."""
         self.conditions, self._response = conditions, response
         self.rows = np.arange(len(conditions))
         self._origin = conditions.postures.platform[:, :3, 3]
@@ -61,7 +60,7 @@ class Sensitivities:
         self._raw = lru_cache(maxsize=_BENT)(self._unmixed)
 
     def take(self, rows: NDArray) -> "Sensitivities":
-        """Return the sensitivities of selected rows; forms are not renormalised."""
+        """Select rows without renormalising the forms."""
         other = copy(self)
         other.rows, other._origin = self.rows[rows], self._origin[rows]
         r = self._response
@@ -71,7 +70,7 @@ class Sensitivities:
     def about(self, conditions: Conditions, response: Responses) -> "Sensitivities":
         """Return the sensitivities for conditions that effects have changed.
 
-        The normalisation of the forms is not changed.
+        The normalisation of the forms stays unchanged.
         """
         other = copy(self)
         other.conditions, other._response = conditions, response
@@ -95,7 +94,7 @@ class Sensitivities:
         return change
 
     def sensitivity(self, where: str, component: str, kind: str) -> NDArray:
-        """Return (R, 6) changes of the reading per unit of a component at a place."""
+        """Return changes (R, 6) of the reading per unit of a component at a place."""
         if where == "load":
             return self.under_load[self.rows, :, LOADS.index(component)]
         robot, response = self.conditions.robot, self._response
@@ -104,19 +103,19 @@ class Sensitivities:
     def _basis(
         self, variables: tuple[str, ...], shape: CandidateShape
     ) -> tuple[NDArray, NDArray]:
-        """Return (R, q) columns of a form of variables, of order one, and T (p, q)."""
+        """Return the columns (R, q) of a form, scaled to order one, and T (p, q)."""
         raw = self._unmixed(variables, shape)
         size = np.sqrt(np.mean(raw**2, axis=0))
         mixed = np.diag(1 / np.where(size > 0, size, 1.0))
         if shape.form == "powers" and len(shape.names) > 1:
             # QR decomposition removes the lower powers from each power.
             Q, R = np.linalg.qr(raw * np.diag(mixed))
-            # The rows determine at most as many powers as there are rows.
+            # At most as many powers can be determined as there are rows.
             good = np.flatnonzero(np.abs(np.diag(R)) > _RANK * np.sqrt(len(raw)))
             mixed = mixed[:, good] @ np.linalg.inv(R[np.ix_(good, good)])
             mixed *= np.sqrt(len(raw))
         elif shape.form == "spline":
-            # The prior of a spline's values makes rough splines improbable.
+            # The prior of the spline values penalises rough splines.
             stiff = roughness(len(shape.names)) + _STIFF * np.eye(len(shape.names))
             mixed = np.linalg.inv(np.linalg.cholesky(stiff)).T
             mixed /= np.sqrt(np.mean((raw @ mixed) ** 2) * mixed.shape[1])
@@ -125,7 +124,7 @@ class Sensitivities:
         return raw @ mixed, mixed
 
     def _unmixed(self, variables: tuple[str, ...], shape: CandidateShape) -> NDArray:
-        """Return the (R, p) columns of a form of variables."""
+        """Return the columns (R, p) of a form of variables."""
         if variables[0].startswith("wrench."):
             wrench = [self._wrench(*variables)]
             return FORMS[shape.form].basis(shape.names, wrench, dict(shape.given))
@@ -136,13 +135,13 @@ class Sensitivities:
         return raw
 
     def _wrench(self, name: str) -> NDArray:
-        """Return the (R,) [N m or N] load of a joint in the declared model."""
+        """Return the load (R,) [N m or N] of a joint in the declared model."""
         frame, _, component = name.removeprefix("wrench.").rpartition(".")
         row = self.conditions.robot.index(frame)
         return self._response.wrenches[:, row, LOADS.index(component)]
 
     def changes(self, one: Candidate, x: NDArray | None = None) -> NDArray:
-        """Return the (R, 6, m) [rad, m] contribution of a candidate per unknown.
+        """Return the contribution (R, 6, m) [rad, m] of a candidate per unknown.
 
         The contribution is linearised at the values ``x`` (m,) of the unknowns.  If
         ``x`` is (m + 1,), its last value is the change of the shape parameter, and the
@@ -150,7 +149,7 @@ class Sensitivities:
         """
         m = len(self.axes(one))
         by = 0.0 if x is None or len(x) == m else float(x[-1])
-        # Values of one unknown are adjacent in memory, because they are read together.
+        # Values of one unknown are stored contiguously, because they are read together.
         blocks = [columns.T[:, :, None] * s for s, columns in self._factors(one, by)]
         if x is not None and len(x) > m:
             step = _STEP * float(one.shape.bends[0])
@@ -159,7 +158,7 @@ class Sensitivities:
         return np.moveaxis(np.concatenate(blocks), 0, 2)
 
     def moved(self, one: Candidate, x: NDArray, by: float = 0.0) -> NDArray:
-        """Return the (R, 6) [rad, m] contribution of a candidate with unknowns x (m,).
+        """Return the contribution (R, 6) [rad, m] of a candidate with unknowns x (m,).
 
         The shape parameter is increased by ``by``.
         """
@@ -171,7 +170,7 @@ class Sensitivities:
         return total
 
     def axes(self, one: Candidate) -> NDArray:
-        """Return the (m,) screw component in which each unknown of a candidate acts."""
+        """Return the screw component (m,) in which each unknown of a candidate acts."""
         counts = [columns.shape[1] for _, columns in self._factors(one)]
         components = [c for part in one.parts for c in part.components]
         kinds = [0 if is_turn(c) else 3 for c in components]
@@ -194,13 +193,12 @@ class Sensitivities:
                 yield self.sensitivity(part.where, component, one.kind), columns
 
     def fitted(self, one: Candidate, x: NDArray, std: NDArray) -> list[Function]:
-        """Return the functions of a robot file with fitted coefficients.
+        """Return robot-file functions with fitted coefficients.
 
-        A candidate may act at several places, called parts.  There is one function for
-        each part on which the readings depend.  If a variable is unknown in some
-        sessions, there is one function for each session.  ``x`` is (m,) or (m + 1,),
-        see :meth:`changes`.  ``std`` contains the standard deviations, which are
-        treated as independent.
+        A candidate may act at several places, called parts.  Each part on which the
+        readings depend yields one function, or one per session if a variable is unknown
+        in some sessions.  ``x`` is (m,) or (m + 1,), see :meth:`changes`.  ``std``
+        contains the standard deviations, treated as independent.
         """
         functions, at = [], 0
         m, given, sure = len(self.axes(one)), dict(one.shape.given), {}
@@ -240,7 +238,7 @@ class Sensitivities:
         return functions
 
     def _sessions(self, variables: tuple[str, ...]) -> tuple[str | None, ...]:
-        """Return the sessions in which variables are known; (None,) for all rows."""
+        """Return the sessions in which variables are known, or (None,) for all rows."""
         conditions = self.conditions
         if variables[0].startswith("wrench.") or conditions.session is None:
             return (None,)
@@ -254,7 +252,7 @@ def sensitivity_at(
     where: str, component: str, kind: str,
     robot: Robot, response: Responses, origin: NDArray,
 ) -> NDArray:  # fmt: skip
-    """Return (R, 6) changes of the reading per unit of a component at a place.
+    """Return changes (R, 6) of the reading per unit of a component at a place.
 
     The place is a frame, ``"base"`` or ``"reading"``.  ``origin`` (R, 3) [m] is the
     position of the platform.
@@ -277,7 +275,7 @@ def sensitivity_at(
 def in_cells(
     sensitivities: Sensitivities, one: Candidate, campaign: Campaign
 ) -> NDArray:
-    """Return (N, m) changes of a campaign's measured cells over sigma per unknown."""
+    """Return changes (N, m) of the measured cells per unknown, divided by sigma."""
     changes = np.moveaxis(sensitivities.changes(one), 2, 0) / campaign.sigma
     columns = changes.reshape(len(changes), -1)
     if not campaign.cells.all():

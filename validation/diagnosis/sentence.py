@@ -1,4 +1,4 @@
-"""Describe the result of a diagnosis in sentences."""
+"""State the result of a diagnosis in sentences."""
 
 import math
 from collections.abc import Sequence
@@ -23,7 +23,7 @@ WORDS = {GEOMETRY: "geometric errors", SPRINGS: "springs"}
 
 
 def sentence(diagnosis: Diagnosis) -> str:
-    """Return the sentences that describe the verdict and the errors."""
+    """Describe the verdict and the errors of a diagnosis in sentences."""
     if diagnosis.setup:
         faults = "; ".join(one.sentence for one in diagnosis.setup)
         return f"The campaign is set up wrongly: {faults}"
@@ -71,13 +71,13 @@ def sentence(diagnosis: Diagnosis) -> str:
 
 
 def titles(diagnosis: Diagnosis) -> list[str]:
-    """Return the title (place and variables) of each learned function."""
+    """Return a title (place and variables) for each learned function."""
     every = functions_of(diagnosis)
     return [function.title for functions in every for function in functions]
 
 
 def calibration_text(tally: Calibration) -> str:
-    """Return the error rates of the method on this design as text."""
+    """Format the error rates of the method for this design."""
 
     def counts(words: dict[str, int]) -> str:
         return ", ".join(f"{name} {n}" for name, n in sorted(words.items()))
@@ -95,17 +95,17 @@ def calibration_text(tally: Calibration) -> str:
 
 
 def open_text(open_: NDArray) -> str:
-    """Return a line with the number of rows in which the pose is undetermined."""
+    """State the number of rows in which the pose is undetermined."""
     return (
         f"clearances leave the pose undetermined in {int(open_.sum())} of "
-        f"{len(open_)} rows (marked open): there one of the poses of least "
-        "energy is predicted, in a closed chain the pose nearest to nominal, "
-        "in an open chain that of centred clearances"
+        f"{len(open_)} rows (marked open): one of the minimum-energy poses is "
+        "predicted there, in a closed chain the pose nearest to nominal, in an open "
+        "chain that with centred clearances"
     )
 
 
 def formula(function: Function) -> str:
-    """Return a function as text by component: coefficients times columns."""
+    """Format each component as a sum of coefficients times basis columns."""
     names = [name.rpartition(".")[2] for name in function.variables]
     words = []
     for component in function.components:
@@ -120,7 +120,7 @@ def formula(function: Function) -> str:
 
 
 def _column_text(function: Function, key: str, names: Sequence[str]) -> str:
-    """Return one column of a function's form as text."""
+    """Format one basis column of a function."""
     form, given = function.form, function.parameters
     head, _, word = key.rpartition(".")
     if form == "knee":

@@ -1,10 +1,10 @@
-"""Find the effects that a campaign's design can distinguish, before any fit.
+"""Determine which effects a campaign design can distinguish, before any fit.
 
 The change of the readings by an effect is a linear combination of the columns A of its
-signature.  Nuisance parameters, such as an unknown registration, can imitate a part of
-this change.  Therefore their columns are projected out first.  P_f denotes the
-projection on the signature of effect f.  Then |P_f A_e| / |A_e| is the fraction of
-effect e that f can imitate.
+signature.  Nuisance parameters, for example an unknown registration, can imitate part
+of this change, so their columns are projected out first.  With P_f the projection onto
+the signature of effect f, |P_f A_e| / |A_e| is the fraction of effect e that f can
+imitate.
 
 Sources:
     Bjoerck, Golub (1973), Numerical methods for computing angles between linear
@@ -22,28 +22,29 @@ from forcefit.validation.diagnosis.signatures import UNSEEN
 
 LIKE = 0.98  # cosine above which a design cannot distinguish two signatures
 SEEN = 3.0  # [sigma] smallest norm of a detectable signature
-# Relative size of a direction below which only rounding errors remain.  Other columns
-# then imitate the direction.
+# Relative size of a direction below which only round-off remains, that is, other
+# columns imitate the direction.
 ROUNDING = 1e-9
-# Relative size below which a direction of a signature counts as zero.  It is larger
-# than for rounding, because signatures are secants and not exact derivatives.
+# Relative size below which a direction of a signature counts as zero.  It exceeds
+# round-off, because signatures are secants and not exact derivatives.
 _RANK = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
 class Separability:
-    """Visibility of each effect, and its similarity to other effects.
+    """Visibility of each effect and its similarity to other effects.
 
     Attributes:
         names: names of the m effects.
-        strength: (m,) [sigma] norm of an effect's signature at plausible sizes of its
-            unknowns, over all rows, before nuisance parameters are projected out.
+        strength: (m,) [sigma] norm of each effect's signature over all rows, at
+            plausible sizes of its unknowns, before nuisance parameters are projected
+            out.
         left: (m,) fraction of the norm that remains after nuisance parameters are
             projected out.
         unknowns: (m,) number of unknowns.
         rank: (m,) number of unknowns that the design can distinguish.
         cosine: (m, m) cosine of the smallest angle between the spans of two signatures;
-            1 if the spans have a direction in common.
+            1 if they share a direction.
         shared: (m, m) fraction of the row's effect that the column's effect can
             imitate.
     """
@@ -73,11 +74,11 @@ class Separability:
         return np.divide(SEEN, size, out=np.full(len(size), np.inf), where=size > 0)
 
     def classes(self) -> list[tuple[str, ...]]:
-        """Return the classes of effects that imitate each other completely.
+        """Return classes of effects that imitate each other completely.
 
         Returns:
-            Classes of at least two effects.  A verdict can name only the class, not one
-            of its effects.
+            Classes of at least two effects.  A verdict can name only the class as a
+            whole.
         """
         alike = (self.shared > LIKE) & (self.shared.T > LIKE)
         alike &= np.outer(self.traced, self.traced)
@@ -101,7 +102,7 @@ class Separability:
         return [(self.names[i], self.names[j]) for i, j in np.argwhere(one_way)]
 
     def overlapping(self) -> list[tuple[str, str]]:
-        """Return pairs of effects that can imitate each other only partly."""
+        """Return pairs of effects that can imitate each other in part."""
         part = (self.cosine > LIKE) & (self.shared <= LIKE) & (self.shared.T <= LIKE)
         part &= np.outer(self.visible, self.visible)
         return [(self.names[i], self.names[j]) for i, j in np.argwhere(part) if i < j]
@@ -110,7 +111,7 @@ class Separability:
 def compare_signatures(
     columns: Mapping[str, NDArray], nuisance: NDArray | None = None
 ) -> Separability:
-    """Compare the signatures of effects.
+    """Return norms, fractions and angles of effect signatures.
 
     Args:
         columns: for each effect (N, k) changes of the readings by unknowns of plausible
@@ -118,7 +119,7 @@ def compare_signatures(
         nuisance: (N, p) columns of nuisance parameters, divided by sigma.
 
     Returns:
-        Norms, fractions and angles of all signatures.
+        The comparison of all signatures.
     """
     names, left = tuple(columns), dict(columns)
     if nuisance is not None:

@@ -1,8 +1,8 @@
-"""Test the sequence of models that leads to a fitted robot on held-out rows.
+"""Test on held-out rows the sequence of models that leads to a fitted robot.
 
-The models are in a fixed order: declared, pose of the device, geometric errors,
-springs, effects of the library, learned functions.  Each model contains the unknowns of
-all preceding models and is fitted as a whole.  The last model is the fitted robot.
+The order is fixed: declared, device pose, geometric errors, springs, library effects,
+learned functions.  Each model contains the unknowns of all preceding ones and is fitted
+as a whole.  The last model is the fitted robot.
 """
 
 from collections.abc import Sequence
@@ -24,14 +24,14 @@ _TERMS = (
 )  # fmt: skip
 # Indices of terms of the sequence.
 _DECLARED, _REGISTRATION, _LIBRARY, _LEARNED = 0, 1, 4, 5
-# Position of a model in the sequence: its last term, and its number of learned
+# Position of a model in the sequence: its last term and its number of learned
 # functions.
 Place = tuple[int, int]
 
 
 @dataclass(frozen=True)
 class Errors:
-    """Root mean square errors over selected rows.
+    """Root-mean-square errors over selected rows.
 
     Attributes:
         position: [m] error of the measured translations.
@@ -53,7 +53,7 @@ def errors_of(
 
 
 def rms(values: NDArray) -> float:
-    """Return the root mean square of the finite values; NaN if there are none."""
+    """Return the root mean square of the finite values, or NaN if there are none."""
     known = values[np.isfinite(values)]
     return float(np.sqrt(np.mean(known**2))) if known.size else float("nan")
 
@@ -79,7 +79,7 @@ class Step:
 def stages(
     campaign: Campaign, fit: MachineFit, rows: NDArray, held: NDArray
 ) -> dict[Place, tuple[float, NDArray]]:
-    """Fit the models that lead to a fitted robot, and test each on held-out rows.
+    """Fit the models that lead to a fitted robot and test each on held-out rows.
 
     Args:
         campaign: campaign of R rows.
@@ -115,7 +115,7 @@ def _has_finite_motions(unknowns: Unknowns) -> bool:
 
 
 def _models(unknowns: Unknowns) -> dict[Place, Unknowns]:
-    """Yield the unknowns of the preceding models; absent terms are omitted."""
+    """Yield the unknowns of the preceding models, omitting absent terms."""
     device = tuple(one for one in unknowns.effects if one.device)
     now = replace(unknowns, effects=(), small=(), functions=())
     models = {(_DECLARED, 0): now}
@@ -142,7 +142,7 @@ def _start(unknowns: Unknowns, fit: MachineFit) -> NDArray:
 def pooled(
     campaign: Campaign, folds: list[dict[Place, tuple[float, NDArray]]], rows: NDArray
 ) -> list[Step]:
-    """Return the sequence tested on rows (R,) bool of all folds together.
+    """Return the sequence tested on rows (R,) of all folds together.
 
     Returns:
         The steps in order.  The error of the last step is the error of the diagnosis.
@@ -162,7 +162,7 @@ def pooled(
 
 
 def joined(residuals: Sequence[NDArray]) -> NDArray:
-    """Return the (R, 6) [rad, m] residual of one step, joined from all folds."""
+    """Join the residual (R, 6) [rad, m] of one step from all folds."""
     residual = residuals[0]
     for other in residuals[1:]:
         residual = np.where(np.isnan(other), residual, other)

@@ -1,8 +1,8 @@
 """Detect set-up blunders: wrong signs, quarter turns, wrong units, exchanged columns.
 
-Blunders are tested before any search for effects.  Blunders change readings by
-decimetres, and effects change them by micrometres.  Therefore rigid motions and the
-declared springs suffice to identify blunders.  Several blunders may occur together.
+Blunders are tested before any search for effects.  They change readings by decimetres,
+whereas effects change them by micrometres, so rigid motions and the declared springs
+suffice to identify them.  Several blunders may occur together.
 """
 
 from collections.abc import Sequence
@@ -26,12 +26,12 @@ from forcefit.validation.diagnosis.setup_corrections import (
 )
 
 _ROWS = 40  # number of rows by which corrections are compared
-# Fraction of cells with the smallest residuals that is used, so that single outliers do
-# not count.
+# Fraction of cells, with the smallest residuals, that is used, so that single outliers
+# do not count.
 _TRIMMED = 0.9
 _MOST = 3  # largest number of simultaneous blunders
 _BEAM = 4  # number of sets of corrections that are extended
-# If one set of corrections reduces the residual below this fraction of the initial one,
+# If a set of corrections reduces the residual below this fraction of the initial one,
 # only this set is extended.
 _CLEAR = 0.1
 # A correction is added to a set only if it reduces the residual below this fraction of
@@ -41,8 +41,8 @@ _LESS = 0.9
 _DECISIVE = 0.5
 # A correction is necessary if the residual without it is larger by this factor.
 _NEEDED = 1.5
-# A corrected set-up is not tested if its commanded positions spread by more than this
-# multiple of the spread of the readings.
+# A corrected set-up is rejected if its commanded positions spread by more than this
+# multiple of the readings.
 _FAR = 10.0
 _NOISE = 3.0  # [sigma] residual below which the search for blunders ends
 _LEAST = 100.0  # smallest decrease of chi-square for each reported blunder
@@ -52,7 +52,7 @@ Corrections = tuple[Correction, ...]
 
 @dataclass(frozen=True)
 class SetupBlunder:
-    """An error in the set-up of a campaign.
+    """A blunder in the set-up of a campaign.
 
     Attributes:
         kind: ``sign``, ``quarter_turn``, ``exchanged``, ``unit``, ``transposed`` or
@@ -60,7 +60,7 @@ class SetupBlunder:
         columns: names of the columns of the campaign's table.
         before: [sigma] residual with all corrections except this one.
         after: [sigma] residual with all corrections.
-        sentence: advice on what to check.
+        sentence: sentence that advises the user what to check.
     """
 
     kind: str
@@ -73,16 +73,16 @@ class SetupBlunder:
 def setup_blunders(
     campaign: Campaign, conditions: Conditions
 ) -> tuple[SetupBlunder, ...]:
-    """Return set-up blunders; correcting them reduces the residual decisively.
+    """Return the set-up blunders whose correction reduces the residual decisively.
 
     Args:
         campaign: measured deviations.
         conditions: conditions of its R rows, as declared in the robot file.
 
     Returns:
-        The blunders; none if the residual does not decrease to half.  The residual is
-        the root mean square, in sigma, of the nine tenths of the cells with the
-        smallest residuals.  An unknown pose of the device is fitted before.
+        The blunders, none if the residual does not decrease to half.  The residual is
+        the root mean square, in sigma, over the nine tenths of the cells with the
+        smallest residuals, after fitting an unknown device pose.
     """
     rows = _sample(campaign)
     if not len(rows):
@@ -103,19 +103,19 @@ def setup_blunders(
 
 
 def _blunder(correction: Correction, before: float, after: float) -> SetupBlunder:
-    """Return a blunder, including a sentence that tells the user what to check."""
+    """Describe a blunder, including a sentence that advises the user what to check."""
     columns = correction.columns
     fit, s = ("fits", "") if len(columns) == 1 else ("fit", "s")
     sentence = (
         f"{', '.join(columns)} {fit} {correction.what}: the residual is then "
-        f"{after:.3g} sigma, otherwise {before:.3g}; look at the column{s} and at the "
-        "robot's file"
+        f"{after:.3g} sigma, otherwise {before:.3g}; check the column{s} and the robot "
+        "file"
     )
     return SetupBlunder(correction.kind, columns, before, after, sentence)
 
 
 def _search(judge: "_Judge", start: float) -> tuple[Corrections, float]:
-    """Return the corrections with the smallest residual, from a beam search."""
+    """Find the corrections with the smallest residual by a beam search."""
     tried = corrections(judge.campaign)
     best: tuple[Corrections, float] = ((), start)
     beam = [best]
@@ -140,13 +140,13 @@ def _search(judge: "_Judge", start: float) -> tuple[Corrections, float]:
 def _needed(
     judge: "_Judge", chosen: Corrections, left: float
 ) -> tuple[Corrections, float]:
-    """Return only the corrections that reduce the residual substantially."""
+    """Drop the corrections that do not reduce the residual substantially."""
     for one in chosen:
         fewer = _without(chosen, one)
         without = judge.residual(fewer)
         rivals = [without]
         # If the springs hardly respond to the load, scaled-down loads fit no better
-        # than zero loads.
+        # than none.
 
         if one.array == "loads":
             rivals.append(judge.residual(fewer, loads=0.0))
@@ -156,12 +156,12 @@ def _needed(
 
 
 def _without(chosen: Sequence[Correction], one: Correction) -> Corrections:
-    """Return a set of corrections without one of its corrections."""
+    """Remove one correction from a set."""
     return tuple(other for other in chosen if other is not one)
 
 
 def _sample(campaign: Campaign) -> NDArray:
-    """Return evenly spaced rows, out of all rows that can test a set-up."""
+    """Select evenly spaced rows among those that can test a set-up."""
     cells = campaign.cells
     enough = np.any if campaign.registration == "known" else np.all
     usable = cells[:, :3].all(axis=1) | enough(cells[:, 3:], axis=1)
@@ -170,7 +170,7 @@ def _sample(campaign: Campaign) -> NDArray:
 
 
 class _Judge:
-    """Computes the residuals that assumed set-ups cause in a sample of the rows."""
+    """Computes the residuals of assumed set-ups in a sample of the rows."""
 
     def __init__(self, campaign: Campaign, conditions: Conditions) -> None:
         self.campaign, self.given = campaign, as_given(campaign)
@@ -182,12 +182,12 @@ class _Judge:
     def residual(
         self, made: Corrections, *, loads: float = 1.0, stated: bool = False
     ) -> float:
-        """Return the trimmed rms [sigma] of the residual, inf for unreachable commands.
+        """Return the trimmed rms [sigma] of the residual; inf for unreachable commands.
 
         Args:
             made: corrections that are applied to the campaign.
             loads: factor on all loads.
-            stated: whether the declared sigma is used even if a correction scales
+            stated: whether to use the declared sigma even if a correction scales
                 lengths.
         """
         setup = self.given
@@ -217,7 +217,7 @@ class _Judge:
         return float(np.sqrt(np.mean(kept**2)))
 
     def _moved(self, setup: SetUp) -> Conditions | None:
-        """Return the conditions under a set-up; None if a command is unreachable."""
+        """Return the conditions under a set-up, or None if a command is unreachable."""
         moved, given = replace(self.conditions, load=setup.loads), self.given
         if setup.places is not given.places or setup.axes is not given.axes:
             wide = np.nanstd(setup.points, axis=0).max()
@@ -243,7 +243,7 @@ class _Judge:
     def _device(
         self, setup: SetUp, points: NDArray, turns: NDArray, own: NDArray
     ) -> tuple[NDArray, NDArray]:
-        """Return the rotation (3, 3) and translation (3,) [m] of the device."""
+        """Fit the rotation (3, 3) and translation (3,) [m] of the device."""
         if self.campaign.registration == "known":
             return np.eye(3), np.zeros(3)
         read, seen = points[own], setup.points[own]

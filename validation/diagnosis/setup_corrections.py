@@ -1,8 +1,8 @@
-"""Define corrections of set-up blunders, such as a sign, a unit or exchanged columns.
+"""Define corrections of set-up blunders: signs, units, exchanged columns and others.
 
-The readings of a campaign are deviations from the commanded pose.  Most corrections
-change the absolute readings, that is, the commanded poses combined with the deviations,
-because the device measured absolute poses.  Corrections with ``deviation`` set change
+The readings of a campaign are deviations from the commanded pose, but the device
+measured absolute poses.  Most corrections therefore change the absolute readings, that
+is, commanded poses combined with deviations.  Corrections with ``deviation`` set change
 only the deviations.
 """
 
@@ -27,22 +27,21 @@ _UNITS = {  # factors between units that are often confused
 
 
 def _rolled(turns: Rotation, by: int) -> Rotation:
-    """Return rotations after a cyclic shift of the quaternion components."""
+    """Shift the quaternion components of rotations cyclically."""
     return Rotation.from_quat(np.roll(turns.as_quat(), by, axis=-1))
 
 
 _MISREAD = (
     ("transposed", "transposed", Rotation.inv),
-    # If a quaternion (x, y, z, w) is read in the order w x y z, the components of the
-    # result are y z w x.
+    # A quaternion (x, y, z, w) that is read as w x y z has the components y z w x.
 
     ("quaternion", "with the quaternion's w taken last, not first",
      partial(_rolled, by=1)),
     ("quaternion", "with the quaternion's w taken first, not last",
      partial(_rolled, by=-1)),
 )  # fmt: skip
-# Columns, the array of a SetUp with these columns, the correction as text, and whether
-# only the deviation changes.
+# Columns, the corresponding array of SetUp, the correction in words, and whether only
+# the deviation changes.
 _LENGTHS = (
     ("pose.t", "places", "", False),
     ("meas.t", "points", ", as positions", False),
@@ -61,7 +60,7 @@ class SetUp:
 
     Attributes:
         coordinates: (R, n) [rad or m] commanded coordinates of all joints.
-        places: (R, 3) [m] commanded positions of the platform, if poses are commanded.
+        places: (R, 3) [m] commanded platform positions, if poses are commanded.
         axes: (R, 3, 3) commanded axes of the platform.
         loads: (R, 6) [N m, N] loads on the platform.
         points: (R, 3) [m] measured positions, base axes; NaN if not measured.
@@ -82,16 +81,15 @@ class SetUp:
 
 @dataclass(frozen=True, eq=False)
 class Correction:
-    """A correction of one blunder.
+    """Correction of one blunder.
 
     Attributes:
         kind: kind of the blunder in one word.
         columns: columns of the campaign's table that the correction changes.
         what: the correction in words, for a sentence.
-        array: name of the array of :class:`SetUp` that it changes.
+        array: name of the :class:`SetUp` array that it changes.
         change: function that changes this array, or its deviation from the command.
-        deviation: whether the correction changes the deviation instead of the absolute
-            readings.
+        deviation: whether the deviation is changed instead of the absolute readings.
         sigma: factor on the standard deviations of positions.
     """
 
@@ -104,7 +102,7 @@ class Correction:
     sigma: float = 1.0
 
     def apply(self, given: SetUp) -> SetUp:
-        """Return the set-up after this correction."""
+        """Apply this correction to a set-up."""
         values, about = getattr(given, self.array), given.nominal.get(self.array)
         if not self.deviation or about is None:
             values = self.change(values)
@@ -146,8 +144,8 @@ def corrections(campaign: Campaign) -> list[Correction]:
     tried += _of_loads(campaign)
     for stem, array, how, deviation in _LENGTHS:
         for factor, what in _factors("length") if there[stem] else ():
-            # Otherwise sigma would increase with the lengths, and division by any
-            # factor would improve the fit.
+            # Otherwise sigma would grow with the lengths, and dividing by any factor
+            # would improve the fit.
 
             sigma = min(factor, 1.0) if array == "points" else 1.0
             tried.append(Correction(
@@ -207,13 +205,13 @@ def _xyz(stem: str) -> tuple[str, ...]:
 
 
 def _factors(quantity: str) -> list[tuple[float, str]]:
-    """Yield factors between two units in both directions, with descriptions."""
+    """Yield conversion factors between two units in both directions."""
     both = (f for one in _UNITS[quantity] for f in (one, 1 / one))
     return [(factor, f"times {factor:.4g}") for factor in both]
 
 
 def _turned(turns: NDArray, change: Callable[[Rotation], Rotation]) -> NDArray:
-    """Return (R, 3, 3) changed rotations; NaN stays NaN."""
+    """Apply a change to rotations (R, 3, 3); NaN stays NaN."""
     read = np.isfinite(turns).all(axis=(1, 2))
     changed = turns.copy()
     changed[read] = change(Rotation.from_matrix(turns[read])).as_matrix()

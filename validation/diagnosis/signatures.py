@@ -1,4 +1,4 @@
-"""Compute signatures: the first-order change of the readings by each hypothesis.
+"""Compute signatures, the first-order changes of the readings by hypotheses.
 
 ======  ============  ======  ========================================================
 symbol  code          shape   meaning
@@ -34,7 +34,7 @@ from forcefit.validation.diagnosis.hypotheses import (
 
 _PROBES = 3  # number of random projections by which equal columns are found
 _DIGITS = 6  # number of digits in which projections of equal columns must agree
-# Number of tested rows with the largest loads, and with the largest rotations.
+# Number of tested rows, those with the largest loads and with the largest rotations.
 _PROBED = 4
 # Smallest visible change: sum of squares of all whitened readings.
 _HARDLY = 2.0
@@ -45,10 +45,10 @@ UNSEEN = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class Signature:
-    """Contribution of one hypothesis to the model, in units of sigma.
+    """Contribution of a hypothesis to the model, in units of sigma.
 
     Attributes:
-        hypothesis: the hypothesis that contributes.
+        hypothesis: the contributing hypothesis.
         offset: (N,) contribution of the linearised hypothesis if all unknowns are zero.
         columns: (N, k) contribution per unit of each unknown.
     """
@@ -64,15 +64,14 @@ class Signature:
 
 
 def conditions_of(campaign: Campaign) -> Conditions:
-    """Return the conditions of a campaign for the machine that its robot file declares.
+    """Return the conditions of a campaign for its declared machine.
 
     Args:
         campaign: campaign of R rows.
 
     Returns:
-        Conditions of R rows.  A covariate that was not recorded in a session is NaN
-        there.  The covariates ``gravity.x``, ``.y``, ``.z`` [m/s^2] contain the known
-        gravity in each row.
+        Conditions of R rows.  Covariates are NaN in sessions that did not record them.
+        ``gravity.x``, ``.y``, ``.z`` [m/s^2] contain the known gravity in each row.
 
     Raises:
         BadInput: a function of the robot depends on a covariate that is missing.
@@ -103,18 +102,18 @@ def conditions_of(campaign: Campaign) -> Conditions:
 
 
 def loaded_components(campaign: Campaign) -> list[str]:
-    """Return the components of the load that are nonzero in at least one row."""
+    """Return the load components that are nonzero in at least one row."""
     return [name for name, w in zip(LOAD, campaign.loads.T, strict=True) if w.any()]
 
 
 def whiten(campaign: Campaign, deviation: NDArray) -> NDArray:
-    """Return (N, ...) deviations of the measured cells, divided by sigma."""
+    """Return the deviations (N, ...) of the measured cells, divided by sigma."""
     some = deviation[campaign.cells]
     return some / campaign.sigma[campaign.cells].reshape(-1, *[1] * (some.ndim - 1))
 
 
 def fingerprints(columns: NDArray) -> list[tuple[float, ...]]:
-    """Return keys of columns (n, k); parallel columns have equal keys."""
+    """Return keys of columns (n, k) that agree for parallel columns."""
     probes = np.random.default_rng(0).normal(size=(_PROBES, len(columns)))
     seen = probes @ columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
     seen *= np.sign(seen[0])
@@ -122,7 +121,7 @@ def fingerprints(columns: NDArray) -> list[tuple[float, ...]]:
 
 
 class Tangents:
-    """First derivatives of a campaign's readings in every unknown of every effect.
+    """First derivatives of a campaign's readings by every unknown of every effect.
 
     Attributes:
         campaign: campaign of R rows with N measured cells.
@@ -131,16 +130,16 @@ class Tangents:
     """
 
     def __init__(self, campaign: Campaign, derivatives: Derivatives) -> None:
-        """Compute the readings of the declared model in the measured cells."""
+        """Compute the declared readings in the measured cells."""
         self.campaign, self.derivatives = campaign, derivatives
         self.declared = whiten(campaign, derivatives.declared)
 
     def model(self, effects: Mapping[str, Values], *, finite: bool = False) -> NDArray:
-        """Return (N,) whitened readings with effects (:meth:`.Derivatives.model`)."""
+        """Return whitened readings (N,) with effects (:meth:`.Derivatives.model`)."""
         return whiten(self.campaign, self.derivatives.model(effects, finite=finite))
 
     def rows_of(self, session: str | None) -> NDArray:
-        """Return (N, 1): 1 in the cells of a session, 0 elsewhere; all 1 for None."""
+        """Return an indicator (N, 1) of the cells of a session; None selects all."""
         row = np.nonzero(self.campaign.cells)[0]
         if session is None or self.campaign.session is None:
             return np.ones((len(row), 1))
@@ -149,8 +148,8 @@ class Tangents:
     def at_start(self, hypothesis: Hypothesis) -> Signature:
         """Return the first-order contribution of a hypothesis at its start values.
 
-        Each unknown applies to all rows or to one session.  The values are NaN without
-        a solution.
+        Each unknown applies to all rows or to one session.  Values are NaN where the
+        model has no solution.
         """
         sessions = sessions_of(hypothesis)
         one = self._at_start(in_one_session(hypothesis, sessions[0])[0])
@@ -194,7 +193,7 @@ class Tangents:
         return bool(np.mean(size**2) * len(self.declared) < _HARDLY)
 
     def _column(self, effect: str, slot: Slot, shapes: dict[str, float]) -> NDArray:
-        """Return the (N,) derivative by one unknown, at the start values."""
+        """Return the derivative (N,) by one unknown at the start values."""
         begun = whiten(self.campaign, self.derivatives.begun(effect, slot, shapes))
         return _seen((begun - self.declared) / (STEP * slot.unknown.scale), slot)
 
@@ -221,6 +220,6 @@ class Tangents:
 
 
 def _seen(column: NDArray, slot: Slot) -> NDArray:
-    """Return an (N,) derivative, or zero if a plausible unknown is not visible."""
+    """Return a derivative (N,), or zero if no plausible unknown is visible."""
     size = np.linalg.norm(column) * slot.unknown.scale
     return np.zeros_like(column) if size < UNSEEN else column

@@ -1,7 +1,7 @@
-"""Define the models of the search and compute their log posterior.
+"""Define the models of the search and compute their log posteriors.
 
-A model consists of elements (effects and functions).  It may also contain geometric
-errors of the frames, springs in the joints, or both.  Its score is the log posterior:
+A model consists of elements (effects and functions) and may also contain geometric
+errors of frames, joint springs, or both.  Its score is the log posterior:
 
     score = ln p(z) - cost of optimised standard deviations + bounds + ln prior
 """
@@ -58,12 +58,12 @@ class State:
     readings: WeightedReadings
 
     def _columns(self) -> NDArray:
-        """Return (n, k) columns of all unknowns, which are too large to be cached."""
+        """Return the columns (n, k) of all unknowns, which are too large to cache."""
         r = self.readings
         return np.hstack([r.small[:, self.used], *(r.own(e) for e in self.elements)])
 
     def _z(self) -> NDArray:
-        """Return the (n,) readings minus the offsets of the elements."""
+        """Return the readings (n,) minus the offsets of the elements."""
         return self.readings.without_offsets(self.elements)
 
     @cached_property
@@ -74,7 +74,7 @@ class State:
 
     @cached_property
     def sample_marginal(self) -> Marginal:
-        """Model with marginalised unknowns for the cells of the sampled rows."""
+        """Model with marginalised unknowns for the cells of sampled rows."""
         some = self.readings.sampled
         if some.all():
             return self.marginal
@@ -99,7 +99,7 @@ class State:
         return (self.readings.z - self.fitted) / self.readings.root
 
     def own(self, k: int) -> slice:
-        """Return the slice of the model's unknowns that belongs to the k-th element."""
+        """Return the slice of the k-th element in the model's unknowns."""
         counts = [e.columns.shape[1] for e in self.elements]
         begin = int(self.used.sum()) + sum(counts[:k])
         return slice(begin, begin + counts[k])
@@ -134,7 +134,7 @@ class State:
         return not any(map(_at_bounds, self.elements, means))
 
     def sizes_for(self, elements: Sequence[Element]) -> dict[int, float]:
-        """Return the groups' standard deviations for a model with other elements."""
+        """Return standard deviations by group, to start a model with other elements."""
         own = self.sizes.of_group
         found = {g: s for g, s in own.items() if g < _GROUPS}
         for k, e in enumerate(self.elements):
@@ -143,14 +143,14 @@ class State:
         return found
 
     def expected_squares(self) -> NDArray:
-        """Return the (n,) expected squares of the unweighted residuals."""
+        """Return the expected squares (n,) of the unweighted residuals."""
         X = self._columns()
         spread = np.einsum("ij,ij->i", X @ self.sizes.covariance, X)
         return self.left**2 + spread * self.tau**2 / self.readings.weights
 
 
 def _at_bounds(e: Element, mean: NDArray) -> bool:
-    """Return whether all values, or a shape parameter, of an effect are at a bound."""
+    """Return whether all values or a shape parameter of an effect are at a bound."""
     if not e.name or not e.columns.shape[1]:
         return False
     at, x = (mean <= e.lower) | (mean >= e.upper), e.values(mean)
@@ -166,12 +166,11 @@ def _at_bounds(e: Element, mean: NDArray) -> bool:
 def prediction_gain(one: State, other: State, blocks: NDArray) -> float:
     """Return how much better one model predicts than another, in standard errors.
 
-    Each block (n,) of readings is predicted by a fit to the others.  Two gains are
-    computed, and the larger one is returned.  The first is the mean difference of the
-    log predictive densities.  The second is Wilcoxon's signed-rank statistic (1945).
-    It is needed because a few blocks often dominate the mean and its scatter, although
-    nearly all blocks improve.  The gain is 0 for a single block, because its standard
-    error is unknown.
+    Each block (n,) of readings is predicted by a fit to the others.  The gain is the
+    larger of the mean difference of the log predictive densities and Wilcoxon's
+    signed-rank statistic (1945).  The latter is needed because a few blocks often
+    dominate the mean and its scatter although nearly all blocks improve.  The gain is 0
+    for a single block, because its standard error is unknown.
     """
     densities = []
     for state in (one, other):
@@ -188,7 +187,7 @@ def prediction_gain(one: State, other: State, blocks: NDArray) -> float:
 
 
 class Models:
-    """Models of weighted readings; each model is fitted only once."""
+    """Models of weighted readings, each fitted only once."""
 
     def __init__(self, readings: WeightedReadings) -> None:
         """Start with an empty cache."""
@@ -196,7 +195,7 @@ class Models:
         self._states: dict[object, State] = {}
 
     def forget(self) -> None:
-        """Release the cached models and products of columns."""
+        """Release cached models and products of columns."""
         for state in self._states.values():
             state.forget()
         self._states.clear()
@@ -223,7 +222,7 @@ class Models:
         return self._states[key]
 
     def best(self, elements: tuple[Element, ...], start: State) -> State:
-        """Return the best model whose nuisance groups differ by at most one group."""
+        """Return the best model that differs by at most one nuisance group."""
         g, s = start.mode
         near = [m for m in self.modes() if m in {(g, s), (not g, s), (g, not s)}]
         states = [self.state(elements, m, start) for m in near]

@@ -1,4 +1,4 @@
-"""Format a diagnosis as text for a terminal, from its table in the public format."""
+"""Format the public table of a diagnosis as text for a terminal."""
 
 import math
 from typing import Any
@@ -14,7 +14,7 @@ Table = dict[str, Any]
 
 
 def text(diagnosis: Diagnosis, tally: Calibration | None = None) -> str:
-    """Return a diagnosis as text for a terminal."""
+    """Format a diagnosis as text for a terminal."""
     answer = table(diagnosis, tally)
     lines = [f"{answer['campaign']}: {answer['verdict']}", answer["sentence"], ""]
     for effect in answer["effects"]:
@@ -65,7 +65,7 @@ def text(diagnosis: Diagnosis, tally: Calibration | None = None) -> str:
 
 
 def _effect_lines(effect: Table) -> list[str]:
-    """Return lines about an effect other than geometric errors and springs."""
+    """Return lines about an effect other than geometric errors or springs."""
     if "combinations" in effect:
         return []
     there = f" in session {effect['session']}" if "session" in effect else ""
@@ -96,7 +96,7 @@ def _small_lines(one: Table | None, name: str) -> list[str]:
 
 
 def _function_lines(one: Table) -> list[str]:
-    """Return two to four lines of text that describe a learned function."""
+    """Describe a learned function in two to four lines."""
     formula, parts = one["formula"], one["parts_of_range"]
     short = formula if len(formula) < 160 else f"{formula[:157]}..."
     lines = [f"learned: {one['label']}", f"  {short}"]
@@ -111,7 +111,7 @@ def _function_lines(one: Table) -> list[str]:
 
 
 def _error_lines(answer: Table) -> list[str]:
-    """Return a table of errors of the declared, the identified and the saved robot."""
+    """Tabulate the errors of the declared, identified and saved robots."""
     error, held = answer["error"], answer["held_out"]
     noise = {**error["noise"], "normalised": answer["noise_scale"]["normalised"]}
     columns = error["before"], error["after"], noise, error["saved"]
@@ -131,7 +131,7 @@ def _error_lines(answer: Table) -> list[str]:
 
 
 def _sequence_lines(answer: Table) -> list[str]:
-    """Return lines about the model sequence, with errors on the held-out rows."""
+    """Return lines about the model sequence with errors on the held-out rows."""
     rows, last = answer["ladder"], math.nan
     unit = rows[-1]["unit"]
     lines = [f"{'model':<20}{'unknowns':>10}{unit:>12}{'sigma':>10}{'reduction':>11}"]
@@ -146,7 +146,7 @@ def _sequence_lines(answer: Table) -> list[str]:
 
 
 def _next_lines(one: Table) -> list[str]:
-    """Return a line about the measurement that discriminates between the models."""
+    """Return a line about the measurement that would discriminate between models."""
     where = ", ".join(f"{k}={v:.4g}" for k, v in one["configuration"].items())
     covariates = "".join(f", {k} {v:g}" for k, v in one["covariates"].items())
     return [

@@ -1,13 +1,13 @@
-"""Run the search of a diagnosis, from readings to the parameters of a machine.
+"""Run the search of a diagnosis, from readings to machine parameters.
 
 Steps:
 
 1. the pose of the measuring frame is estimated if it is unknown;
 2. effects and functions are searched for together (:mod:`.select`);
-3. the machine with these effects is fitted (:mod:`.fit`); second-order terms of its
+3. the machine with these effects is fitted (:mod:`.fit`), second-order terms of its
    geometric errors are added to the model, and step 2 is repeated until they converge.
 
-The search reads only the rows to be fitted.
+The search uses only the rows to be fitted.
 """
 
 from collections.abc import Callable, Mapping
@@ -47,16 +47,16 @@ from forcefit.validation.diagnosis.weighted_readings import NONE
 
 Update = Callable[[str, int, int], None]
 FINITE = next(name for name, effect in LIBRARY.items() if effect.finite)
-# Number of rows for selecting models; the selected model is fitted to all rows.
+# Number of rows for model selection; the selected model is fitted to all rows.
 _SEARCHED = 2000
-# Largest number of searches; each excludes the gross blunders that were found before.
+# Largest number of searches; each excludes the gross blunders found before.
 _TURNS = 6
 _BENDS = 1  # number of repetitions with second-order terms of geometric errors
 _GROSS = 30.0  # smallest rms of a gross blunder / median rms of all rows
 # Functions of time must improve the prediction of other rows by this number of standard
 # errors.
 _CLEARLY = 2.0
-# [sigma] Second-order terms are added if they change a reading by more than this value.
+# [sigma] Second-order terms are added if they change any reading by more.
 _BENT = 0.3
 _RIVALS = (
     3  # largest number of rival machines, for which a next measurement is searched
@@ -68,13 +68,12 @@ class Traced:
     """Result of the search for effects and functions.
 
     Attributes:
-        campaign: campaign of R rows with the estimated sigma and shared noise.  The
-            sigma of a blunder is many times larger.
+        campaign: campaign of R rows with the estimated sigma, which is many times
+            larger for blunders, and the common noise.
         conditions: conditions of all rows, including the registration and the
             second-order terms of geometric errors.
         used: (R,) bool, True for rows that were fitted.
-        outliers: (R,) bool, True for rows that are excluded because they contain a
-            blunder.
+        outliers: (R,) bool, True for rows excluded because of a blunder.
         selected: models with their probabilities.
         columns: columns of the campaign's cells.
     """
@@ -110,13 +109,13 @@ class Traced:
 
     @property
     def _alone(self) -> bool:
-        """Whether the best model contains exactly one effect or function."""
+        """Whether the best model contains a single effect or function."""
         found = self.selected
         device = self.campaign.registration == "unknown"
         return len(found.hypotheses) - device + len(found.functions) == 1
 
     def rivals(self) -> list[Unknowns]:
-        """Return up to three machines with other effects, the most probable first."""
+        """Return up to three machines with other effects, most probable first."""
         states = self.selected.states
         own = frozenset(e.name for e in states[0].elements if e.name)
         found: dict[frozenset[str], Unknowns] = {}
@@ -139,7 +138,7 @@ class Traced:
         return list(found.values())
 
     def _device_frames(self, hypothesis: Hypothesis) -> list[Acting]:
-        """Return the device's estimated pose as hypotheses, one for each session."""
+        """Return the estimated device pose as one hypothesis per session."""
         base = np.broadcast_to(self.conditions.base, (len(self.campaign), 6))
         own = {}
         for session in self.campaign.sessions or (None,):
@@ -151,7 +150,7 @@ class Traced:
 
 
 def _acting(hypothesis: Hypothesis, values: NDArray) -> list[Acting]:
-    """Return a hypothesis with its values, once for each session with parameters."""
+    """Return a hypothesis with its values, once per session with parameters."""
     own = [(in_one_session(hypothesis, s), s) for s in sessions_of(hypothesis)]
     return [Acting(there, values[places], s) for (there, places), s in own]
 
@@ -172,7 +171,7 @@ def trace(
             :class:`.columns.Columns`.
 
     Returns:
-        The identified effects, and the fitted machine with these effects.
+        The identified effects and the machine fitted with them.
 
     Raises:
         BadInput: the pose of the measuring frame is unknown, and the readings do not
@@ -212,14 +211,14 @@ def trace(
 
 
 def _searched_rows(campaign: Campaign, fitted: NDArray) -> NDArray:
-    """Return (R,) bool: rows used to select models, either all or a random sample."""
+    """Return a mask (R,) of rows for model selection, either all or a random sample."""
     chosen = np.zeros(len(campaign), dtype=bool)
     chosen[fitted] = drawn(campaign.measured_at_once[fitted], _SEARCHED)
     return chosen
 
 
 def _without_outlying(traced: Traced, fit: MachineFit) -> tuple[Traced, MachineFit]:
-    """Return the fitted machine without blunders in rows outside the sample."""
+    """Refit the machine without blunders in rows outside the sample."""
     others = traced.used & ~np.isin(np.arange(len(traced.used)), traced.columns.row)
     if not others.any():
         return traced, fit
@@ -235,7 +234,7 @@ def _without_outlying(traced: Traced, fit: MachineFit) -> tuple[Traced, MachineF
 def _with_its_errors(
     campaign: Campaign, declared: Declared, derivatives: Derivatives, fitted: NDArray
 ) -> Derivatives:
-    """Return derivatives with the second-order terms of geometric errors."""
+    """Add the second-order terms of geometric errors to derivatives."""
     conditions, seen = derivatives.conditions, hidden(campaign, ~fitted)
     alone = dict.fromkeys([*LIBRARY, FUNCTION], 0.0)
     columns = Columns(campaign, derivatives, odds=alone)
@@ -244,7 +243,7 @@ def _with_its_errors(
         z = whiten(campaign, campaign.measured - predict(conditions).deviation)
         known = cells & np.isfinite(z)
         selected = select(columns, z[known], known, common=NONE)
-        # A fit takes long, so the errors of the linear estimate are tested first.
+        # Fits are slow, so the errors of the linear estimate are tested first.
         near = selected.states[0].errors
         if declared.bent(seen, conditions, near, _BENT / 3) is None:
             break
@@ -259,12 +258,12 @@ def _with_its_errors(
 
 
 def _errors(fit: MachineFit) -> NDArray:
-    """Return (n, 6) [rad, m] estimated minus declared geometric errors."""
+    """Return estimated minus declared geometric errors (n, 6) [rad, m]."""
     return np.asarray(fit.robot.errors - fit.unknowns.robot.errors)
 
 
 def _gross(campaign: Campaign, fit: MachineFit, used: NDArray) -> NDArray:
-    """Return (R,) bool, True for fitted rows with gross outliers, to be omitted."""
+    """Return a mask (R,) of fitted rows with gross outliers, to be omitted."""
     left = residual_of(campaign, fit.robot) / campaign.sigma
     left = np.where(campaign.cells & used[:, None], left, 0.0)
     count = np.maximum((campaign.cells & used[:, None]).sum(axis=1), 1)
@@ -304,7 +303,7 @@ def _traced(
     good = np.ones(len(columns.row))
     good[cells] = selected.weights
     # The whole row of a blunder is excluded, because its other readings are doubtful
-    # and errors are computed by row.
+    # and errors are computed per row.
     blunders = np.bincount(columns.row, good < 0.5, minlength=len(campaign))
     outliers = (blunders > 0) | impossible_rows(campaign)
     return Traced(
@@ -324,14 +323,14 @@ def _fitted(traced: Traced) -> MachineFit:
         weak = [one for one in fit.unknowns.effects if not supported(fit, one)]
         if not weak:
             return fit
-        # The weakest effect is removed first, because the uncertainties of two
-        # equivalent effects are both large.
+        # The weakest effect is removed first, because two equivalent effects both have
+        # a large uncertainty.
 
         one = min(weak, key=lambda e: _size(fit, e))
         fit = fit_machine(traced.campaign, fit.unknowns.without(one), traced.used)
 
 
 def _size(fit: MachineFit, one: Acting) -> float:
-    """Return the squared change [sigma^2] that an effect causes in fitted readings."""
+    """Return the squared change [sigma^2] of the fitted readings by an effect."""
     x, _, slopes = fit.own(one)
     return float(np.sum((slopes @ x) ** 2))

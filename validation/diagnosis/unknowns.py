@@ -1,8 +1,8 @@
-"""Define the unknown parameters of a machine, and the robot with given parameters.
+"""Define the unknown machine parameters and the robot with given parameters.
 
-A diagnosis determines numbers that are missing in a robot file: library effects,
-geometric errors, compliances of joints and functions.  Together they form a vector x.
-Each x defines a robot that can be saved.
+A diagnosis determines parameters that a robot file lacks: library effects, geometric
+errors, joint compliances and functions.  Together they form a vector x, and each x
+defines a robot that can be saved.
 """
 
 from collections.abc import Mapping
@@ -26,7 +26,7 @@ from forcefit.validation.diagnosis.responses import responses
 from forcefit.validation.diagnosis.sensitivities import Sensitivities
 from forcefit.validation.diagnosis.signatures import conditions_of
 
-# ratio of prior standard deviation to plausible size of an effect's unknown
+# Ratio of prior standard deviation to plausible size of an effect's unknown.
 _WIDE = 1e3
 # Largest change of a function's shape parameter, and its prior standard deviation,
 # relative to its value.
@@ -65,14 +65,14 @@ class Small:
 
 @dataclass(frozen=True, eq=False)
 class Acting:
-    """An effect of the library that acts in all rows or in one session.
+    """A library effect that acts in all rows or in one session.
 
     Attributes:
-        hypothesis: the effect with its frames and unknowns.
+        hypothesis: effect with its frames and unknowns.
         mean: (k,) prior means, which are also the start values of a fit.
         session: session in which the effect acts, None for all sessions.
         device: whether the effect is the pose of a measuring frame, which is always
-            unknown.
+            fitted.
     """
 
     hypothesis: Hypothesis
@@ -98,7 +98,7 @@ class Acting:
 
 @dataclass(frozen=True, eq=False)
 class LearnedFunction:
-    """A function of the machine with unknown coefficients.
+    """A learned function with unknown coefficients.
 
     Attributes:
         candidate: places, variables and form of the function.
@@ -133,7 +133,7 @@ class Unknowns:
 
     Attributes:
         robot: declared robot with the effects of its file.
-        effects: effects of the library, including the registration.
+        effects: library effects, including the registration.
         small: geometric errors and joint compliances.
         functions: learned functions.
         sensitivities: derivatives by which functions are normalised; None without
@@ -151,7 +151,7 @@ class Unknowns:
 
     @cached_property
     def places(self) -> list[tuple[Part, slice]]:
-        """Each part of the parameter vector x with its slice, in the order of x."""
+        """Parts of the parameter vector x and their slices, in the order of x."""
         parts: list[Part] = [*self.effects, *self.small, *self.functions]
         ends = np.cumsum([len(part) for part in parts]).tolist()
         return [
@@ -159,7 +159,7 @@ class Unknowns:
         ]
 
     def place(self, part: Part) -> slice:
-        """Return the slice of one part in the parameter vector x."""
+        """Return the slice of a part in the parameter vector x."""
         return next(own for one, own in self.places if one is part)
 
     @property
@@ -199,7 +199,7 @@ class Unknowns:
         return robot
 
     def _effects_at(self, x: NDArray) -> dict[str | None, dict[str, dict[str, float]]]:
-        """Return the effects that are added to the file, for all rows or a session."""
+        """Return the effects to add to the file, for all rows or a session."""
         found: dict[str | None, dict[str, dict[str, float]]] = {}
         for one in self.effects:
             values = one.hypothesis.public(
@@ -249,13 +249,13 @@ class Unknowns:
         return np.nan_to_num(J, nan=0.0, posinf=0.0, neginf=0.0)
 
     def without(self, effect: Acting) -> "Unknowns":
-        """Return the unknowns after removing the unknowns of one effect."""
+        """Remove the unknowns of one effect."""
         kept = tuple(one for one in self.effects if one is not effect)
         return replace(self, effects=kept)
 
 
 def effects_in(robot: Robot, session: str | None) -> Mapping[str, Values]:
-    """Return the effects in a robot's file for all rows, or for one session only."""
+    """Return a robot's effects for all rows, or for one session only."""
     if session is None:
         return robot.effects
     return robot.session_effects.get(session, {})
@@ -264,7 +264,7 @@ def effects_in(robot: Robot, session: str | None) -> Mapping[str, Values]:
 def with_effects_in(
     robot: Robot, session: str | None, effects: Mapping[str, Values]
 ) -> Robot:
-    """Return a robot with different effects for all rows, or for one session only."""
+    """Replace a robot's effects for all rows, or for one session only."""
     if session is None:
         return replace(robot, effects=effects)
     sessions = {**robot.session_effects, session: effects}
@@ -281,7 +281,7 @@ def _linear(conditions: Conditions) -> Conditions:
 
 
 def _resting_as(conditions: Conditions, held: Conditions) -> Conditions:
-    """Return conditions with the rest positions of ``held``; new frames are at 0."""
+    """Give conditions the rest positions of ``held``; new frames are at 0."""
     assert held.rest is not None
     rest = np.zeros_like(conditions.errors)
     for row, frame in enumerate(conditions.robot.frames):

@@ -1,4 +1,4 @@
-"""Determine the verdict of a diagnosis from the probabilities of models."""
+"""Determine the verdict of a diagnosis from model probabilities."""
 
 from forcefit.assembly.model.statuses import (
     AMBIGUOUS,
@@ -21,8 +21,8 @@ def by_names(selected: Selected) -> Sets:
     """Return the probabilities of sets of effects, the most probable first.
 
     Returns:
-        The names of the effects, and the probability, of each set.  If a model contains
-        a function, its last name is ``"function"``.
+        The effect names and the probability of each set.  If a model contains a
+        function, its last name is ``"function"``.
     """
     weights: dict[tuple[str, ...], float] = {}
     for model in selected.models:
@@ -36,7 +36,7 @@ def verdict(
     selected: Selected, names: tuple[str, ...], *, functions: bool, small: bool,
     more_than_noise: bool,
 ) -> tuple[str, tuple[str, ...]]:  # fmt: skip
-    """Return the verdict, and the claimed effects.
+    """Return the verdict and the claimed effects.
 
     Args:
         selected: models with their probabilities.

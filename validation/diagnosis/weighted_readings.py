@@ -1,4 +1,4 @@
-"""Store weighted readings and columns of the fitted cells, and cache inner products."""
+"""Store weighted readings and columns of the fitted cells; cache inner products."""
 
 from collections.abc import Sequence
 
@@ -15,17 +15,16 @@ NONE = (0.0, 0.0)  # standard deviations if there is no shared noise
 
 
 class WeightedReadings:
-    """Weighted readings of the fitted cells, after projecting out the device's pose.
+    """Weighted readings of the fitted cells, with the device pose projected out.
 
     Attributes:
         columns: columns of all N cells.
         given: (n,) whitened residual of the fitted cells.
         cells: (N,) mask of the fitted cells.
         weights: (n,) relative precisions, 1 for a reading that is not a blunder.
-        common: [rad, m] standard deviations, divided by tau, of the platform's rotation
-            and translation that all cells of a measurement share.
-        sampled: (n,) bool, True for cells by which functions are scored in the first
-            step.
+        common: [rad, m] standard deviations, divided by tau, of the random platform
+            motion that is common to the cells of a measurement.
+        sampled: (n,) mask of the cells on which functions are scored first.
         whiten: transformation of the fitted cells to independent noise.
         flat: (n, f) orthonormal columns of the measuring frame, which has a flat prior.
         z: (n,) whitened residual after projecting out the measuring frame.
@@ -66,7 +65,7 @@ class WeightedReadings:
         return columns - self.flat @ (self.flat.T @ columns)
 
     def sample(self, common: tuple[float, float]) -> "WeightedReadings":
-        """Return the readings of the sampled rows for a given shared noise."""
+        """Return the readings of the sampled rows for given common noise."""
         cells, some = self.cells.copy(), self.sampled
         cells[cells] = some
         return WeightedReadings(
@@ -83,7 +82,7 @@ class WeightedReadings:
         return B
 
     def products(self, elements: Sequence[Element]) -> tuple[NDArray, NDArray]:
-        """Return products of m columns with nuisance columns, (k, m), and (m, m)."""
+        """Return products of m columns with nuisance columns and themselves."""
         for i, e in enumerate(elements):
             missing = [o for o in (None, *elements[: i + 1])
                        if (e, o) not in self._inner]  # fmt: skip
@@ -105,7 +104,7 @@ class WeightedReadings:
         return self._eigen[e]
 
     def without_offsets(self, elements: Sequence[Element]) -> NDArray:
-        """Return the (n,) readings minus the offsets of the elements."""
+        """Return the readings (n,) minus the offsets of the elements."""
         z = self.z
         for e in elements:
             if e.offset is not None:

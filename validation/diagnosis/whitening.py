@@ -1,8 +1,8 @@
-r"""Transform the noise that points of a measurement share to independent noise.
+r"""Whiten noise that is common to the points of a measurement.
 
 One measurement may contain several points of the platform.  The noise of its cells,
-divided by the declared sigma, is e + L n.  Here e is independent noise of variance 1/w.
-The k independent standard normal variables n are common to all cells of the
+divided by the declared sigma, is e + L n, where e is independent noise of variance 1/w
+and the k independent standard normal variables n are common to all cells of the
 measurement.
 
 ======  ===============  =======  ====================================================
@@ -30,7 +30,7 @@ from forcefit.validation.campaign.campaign import Campaign
 
 @dataclass(frozen=True, eq=False)
 class Whitening:
-    """Linear map of n cells to cells of independent noise of variance one.
+    """Linear map of n cells to cells with independent noise of unit variance.
 
     Attributes:
         root: (n,) square roots of the relative precisions.
@@ -43,20 +43,20 @@ class Whitening:
     log_det: float = 0.0
 
     def __call__(self, values: NDArray) -> NDArray:
-        """Return W times (n,) or (n, m) values that are divided by sigma."""
+        """Return W times values (n,) or (n, m), which are divided by sigma."""
         if self.matrix is not None:
             return np.asarray(self.matrix @ values)
         return values * (self.root if values.ndim == 1 else self.root[:, None])
 
     def inverse(self, values: NDArray) -> NDArray:
-        """Return the (n,) values over sigma before this transformation."""
+        """Undo this transformation; return values (n,) divided by sigma."""
         if self.matrix is not None:
             return np.asarray(spsolve(self.matrix, values))
         return values / self.root
 
 
 def whitening(root: NDArray, loadings: NDArray | None, visit: NDArray) -> Whitening:
-    """Return the transformation of n cells to independent noise.
+    """Return the whitening transformation of n cells.
 
     ``root`` (n,) are the square roots of the relative precisions.  ``loadings`` (n, k)
     are the changes of the cells, divided by sigma, per shared variable.  ``visit`` (n,)
@@ -82,7 +82,7 @@ def whitening(root: NDArray, loadings: NDArray | None, visit: NDArray) -> Whiten
 
 
 def _of_one_size(visit: NDArray) -> Iterator[NDArray]:
-    """Yield (V, m) cells of all measurements that contain m cells, for every m."""
+    """Yield the cells (V, m) of all measurements with m cells, for every m."""
     order = np.argsort(visit, kind="stable")
     _, start, count = np.unique(visit[order], return_index=True, return_counts=True)
     for size in np.unique(count).tolist():
@@ -91,7 +91,7 @@ def _of_one_size(visit: NDArray) -> Iterator[NDArray]:
 
 
 def whitening_of(campaign: Campaign, cells: NDArray) -> Whitening:
-    """Return the transformation of cells (R, 6) bool for the noise of a campaign."""
+    """Return the whitening transformation of cells (R, 6) for a campaign's noise."""
     row, _ = np.nonzero(cells)
     loadings = None
     if campaign.common is not None:
@@ -101,7 +101,7 @@ def whitening_of(campaign: Campaign, cells: NDArray) -> Whitening:
 
 
 def independent(campaign: Campaign, residual: NDArray) -> NDArray:
-    """Return the N cells of a residual (R, 6) [rad, m] with independent noise.
+    """Return the N whitened cells of a residual (R, 6) [rad, m].
 
     If the residual is noise, the result (N,) has unit variance.  Values that are
     not finite count as zero.
@@ -112,7 +112,7 @@ def independent(campaign: Campaign, residual: NDArray) -> NDArray:
 
 
 def size_of_noise(campaign: Campaign) -> NDArray:
-    """Return the (R, 6) [rad, m] standard deviations of readings with shared noise."""
+    """Return the standard deviations (R, 6) [rad, m] of readings with common noise."""
     if campaign.common is None:
         return campaign.sigma
     return np.sqrt(campaign.sigma**2 + np.sum(campaign.common**2, axis=2))
@@ -128,7 +128,7 @@ def platform_motions(campaign: Campaign, reading: NDArray) -> NDArray | None:
 
     Returns:
         (R, 6, 6) [rad, m] change per unit rotation about the centre of the measured
-        points, and per unit translation.  None if no measurement contains several
+        points and per unit translation.  None if no measurement contains several
         points.
     """
     visit = campaign.measured_at_once[campaign.cells.any(axis=1)]

@@ -1,4 +1,4 @@
-"""Import files of measuring devices as campaigns.
+"""Import measuring-device files as campaigns.
 
 Start with ``tracker.py``.
 """

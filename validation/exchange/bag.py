@@ -1,8 +1,7 @@
-"""Read points, poses and transforms from ROS bags with the package ``rosbags``.
+"""Read points, poses and transforms from ROS bags, using the package ``rosbags``.
 
-A bag is a rosbag2 folder (SQLite or MCAP) or a ROS 1 ``.bag``.  The name of a reading
-consists of its topic and its frame.  Its time is the stamp of the message.  Lengths are
-in metres.
+A bag is a rosbag2 folder (SQLite or MCAP) or a ROS 1 ``.bag``.  A reading is named
+after its topic and frame, and its time is the message stamp.  Lengths are in metres.
 """
 
 import os
@@ -30,11 +29,11 @@ def is_bag(path: Path | str) -> bool:
 
 
 def read_bag(path: Path | str, oriented: bool = False) -> list[Reading]:
-    """Return the readings of all points, poses and transforms in a bag.
+    """Return all points, poses and transforms in a bag as readings.
 
     Args:
         path: a rosbag2 folder or a ROS 1 bag.
-        oriented: whether orientations are read; otherwise they are ignored.
+        oriented: whether to read orientations or ignore them.
 
     Returns:
         The readings in the recorded order.
@@ -73,7 +72,7 @@ def read_bag(path: Path | str, oriented: bool = False) -> list[Reading]:
 
 
 def _places(message: Any) -> Iterator[tuple[str, Any, Any, Any]]:
-    """Yield frame, header, position and quaternion (or None) of a message's points."""
+    """Yield the frame, header, position and quaternion (or None) of each point."""
     for one in getattr(message, "transforms", [message]):
         if hasattr(one, "transform"):
             T = one.transform
@@ -88,7 +87,7 @@ def _places(message: Any) -> Iterator[tuple[str, Any, Any, Any]]:
 def _reading(
     path: str, number: int, names: tuple[str, ...], header: Any, place: Any, turn: Any
 ) -> Reading:
-    """Return one point of a bag; its ``line`` is the number of the message."""
+    """Return one point of a bag, whose ``line`` is the message number."""
     position = np.array([place.x, place.y, place.z], dtype=float)
     if np.isnan(position).any():
         position[:] = np.nan  # the device saw no target

@@ -1,4 +1,4 @@
-"""Write the texts of an imported campaign: its table and ``campaign.toml``."""
+"""Write the table and the ``campaign.toml`` of an imported campaign."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -21,7 +21,7 @@ def columns_of(
     commands: Commands, rows: Rows, gaps: NDArray, turns: NDArray, frame: DeviceFrame,
     names: Sequence[str],
 ) -> dict[str, NDArray]:  # fmt: skip
-    """Return the columns of the campaign's table, in SI units.
+    """Return the columns of the campaign table in SI units.
 
     Args:
         commands: the commands.
@@ -78,7 +78,7 @@ def spreads(rows: Rows, frame: DeviceFrame, names: Sequence[str]) -> NDArray:
 
 
 def labels_of(commands: Commands, rows: Rows) -> list[str]:
-    """Return the labels of the rows: the id of the command, numbered if it is repeated.
+    """Label the rows by the command id, numbering repeats.
 
     Args:
         commands: the commands.
@@ -97,27 +97,27 @@ def labels_of(commands: Commands, rows: Rows) -> list[str]:
 
 
 def cell(value: float) -> str:
-    """Return a number as text with all digits; an empty text for NaN."""
+    """Format a number with all its digits, or NaN as an empty text."""
     return repr(float(value)) if np.isfinite(value) else ""
 
 
 def declaration(
     declared: TargetsFile, folder: Path, spread: NDArray, turned: bool
 ) -> str:
-    """Return the text of ``campaign.toml``.
+    """Return the text of ``campaign.toml`` for an imported campaign.
 
     Args:
         declared: content of the targets file.
         folder: folder of the campaign.
-        spread: (..., 3) [m] standard deviations from the files of the readings; NaN if
-            they are absent.
+        spread: (..., 3) [m] standard deviations stated with the readings; NaN if
+            absent.
         turned: whether orientations were measured.
 
     Returns:
         The text of the file.
 
     Raises:
-        BadInput: the standard deviation of a reading is given neither with the reading
+        BadInput: the standard deviation of a reading is stated neither with the reading
             nor in the targets file.
     """
     name = declared.robot_name

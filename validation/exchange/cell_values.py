@@ -1,4 +1,4 @@
-"""Convert numbers of a device's table to metres, and detect cells without a reading."""
+"""Convert numbers in a device table to metres and detect missing readings."""
 
 from dataclasses import dataclass
 
@@ -14,13 +14,13 @@ _NO_READING = {"", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--", "---"}
 
 
 def missing(cell: str) -> bool:
-    """Return whether the text of a cell means that there is no reading."""
+    """Return whether the text of a cell denotes a missing reading."""
     return cell.lower() in _NO_READING
 
 
 @dataclass(frozen=True, eq=False)
 class CellValues:
-    """Numeric values of a table's cells.
+    """Numeric values of the cells of a table.
 
     Attributes:
         sheet: the table.
@@ -38,7 +38,7 @@ class CellValues:
         return self.number(line, name, cell) * self.unit(self.header.columns[k].unit)
 
     def unit(self, stated: str) -> float:
-        """Return the unit of a column: its own, the declared one, or the file's."""
+        """Return the unit of a column, as stated, declared or given by the file."""
         path, declared, found = self.sheet.file, self.writing.unit, self.header.unit
         if not stated and declared and found:
             if LENGTHS[found] != LENGTHS[declared]:

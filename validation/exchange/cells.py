@@ -1,4 +1,4 @@
-"""Read the text and cells of a device's table, in the encodings of common programs."""
+"""Read the cells of a device table, in the encodings of common programs."""
 
 import codecs
 import csv
@@ -42,8 +42,8 @@ def read_sheet(path: Path | str, decimal: str = ".") -> Sheet:
 
     Args:
         path: a text file in UTF-8, UTF-16 or Latin-1.
-        decimal: the declared decimal mark; in a comma-separated table the mark is a
-            point, unless a number in quotes contains a comma.
+        decimal: declared decimal mark.  In a comma-separated table it is a point unless
+            a quoted number contains a comma.
 
     Returns:
         The table.
@@ -75,7 +75,7 @@ def read_sheet(path: Path | str, decimal: str = ".") -> Sheet:
 def _with_names_of_words(
     lines: Sequence[tuple[int, str]], rows: Sequence[tuple[int, list[str]]]
 ) -> list[tuple[int, list[str]]]:
-    """Join the words of each heading if blanks separate the cells of a table."""
+    """Join the words of each heading in a table whose cells are separated by blanks."""
     usual = Counter(len(cells) for _, cells in rows).most_common(1)[0][0]
     return [
         (number, wide)
@@ -87,7 +87,7 @@ def _with_names_of_words(
 
 
 def _text(path: Path | str) -> str:
-    """Return the text of a file in UTF-8, UTF-16 or Latin-1, with equal line ends."""
+    """Return the text of a file in UTF-8, UTF-16 or Latin-1, with uniform line ends."""
     content = read_bytes(path)
     if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         encodings = ["utf-16"]
@@ -115,7 +115,7 @@ def _text(path: Path | str) -> str:
 
 
 def _mark(lines: Sequence[str], decimal: str) -> str:
-    """Return the separator in most lines; of several, the most common one."""
+    """Return the separator that occurs in most lines, or the most frequent in a tie."""
     for mark in _MARKS:
         if 2 * sum(mark in line for line in lines) < len(lines):
             continue

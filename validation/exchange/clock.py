@@ -15,7 +15,7 @@ _CLOCK = re.compile(r"\d{1,2}:\d{2}:\d{2}(?:[.,]\d+)?(?: ?[APap][Mm])?")
 
 
 def parse_time(place: str, text: str, writing: Writing) -> float:
-    """Return a time [s]: seconds, time of day, ISO 8601, 14 digits, or date and time.
+    """Return a time [s] given in seconds, as time of day, ISO 8601, 14 digits, or date.
 
     Args:
         place: file and line, for messages.
@@ -24,7 +24,7 @@ def parse_time(place: str, text: str, writing: Writing) -> float:
             slashes.
 
     Returns:
-        Seconds on the clock of the file.  Only differences of times are meaningful.
+        Seconds on the clock of the file, of which only differences are meaningful.
 
     Raises:
         BadInput: the text has none of these forms.
@@ -61,7 +61,7 @@ def parse_time(place: str, text: str, writing: Writing) -> float:
 
 
 def _dated(year: str, month: str, day: str, clock: str) -> float:
-    """Return the time [s] of a date and a time of day, 10:30:00.25 or 9:30:00 PM."""
+    """Return the time [s] of a date and a time such as 10:30:00.25 or 9:30:00 PM."""
     clock = clock.replace(",", ".")
     half = clock[-2:].upper() if clock[-1:] in {"M", "m"} else ""
     clock = clock[: len(clock) - len(half)].strip()
@@ -74,5 +74,5 @@ def _dated(year: str, month: str, day: str, clock: str) -> float:
 
 
 def _seconds(text: str, style: str) -> float:
-    """Return the time [s] since 1970 of a text in UTC."""
+    """Return the seconds since 1970 of a UTC time in a given style."""
     return datetime.strptime(text, style).replace(tzinfo=UTC).timestamp()

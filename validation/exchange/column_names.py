@@ -1,4 +1,4 @@
-"""Find the meaning of a column of a device's table from its name."""
+"""Determine the meaning of a device table's columns from their names."""
 
 import re
 from dataclasses import dataclass
@@ -49,13 +49,13 @@ class Column:
 
 
 def column_of(cell: str) -> Column:
-    """Return the meaning of a column, determined only from its name.
+    """Return the meaning of a column, given only its name.
 
     Args:
         cell: cell of the header.
 
     Returns:
-        The meaning of the column without its target.
+        The meaning of the column, without its target.
     """
     stated = _UNIT.search(cell)
     unit = (stated[1] or stated[2] or "") if stated else ""
@@ -87,7 +87,7 @@ def unit_word(text: str) -> str:
     """Return the short name of a unit.
 
     Args:
-        text: text such as Millimeters, inch, ° or mm.
+        text: a name such as Millimeters, inch, ° or mm.
 
     Returns:
         The short name; empty if the text is not a unit of length or angle.

@@ -1,4 +1,4 @@
-"""Read the table of the machine's commands for an import of measured data."""
+"""Read the table of machine commands for an import of measured data."""
 
 import re
 from collections.abc import Mapping
@@ -23,7 +23,7 @@ from forcefit.validation.exchange.clock import parse_time
 from forcefit.validation.exchange.reading import Writing
 
 _UNIT = re.compile(r"\s*[\[(]\s*([^\])]*?)\s*[\])]$")
-# Units of a temperature difference, with their factors to K.
+# Units of temperature differences, with their factors to K.
 _TEMPERATURES = {"K": 1.0, "degC": 1.0, "°C": 1.0, "C": 1.0}
 _INCHES = {"cm": 1e-2, "in": 0.0254, "inch": 0.0254}
 
@@ -115,7 +115,7 @@ def read_commands(path: Path | str, robot: Robot, writing: Writing) -> Commands:
 
 
 def _check_label(place: str, label: str, seen: Mapping[str, int]) -> None:
-    """Reject a missing label and a repeated label."""
+    """Reject a missing or duplicate label."""
     if not label:
         raise BadInput(f"{place}: found an empty cell, expected a label")
     if label in seen:
@@ -126,7 +126,7 @@ def _check_label(place: str, label: str, seen: Mapping[str, int]) -> None:
 
 
 def _decimal_hint(cell: str, decimal: str) -> str:
-    """Return a hint if a cell contains the other decimal mark."""
+    """Return a hint if a cell contains the wrong decimal mark."""
     other = "," if decimal == "." else "."
     if not np.isfinite(parse_number(cell, other)):
         return ""
@@ -137,7 +137,7 @@ def _decimal_hint(cell: str, decimal: str) -> str:
 
 
 def _factor(path: Path | str, name: str, column: str, robot: Robot) -> float:
-    """Return the factor from the unit of a column to SI."""
+    """Return the factor that converts a column to SI units."""
     stated = _UNIT.search(column)
     if not stated:
         return 1.0
@@ -152,7 +152,7 @@ def _factor(path: Path | str, name: str, column: str, robot: Robot) -> float:
 
 
 def _units(name: str, robot: Robot) -> Mapping[str, float] | None:
-    """Return the accepted units of a column with factors; None if any is allowed."""
+    """Return the accepted units of a column with factors, or None if any is allowed."""
     lengths = UNITS["command_position"] | _INCHES
     if name in {"time", "cov.time"}:
         return UNITS["time"]
@@ -172,7 +172,7 @@ def _placed(
     path: Path | str, robot: Robot, ids: list[str], columns: dict[str, NDArray],
     joints: list[str],
 ) -> list[Posture]:  # fmt: skip
-    """Return the posture of each command."""
+    """Compute the posture of each command."""
     given = [name for name in joints if name in columns]
     posed = any(name.startswith("pose.") for name in columns)
     if posed == bool(given) or (given and len(given) < len(joints)):

@@ -1,9 +1,9 @@
-"""Check the unit of lengths and the axes in a device's export.
+"""Check the length unit and the axes of a device export.
 
-A wrong unit multiplies all distances by one factor.  Left-handed axes mirror the
-readings, which no pose of the device can explain.  Such files are refused and not
-corrected, because the wrong setting of the device may also affect data that cannot be
-checked here.
+A wrong unit multiplies all distances by one factor, and left-handed axes mirror the
+readings, which no device pose can explain.  Such files are rejected rather than
+corrected, because the wrong device setting may also affect data that cannot be checked
+here.
 
 Sources:
     Umeyama (1991), Least-squares estimation of transformation parameters between two
@@ -22,8 +22,7 @@ from forcefit.validation.exchange.device_frame import robust_frame, scatter_of
 from forcefit.validation.exchange.reading import LENGTHS
 
 _UNITS = {**LENGTHS, "ft": 0.3048}
-# Corrected readings fit far better if their scatter is below this fraction of the
-# uncorrected scatter.
+# Corrected readings fit far better if they reduce the scatter below this fraction.
 _FAR_BETTER = 0.25
 _SCALED = 0.02  # largest relative scatter of distance ratios for a wrong unit
 # Accepted relative error of the factor between two units, which errors of the robot
@@ -34,7 +33,7 @@ _PAIRED = 10
 # Largest accepted difference between measured and declared distance of two targets,
 # relative to the declared distance.
 _APART = 0.1
-# Reversal of one axis; reversals of other axes differ only by a rotation.
+# Reversal of one axis; reversing a different axis differs only by a rotation.
 _MIRRORED = np.array([1.0, -1.0, 1.0])
 
 
@@ -50,7 +49,8 @@ def check_axes(
         known: whether the axes of the device equal the axes of the base.
 
     Raises:
-        BadInput: the readings fit far better in a different unit or in different axes.
+        BadInput: the readings fit far better in a different unit or with different
+            axes.
     """
     scatter = _scatter(measured, nominal, known)
     factor, meant = _units_of(_factor(measured, nominal, known))
@@ -78,7 +78,7 @@ def check_axes(
 def check_targets(
     file: Path, places: Mapping[str, NDArray], measured: NDArray
 ) -> list[str]:
-    """Compare measured distances between targets with the declared distances.
+    """Compare the measured distances between targets with the declared distances.
 
     Args:
         file: the targets file, for messages.
@@ -87,11 +87,10 @@ def check_targets(
         measured: (R, T, 3) [m] positions of the targets in each row; NaN if not read.
 
     Returns:
-        Remarks about pairs of targets whose distance differs from the declared
-        distance.
+        Remarks about pairs of targets whose measured and declared distances differ.
 
     Raises:
-        BadInput: all distances differ by one common factor.
+        BadInput: all distances differ by a common factor.
     """
     names, ratios, remarks = list(places), [], []
     for i, j in combinations(range(len(names)), 2):
@@ -121,7 +120,7 @@ def check_targets(
 
 
 def _units_of(factor: float) -> tuple[float, str]:
-    """Return the nearest factor between two units and their names, or 1 and ""."""
+    """Return the nearest factor between two units and its description, or 1 and ""."""
     found = [
         (_UNITS[b] / _UNITS[a], f"as {b} taken for {a}", a, b)
         for a, b in permutations(_UNITS, 2)
@@ -132,10 +131,10 @@ def _units_of(factor: float) -> tuple[float, str]:
 
 
 def _factor(measured: NDArray, nominal: NDArray, known: bool) -> float:
-    """Return the ratio of nominal to measured distances, robust against blunders."""
+    """Return a blunder-resistant ratio of nominal to measured distances."""
     if known:
         pairs = [(measured, nominal)]
-    # Distances between readings do not depend on the pose of the device.
+    # Distances between readings are independent of the device pose.
     else:
         shifts = range(1, min(len(measured), _PAIRED))
         pairs = [
@@ -149,7 +148,7 @@ def _factor(measured: NDArray, nominal: NDArray, known: bool) -> float:
 
 
 def _scatter(measured: NDArray, nominal: NDArray, known: bool) -> float:
-    """Return the scatter [m] about the best frame, or about the known base frame."""
+    """Return the scatter [m] about the best-fit frame or the known base frame."""
     if known:
         return scatter_of(np.linalg.norm(measured - nominal, axis=1))
     return robust_frame(measured, nominal)[1]

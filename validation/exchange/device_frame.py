@@ -1,4 +1,4 @@
-"""Estimate the pose of the device, and find exchanged targets and blunders."""
+"""Estimate the device pose and find exchanged targets and blunders."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 # Deviations above this multiple of the scatter of all readings are not caused by a
 # machine.
 _GROSS = 20.0
-# An exchange of targets is accepted if it reduces the misfit below this fraction of the
-# misfit without the exchange.
+# Targets count as exchanged if exchanging them reduces the misfit below this fraction.
 _BETTER = 0.25
 _MOST = 6  # largest number of targets for which all 720 orders are tried
 
@@ -34,7 +33,7 @@ class DeviceFrame:
 
 
 def fit_frame(measured: NDArray, nominal: NDArray) -> DeviceFrame:
-    """Return the frame that fits measured points to nominal points by least squares.
+    """Return the least-squares frame that fits measured to nominal points.
 
     Args:
         measured: (N, 3) [m] points in device axes.
@@ -51,13 +50,13 @@ def fit_frame(measured: NDArray, nominal: NDArray) -> DeviceFrame:
 
 
 def spans_a_plane(points: NDArray) -> bool:
-    """Return whether (N, 3) points determine a frame, that is, are not on one line."""
+    """Return whether points (N, 3) determine a frame, that is, are not collinear."""
     sizes = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
     return len(points) > 2 and bool(sizes[1] > 1e-6 * sizes[0] > 0)
 
 
 def robust_frame(measured: NDArray, nominal: NDArray) -> tuple[DeviceFrame, float]:
-    """Fit the device's frame without grossly wrong points; return also the scatter.
+    """Fit the device frame, excluding gross errors; also return the scatter.
 
     Args:
         measured: (N, 3) [m] points in device axes.
@@ -79,7 +78,7 @@ def robust_frame(measured: NDArray, nominal: NDArray) -> tuple[DeviceFrame, floa
 
 
 def scatter_of(gaps: NDArray) -> float:
-    """Return the robust scatter [m] of (N,) distances, at least the rounding error."""
+    """Return a robust scatter [m] of distances (N,), at least the round-off."""
     # The median length of a Gaussian vector in space is 1.538 times the sigma of one
     # component.
     return float(np.median(gaps)) / 1.538 + 1e-12
@@ -93,7 +92,7 @@ def is_gross(gap: float, scatter: float) -> bool:
 def exchanged_throughout(
     measured: Sequence[NDArray], nominal: Sequence[NDArray]
 ) -> tuple[int, ...] | None:
-    """Return an order of the targets that fits far better than the given order.
+    """Return a target order that fits far better than the given one, if there is one.
 
     Args:
         measured: for each target (R, 3) [m] positions in device axes; NaN if not
@@ -101,8 +100,8 @@ def exchanged_throughout(
         nominal: for each target (R, 3) [m] positions in base axes.
 
     Returns:
-        For each target the index of the target that was measured; None if the names are
-        correct.
+        For each target, the index of the target that was actually measured; None if the
+        names are correct.
     """
     count = len(measured)
     if not 2 <= count <= _MOST:
@@ -123,7 +122,7 @@ def exchanged_throughout(
 def exchanged_here(measured: NDArray, nominal: NDArray, scatter: float) -> (
     tuple[int, ...] | None
 ):  # fmt: skip
-    """Return the targets of one row that were exchanged.
+    """Find exchanged targets in one row.
 
     Args:
         measured: (k, 3) [m] points in base axes.
@@ -131,8 +130,8 @@ def exchanged_here(measured: NDArray, nominal: NDArray, scatter: float) -> (
         scatter: [m] scatter of all readings.
 
     Returns:
-        For each target the index of the target that was measured; None if no targets
-        were exchanged.
+        For each target, the index of the target that was actually measured; None if no
+        targets were exchanged.
     """
     count = len(measured)
     own = np.linalg.norm(measured - nominal, axis=1).max(initial=0.0)

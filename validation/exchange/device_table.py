@@ -1,11 +1,11 @@
-"""Read exports of measuring devices: tables of points with names and units.
+"""Read the tables of points that measuring devices export.
 
 The reader accepts SpatialAnalyzer text (``collection::group::point``), exports of
 Leica, FARO, API, Vicon and OptiTrack software, and plain tables.  The cells of a plain
-table are separated by blanks, tabs, semicolons or commas.  A header and lines before
-the header are optional.  The reader does not guess the format.  Units must be given in
-the table or in the targets file.  A decimal comma and the orders of dates and angles
-must be given in the targets file.
+table are separated by blanks, tabs, semicolons or commas.  A header and a preamble are
+optional.  The reader does not guess: units must be stated in the table or in the
+targets file, and a decimal comma and the order of dates and angles must be declared in
+the targets file.
 """
 
 import re
@@ -31,7 +31,7 @@ from forcefit.validation.exchange.orientation import (
 from forcefit.validation.exchange.plain_rows import read_plain_rows
 from forcefit.validation.exchange.reading import Reading, Writing
 
-# headings of the angles and distances that a tracker measures
+# Headings of the angles and distances that a tracker measures.
 _SPHERICAL = {"az", "azimuth", "el", "elevation", "hz", "range", "distance", "theta"}
 
 
@@ -47,8 +47,7 @@ def read_device_table(
             axes.  A table may contain separate columns for each target.
 
     Returns:
-        The readings in the order of the file.  A row with several targets is converted
-        to several readings.
+        The readings in file order.  A row with several targets yields several readings.
 
     Raises:
         BadInput: the file contains no coordinates or no unit, or a cell is neither a
@@ -75,7 +74,7 @@ def read_device_table(
 def _refuse_other_headings(
     path: Path | str, rows: Sequence[tuple[int, list[str]]]
 ) -> None:
-    """Raise BadInput if the row above the data names other columns than x, y, z."""
+    """Raise BadInput if the row above the data names columns other than x, y, z."""
     if len(rows) < 2:
         return
     (line, heads), (_, cells) = rows[-2:]
@@ -88,7 +87,7 @@ def _refuse_other_headings(
 
 
 def _lacking(cells: Sequence[str]) -> str:
-    """Return the first of x, y, z that is missing in the headings of a line."""
+    """Return the first of x, y, z that is missing among the headings of a line."""
     words = " ".join(cells).lower().split()
     return next((axis for axis in "xyz" if axis not in words), "x")
 
@@ -105,7 +104,7 @@ class _HeadedRows:
     values: CellValues
 
     def readings(self, line: int, cells: list[str]) -> list[Reading]:
-        """Return the readings of a row: one for each target that has columns."""
+        """Return the readings of a row, one for each target with columns."""
         header = self.values.header
         place = f"{self.values.sheet.file}: line {line}"
         while len(cells) > len(header.cells) and not cells[-1]:
@@ -148,7 +147,7 @@ class _HeadedRows:
         self, line: int, cells: list[str], names: tuple[str, ...], own: list[int],
         time: float,
     ) -> Reading:  # fmt: skip
-        """Return a target's reading of a row."""
+        """Return the reading of one target in a row."""
         columns, writing = self.values.header.columns, self.values.writing
         position, sigma = np.full(3, np.nan), np.full(3, np.nan)
         for k in own:

@@ -1,4 +1,4 @@
-"""Find the header of a device's table, and the target of each column."""
+"""Find the header of a device table and the target of each column."""
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
@@ -27,7 +27,7 @@ class Header:
         first: index of the first row of data among the rows of the table.
         cells: unchanged cells of the header; empty if there is no header.
         columns: meaning of each column.
-        unit: unit of lengths in the lines before the header; empty if there is none.
+        unit: unit of lengths stated before the header; empty if there is none.
         unit_line: number of the line with this unit, for messages.
     """
 
@@ -41,7 +41,7 @@ class Header:
 def find_header(
     rows: Sequence[tuple[int, list[str]]], targets: Iterable[str]
 ) -> Header | None:
-    """Find the header of a table, which may follow other lines.
+    """Find the header of a table, which other lines may precede.
 
     Args:
         rows: line number and cells of each row of the table.
@@ -76,7 +76,7 @@ def find_header(
 
 
 def without_header(rows: Sequence[tuple[int, list[str]]], decimal: str) -> Header:
-    """Find the first row of a table without a header, and the unit before this row.
+    """Find the first row of a headerless table, and the unit stated before it.
 
     Args:
         rows: line number and cells of each row of the table.
@@ -95,11 +95,11 @@ def without_header(rows: Sequence[tuple[int, list[str]]], decimal: str) -> Heade
 def _by_target(
     cells: Sequence[str], before: Sequence[tuple[int, list[str]]], targets: list[str]
 ) -> list[Column]:
-    """Return the columns of a table with several targets in a row, or nothing.
+    """Return the columns of a table with several targets per row, if it is one.
 
-    The names of the targets are in the headings of the columns, or in a row above.
-    Without names, the order of the targets is used if the number of column groups
-    equals the number of targets.
+    Target names are part of the column headings or listed in a row above.  Without
+    names, columns are assigned to the targets in order, provided that there are as many
+    groups of columns as targets.
 
     Args:
         cells: cells of the header.
@@ -116,7 +116,7 @@ def _by_target(
     plain = [column_of(cell) for cell in cells]
     for _, above in reversed(before):
         labels = _filled(above, len(cells))
-        # Prefer the name of a body to its markers, such as arm:1, arm:2.
+        # Prefer a body's name to those of its markers, for example arm:1, arm:2.
         exact = set(labels) & set(targets)
         found = [
             label if label in exact else _only(label, [*{*targets} - exact])
@@ -159,7 +159,7 @@ def _complete(columns: Sequence[Column], least: int = 1) -> bool:
 
 
 def _of_target(cell: str, targets: Sequence[str]) -> tuple[Column, str]:
-    """Return the meaning of a heading with a target's name before or after the axis."""
+    """Return the meaning of a heading that names a target before or after the axis."""
     for target in sorted(targets, key=len, reverse=True):
         name = re.escape(target)
         before = re.search(rf"(?:^|[^a-z0-9]){name}(?=[^a-z0-9]|[xyz]\b)", cell, re.I)
@@ -176,7 +176,7 @@ def _of_target(cell: str, targets: Sequence[str]) -> tuple[Column, str]:
 
 
 def _only(label: str, targets: Sequence[str]) -> str:
-    """Return the target that a label such as arm:SMR1 names; empty if it names none."""
+    """Return the target named by a label such as arm:SMR1; empty if there is none."""
     words = re.split(r"[:./|\s]+", label)
     found = [target for target in targets if target in words or target == label]
     return found[0] if len(found) == 1 else ""
@@ -192,7 +192,7 @@ def _with_kinds(cells: list[str], above: Sequence[str]) -> list[str]:
 
 
 def _filled(cells: Sequence[str], count: int) -> list[str]:
-    """Return the labels of merged cells; an empty cell repeats the label before it."""
+    """Fill merged cells: an empty cell repeats the label before it."""
     labels: list[str] = []
     for cell in [*cells, *[""] * count][:count]:
         labels.append(cell or (labels[-1] if labels else ""))
@@ -200,7 +200,7 @@ def _filled(cells: Sequence[str], count: int) -> list[str]:
 
 
 def _stated(rows: Sequence[tuple[int, list[str]]]) -> tuple[int, str]:
-    """Return line and unit of lengths before a header; 0 and empty if absent."""
+    """Return the line and unit of lengths stated before a header, or 0 and ""."""
     for line, cells in rows:
         if match := _STATED.search(" ".join(cells)):
             words = re.findall(r"[A-Za-zµμ]+", match[1])[:4]

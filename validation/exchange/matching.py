@@ -1,4 +1,4 @@
-"""Assign readings to targets and commands."""
+"""Assign readings to targets and to commands."""
 
 import re
 from collections import Counter
@@ -18,16 +18,15 @@ class Match:
 
     Attributes:
         how: method of the assignment: ``"name"``, ``"time"`` or ``"order"``.
-        rows: for each row of the campaign its command and its readings by target.  A
-            second reading of a target at the same command is stored in a second row.
-        strangers: readings of points that are not targets, such as points on the
-            ground.
+        rows: command and readings by target of each campaign row.  A second reading of
+            a target at the same command starts a new row.
+        strangers: readings of points that are not targets, for example ground points.
         unmatched: readings of targets to which no command was assigned.
         missing: readings without a position.
-        duplicates: readings that occur twice in one file with equal digits.  The second
-            one is omitted.
-        copies: readings that occur in two files with equal digits.  Both are used,
-            because a device with few digits may measure equal values.
+        duplicates: readings that repeat an earlier one in the same file digit by digit;
+            they are omitted.
+        copies: readings that repeat one in a different file digit by digit.  Both are
+            used, because a device with few digits may measure equal values.
     """
 
     how: str
@@ -54,7 +53,7 @@ def match(
         window: [s] largest time between a command and its readings.
 
     Returns:
-        The assigned rows, and the readings that were not assigned.
+        The assigned rows and the unassigned readings.
 
     Raises:
         BadInput: no target was read, a reading names two targets, or the readings
@@ -107,7 +106,7 @@ def match(
 
 
 def _repeated(readings: Sequence[Reading]) -> str:
-    """Return a hint for a message about the first reading that occurs twice."""
+    """Return a hint about the first duplicate reading."""
     seen: dict[object, Reading] = {}
     for reading in readings:
         digits = (reading.names, reading.position.tobytes(), str(reading.time))
@@ -118,7 +117,7 @@ def _repeated(readings: Sequence[Reading]) -> str:
 
 
 def _same(a: Reading, b: Reading) -> bool:
-    """Return whether digits, name and time of two readings are equal."""
+    """Return whether two readings agree in digits, name and time."""
     timed = a.time == b.time or bool(np.isnan(a.time) and np.isnan(b.time))
     return timed and a.names == b.names and np.array_equal(a.position, b.position)
 
@@ -126,7 +125,7 @@ def _same(a: Reading, b: Reading) -> bool:
 def _of_targets(
     readings: Sequence[Reading], targets: list[str]
 ) -> list[tuple[Reading, str]]:
-    """Return the readings of targets; unnamed readings belong to the only target."""
+    """Return the readings of targets; unnamed readings belong to a single target."""
     ours = []
     found = [
         [part for part in reading.names if part in targets] for reading in readings
@@ -156,7 +155,7 @@ def _of_targets(
 def _of_commands(
     ours: list[tuple[Reading, str]], found: list[list[str]], ids: Sequence[str]
 ) -> list[int]:
-    """Return the index of the command in each name, or -1; empty if few name one."""
+    """Return the command index in each name, or -1; empty if few names have one."""
     index = {label: i for i, label in enumerate(ids)}
     asked = [
         [index[label] for label in labels if label != target]
@@ -168,10 +167,10 @@ def _of_commands(
 
 
 def _within(readings: Sequence[Reading], labels: Sequence[str]) -> list[list[str]]:
-    """Return the labels that each name contains, such as SMR1 in ``p04_SMR1``.
+    """Return the labels contained in each name, such as SMR1 in ``p04_SMR1``.
 
-    No letter or digit may come before or after the label.  Of labels that overlap, the
-    longer one is returned.
+    A label must not be adjacent to a letter or digit.  Of overlapping labels, the
+    longest is returned.
     """
     longest = sorted(labels, key=len, reverse=True)
     words = "|".join(map(re.escape, longest))
@@ -180,7 +179,7 @@ def _within(readings: Sequence[Reading], labels: Sequence[str]) -> list[list[str
 
 
 def _nearest(reading: Reading, commands: Commands, window: float) -> int:
-    """Return the index of the command nearest in time; -1 if none is in the window."""
+    """Return the index of the command nearest in time, or -1 outside the window."""
     gaps = np.abs(commands.times - reading.time)
     return int(np.argmin(gaps)) if gaps.min() <= window else -1
 

@@ -1,4 +1,4 @@
-"""Convert orientations from a device: quaternions, or three angles in a given order.
+"""Convert device orientations given as quaternions or as three angles.
 
 An orientation R transforms vectors from target axes to device axes: p_device = R
 p_target.
@@ -17,8 +17,7 @@ from forcefit.validation.exchange.column_names import QUATERNION, Column
 
 ROTATION_VECTOR = "rotation_vector"
 ANGLES = {"rad": 1.0, "mrad": 1e-3, "deg": np.pi / 180}
-# Inverse rotations fit far better if their scatter is below this fraction of the
-# scatter of the given rotations.
+# Inverse rotations fit far better if they reduce the scatter below this fraction.
 _FAR_BETTER = 0.25
 # [rad] scatter above which orientations are unrelated to the commands; orientations of
 # real machines scatter by less than 0.02 rad
@@ -27,7 +26,7 @@ _GROSS = 20.0  # multiple of the scatter of readings excluded from the mean
 # Ratio of the median length of a Gaussian vector in space to the sigma of one
 # component.
 _MEDIAN = 1.538
-_ROUNDING = 1e-12  # [rad] smallest scatter, due to rounding
+_ROUNDING = 1e-12  # [rad] smallest scatter, due to round-off
 _UNIT_NORM = 0.01  # accepted error of the norm of rounded quaternions
 
 
@@ -67,7 +66,7 @@ def orientation_columns(
 
 
 def from_quaternion(place: str, values: Sequence[float]) -> NDArray:
-    """Return the target's axes (3, 3) in the device's axes, from a quaternion w x y z.
+    """Return the target axes (3, 3) in device axes, from a quaternion w x y z.
 
     Args:
         place: file and line, for messages.
@@ -89,12 +88,12 @@ def from_quaternion(place: str, values: Sequence[float]) -> NDArray:
 def from_angles(
     place: str, angles: Mapping[str, float], order: str | None
 ) -> NDArray:  # fmt: skip
-    """Return the target's axes (3, 3) in the device's axes, from three angles [rad].
+    """Return the target axes (3, 3) in device axes, from three angles [rad].
 
     Args:
         place: file and line, for messages.
         angles: angles about each axis, in the order of the columns.
-        order: order in the targets file, or None.
+        order: order declared in the targets file, or None.
 
     Returns:
         The rotation matrix.
@@ -118,7 +117,7 @@ def from_angles(
 
 @dataclass(frozen=True, eq=False)
 class Turns:
-    """Orientations of one target, as deviations of the platform.
+    """Orientations of one target, expressed as platform deviations.
 
     Attributes:
         deviation: (R, 3) [rad] rotation vector from nominal to actual orientation, base
@@ -148,8 +147,8 @@ def turns_of(
         The deviations.
 
     Raises:
-        BadInput: the inverses of the rotations fit far better, or the orientations do
-            not follow the commands.
+        BadInput: the inverse rotations fit far better, or the orientations do not
+            follow the commands.
     """
     best = _turns(base @ seen, nominal, mount)
     other = _turns(base @ np.swapaxes(seen, 1, 2), nominal, mount)
@@ -171,7 +170,7 @@ def turns_of(
 
 
 def _turns(read: NDArray, nominal: NDArray, mount: NDArray | None) -> Turns:
-    """Return the deviations for a declared or fitted mount, without any check."""
+    """Return the deviations for a declared or fitted mount, unchecked."""
     taken = np.isfinite(read).all(axis=(1, 2))
     seen = Rotation.from_matrix(np.swapaxes(nominal[taken], 1, 2) @ read[taken])
     if mount is None:

@@ -1,4 +1,4 @@
-"""Transform readings to base axes; find the device's pose and impossible readings."""
+"""Transform readings to base axes and find impossible readings."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -45,7 +45,7 @@ class Placed:
         turns: (R, 3) [rad] rotation of the platform, base axes; NaN if not measured.
         mounts: mapping from each target with measured orientation to the rotation
             vector (3,) [rad] from platform axes to target axes.
-        left_out: descriptions of impossible readings.
+        left_out: descriptions of omitted, impossible readings.
         remarks: descriptions of other inconsistencies.
     """
 
@@ -60,7 +60,7 @@ class Placed:
 
 
 def place(declared: TargetsFile, commands: Commands, rows: Rows) -> Placed:
-    """Estimate the pose of the device, and transform the readings to base axes.
+    """Estimate the device pose and transform the readings to base axes.
 
     Args:
         declared: content of the targets file.
@@ -71,8 +71,8 @@ def place(declared: TargetsFile, commands: Commands, rows: Rows) -> Placed:
         The readings, converted to deviations from the declared robot.
 
     Raises:
-        BadInput: the readings do not determine the device's pose, or they fit far
-            better in a different unit, mirrored, or with exchanged targets.
+        BadInput: the readings do not determine the device pose, or fit far better in a
+            different unit, mirrored, or with exchanged targets.
     """
     names = list(declared.places)
     T = np.array([commands.postures[command].platform for command, _ in rows])
@@ -114,13 +114,13 @@ def place(declared: TargetsFile, commands: Commands, rows: Rows) -> Placed:
 
 
 def _misfit(nominal: NDArray, measured: NDArray, scatter: float) -> list[str]:
-    """Return a remark with a possible cause if readings do not follow the commands."""
+    """Return a remark on the likely cause if readings do not follow the commands."""
     spread = np.linalg.norm(nominal - nominal.mean(axis=(0, 1)), axis=2)
     reach = float(np.sqrt(np.mean(spread**2)))
     if scatter < _ASTRAY * reach:
         return []
     reason = "check whether the readings are joined to the right commands"
-    # Distances between targets do not depend on the commands.
+    # Distances between targets are independent of the commands.
     apart = np.linalg.norm(measured - np.roll(measured, 1, axis=1), axis=2)
     known = apart[np.isfinite(apart).all(axis=1)]
     if len(known) and measured.shape[1] > 1 and np.ptp(known, axis=0).max() > scatter:
@@ -146,7 +146,7 @@ def _turns(
     declared: TargetsFile, commands: Commands, rows: Rows, nominal: NDArray,
     frame: DeviceFrame, name: str, left_out: list[str],
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
-    """Return (R, 3) [rad] deviations from orientations of a target, and its mount."""
+    """Return deviations (R, 3) [rad] from a target's orientations, and its mount."""
     seen = np.full((len(rows), 3, 3), np.nan)
     for i, (_, readings) in enumerate(rows):
         rotation = readings[name].rotation if name in readings else None
@@ -172,7 +172,7 @@ def _turns(
 def _suspects(
     base: NDArray, nominal: NDArray, read: NDArray, scatter: float, names: list[str]
 ) -> list[tuple[int, str]]:
-    """Return the targets of one command at implausible positions, with reasons."""
+    """Return the implausible readings of one command, with reasons."""
     suspects = []
     ks = np.flatnonzero(read)
     order = exchanged_here(base[ks], nominal[ks], scatter)
@@ -190,7 +190,7 @@ def _suspects(
 def _frame(
     declared: TargetsFile, measured: NDArray, nominal: NDArray, names: list[str]
 ) -> tuple[DeviceFrame, float]:
-    """Return the pose of the device, and the scatter about the declared robot."""
+    """Return the device pose and the scatter about the declared robot."""
     read = np.isfinite(measured).all(axis=2)
     if declared.registration == "known":
         check_axes(declared.file, measured[read], nominal[read], known=True)

@@ -1,4 +1,4 @@
-"""Read rows of a device's table without a header: names followed by numbers."""
+"""Read the rows of a headerless device table."""
 
 from collections.abc import Mapping, Sequence
 
@@ -10,7 +10,7 @@ from forcefit.validation.campaign.dialect import parse_number
 from forcefit.validation.exchange.cell_values import CellValues, missing
 from forcefit.validation.exchange.reading import Reading
 
-# Largest number of columns before the coordinates, such as a counter or a time.
+# Largest number of columns before the coordinates, for example a counter or a time.
 _COUNTERS = 3
 # Largest relative scatter of distances between targets for the correct columns.
 _ALIKE = 0.1
@@ -26,8 +26,8 @@ def read_plain_rows(
     Args:
         values: reader of the cells' values.
         rows: line number and cells of each row.  A row contains a name and x, y, z, or
-            only numbers: those of one point, or of all targets in order.  Further cells
-            are ignored.
+            only numbers: those of one point, or of all targets in order.  Additional
+            cells are ignored.
         targets: mapping from the name of each target to its position (3,) [m], platform
             axes.
 
@@ -53,11 +53,10 @@ def _nameless(cells: Sequence[str], decimal: str) -> bool:
 def _first_column(
     rows: Sequence[Sequence[str]], decimal: str, targets: Mapping[str, NDArray]
 ) -> int:
-    """Return the index of the first coordinate in rows that contain only numbers.
+    """Return the index of the first coordinate in purely numeric rows.
 
-    A counter or a time may precede the coordinates.  Such columns are detected by the
-    distances between targets, which agree with the declared distances only if the
-    correct columns are used.
+    A counter or a time may precede the coordinates.  The correct columns are those for
+    which the distances between targets agree with the declared distances.
 
     Args:
         rows: rows of cells.
@@ -86,7 +85,7 @@ def _first_column(
 
 
 def _of_one(values: CellValues, line: int, cells: list[str], counted: bool) -> Reading:
-    """Return a row of name, x, y, z; the name may be an integer if ``counted``."""
+    """Parse a row of name, x, y, z; the name may be an integer if ``counted``."""
     names, cells = [], list(cells)
     decimal = values.sheet.decimal
     while cells and not np.isfinite(parse_number(cells[0], decimal)):
@@ -107,7 +106,7 @@ def _of_all(
     values: CellValues, line: int, cells: list[str], first: int,
     targets: Mapping[str, NDArray],
 ) -> list[Reading]:  # fmt: skip
-    """Return a row that contains only numbers: x, y, z of each target in order."""
+    """Parse a numeric row with x, y, z of each target in order."""
     found = len(cells) - first
     if found < 3 * len(targets):
         raise BadInput(

@@ -1,4 +1,4 @@
-"""Define a reading of a device, and the format of the device's exports."""
+"""Define a device reading and the format of device exports."""
 
 from dataclasses import dataclass
 
@@ -12,7 +12,7 @@ LARGEST = 1e12  # largest accepted absolute value of a number in a table
 
 @dataclass(frozen=True)
 class Writing:
-    """Declared format of an export, for properties that the export does not state.
+    """Declared format properties that an export does not state itself.
 
     Attributes:
         unit: unit of lengths; None if the header states it.
@@ -39,7 +39,7 @@ class Writing:
 
 @dataclass(frozen=True, eq=False)
 class Reading:
-    """One point that a device read.
+    """A point measured by a device.
 
     Attributes:
         file: path of the file, for messages.

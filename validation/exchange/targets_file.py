@@ -1,4 +1,4 @@
-"""Read the targets file of an import: positions of targets, and format of exports."""
+"""Read the targets file of an import: target positions and export format."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ _MARKS = (".", ",")
 
 @dataclass(frozen=True, eq=False)
 class TargetsFile:
-    """The content of a targets file.
+    """Content of a targets file.
 
     Attributes:
         file: path of the file.
@@ -33,11 +33,11 @@ class TargetsFile:
         registration: ``"unknown"`` if the device's pose is unknown; ``"known"`` if its
             axes are the base's axes.
         window: [s] largest time between a command and its readings.
-        noise: [m] standard deviation of readings whose export states none; None if
+        noise: [m] standard deviation for readings without a stated one; None if
             undeclared.
         noise_rotation: [rad] standard deviation of an orientation; None if undeclared.
-        rotations: mapping from a target to the declared rotation vector (3,) [rad] from
-            platform axes to target axes; all others are fitted.
+        rotations: mapping from each target with a declared mount to its rotation vector
+            (3,) [rad] from platform axes to target axes; the other mounts are fitted.
         writing: format of the exports.
     """
 
@@ -115,12 +115,12 @@ def read_targets(path: Path | str) -> TargetsFile:
 
 
 def _choice(root: Table, key: str, valid: Iterable[str]) -> str | None:
-    """Return the word of a key; None if the key is absent."""
+    """Read a keyword, or None if the key is absent."""
     return root.choice(key, valid) if root.has(key) else None
 
 
 def _decimals(root: Table) -> tuple[str, str]:
-    """Return the decimal marks of the exports and of the commands."""
+    """Read the decimal marks of the exports and of the commands."""
     if not isinstance(root.get("decimal"), dict):
         mark = root.choice("decimal", _MARKS, ".")
         return mark, mark
@@ -131,7 +131,7 @@ def _decimals(root: Table) -> tuple[str, str]:
 
 
 def _rotations(root: Table, places: Mapping[str, NDArray]) -> dict[str, NDArray]:
-    """Return the declared (3,) [rad] rotation vectors of targets, platform axes."""
+    """Read the declared rotation vectors (3,) [rad] of targets, platform axes."""
     if not root.has("rotations"):
         return {}
     table = root.table("rotations")

@@ -1,4 +1,4 @@
-"""Implement ``forcefit validation import``: convert a device's files to a campaign."""
+"""Convert device files to a campaign, as ``forcefit validation import`` does."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -34,7 +34,7 @@ _MOST_LEFT_OUT = 0.2
 
 @dataclass(frozen=True, eq=False)
 class Import:
-    """A campaign that was created from a device's files.
+    """A campaign created from device files.
 
     Attributes:
         robot: name of the robot.
@@ -82,7 +82,7 @@ class Import:
         }
 
     def text(self) -> str:
-        """Return the summary as a few lines of text."""
+        """Format a summary of a few lines."""
         lines = [
             f"{self.robot}: {self.readings} readings in {len(self.cells)} rows, joined "
             f"to commands by {self.how}",
@@ -100,22 +100,22 @@ def import_readings(
     files: Sequence[Path | str], targets: Path | str, commands: Path | str,
     folder: Path | str,
 ) -> Import:  # fmt: skip
-    """Create a campaign from a device's files.
+    """Create a campaign from device files.
 
     Args:
         files: exports of the device, or ROS bags.
         targets: the targets file (:mod:`forcefit.validation.exchange.targets_file`).
         commands: the table of commands
             (:mod:`forcefit.validation.exchange.commands_table`).
-        folder: folder to be written, which must not exist or must be empty.
+        folder: folder to write, which must be empty or not yet exist.
 
     Returns:
         The campaign that was written.
 
     Raises:
-        BadInput: a file violates a rule; too many readings would be omitted; or the
-            readings fit far better in a different unit, mirrored or with exchanged
-            targets.  In these cases no file is written.
+        BadInput: a file is invalid, too many readings would be omitted, or the readings
+            fit far better in a different unit, mirrored or with exchanged targets.  No
+            file is then written.
     """
     folder = Path(folder)
     check_new_folder(folder)
@@ -143,7 +143,7 @@ def _read(file: Path | str, declared: TargetsFile) -> list[Reading]:
 def _campaign(
     declared: TargetsFile, commands: Commands, joined: Match, folder: Path, total: int
 ) -> Import:
-    """Return the two texts of the campaign, and descriptions of omitted readings."""
+    """Return the two files of the campaign as text, and the omitted readings."""
     names = list(declared.places)
     placed = place(declared, commands, joined.rows)
     left_out = _left_out(joined, placed, total)
@@ -173,7 +173,7 @@ def _campaign(
 
 
 def _left_out(joined: Match, placed: Placed, total: int) -> list[str]:
-    """Return descriptions of omitted readings; raise BadInput if there are too many."""
+    """Describe the omitted readings; raise BadInput if there are too many."""
     why = {"time": "no command is near it in time"}.get(
         joined.how, "its name contains no id of a command"
     )
@@ -197,7 +197,7 @@ def _left_out(joined: Match, placed: Placed, total: int) -> list[str]:
 
 
 def _remarks(declared: TargetsFile, joined: Match, placed: Placed) -> list[str]:
-    """Return remarks about the readings in the campaign."""
+    """Return remarks about the readings of the campaign."""
     remarks = []
     if joined.copies:
         remarks.append(

@@ -1,4 +1,4 @@
-"""Find the effects that a campaign can and cannot show, before any diagnosis.
+"""Determine which effects a campaign can reveal, before any diagnosis.
 
 Start with ``inspection.py``.
 """

@@ -1,4 +1,4 @@
-"""Count the rows, loads, readings and covariates of a campaign, with their ranges."""
+"""Summarise the rows, loads, readings and covariates of a campaign."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -7,13 +7,13 @@ from forcefit.validation.campaign.campaign import LOAD, READING, Campaign
 
 
 def row_counts(kinds: NDArray) -> dict:
-    """Return the number of kinds; minimum, median and maximum of rows of a kind."""
+    """Return the number of kinds, and the minimum, median and maximum rows per kind."""
     _, rows = np.unique(kinds, return_counts=True)
     return {"count": len(rows), "rows_each": [rows.min(), np.median(rows), rows.max()]}
 
 
 def load_counts(c: Campaign) -> dict:
-    """Return the levels, magnitudes and directions of the load."""
+    """Summarise the levels, magnitudes and directions of the load."""
     force = np.linalg.norm(c.loads[:, 3:], axis=1)
     moment = np.linalg.norm(c.loads[:, :3], axis=1)
     pairs = np.unique(np.column_stack([c.configuration, c.repeat]), axis=0)
@@ -28,7 +28,7 @@ def load_counts(c: Campaign) -> dict:
 
 
 def reading_counts(c: Campaign) -> dict:
-    """Return the number of cells, the deviation and sigma of each reading component."""
+    """Summarise the cells, deviations and sigma of each reading component."""
     counts = {}
     for k, name in enumerate(READING):
         cells = c.cells[:, k]
@@ -45,7 +45,7 @@ def reading_counts(c: Campaign) -> dict:
 
 
 def covariate_counts(c: Campaign) -> dict:
-    """Return each covariate's range, number of levels and correlation with others."""
+    """Summarise the range, levels and correlations of each covariate."""
     return {
         name: {
             "range": [x.min(), x.max()],
@@ -62,7 +62,7 @@ def covariate_counts(c: Campaign) -> dict:
 
 
 def correlation(x: NDArray, y: NDArray) -> float:
-    """Return the correlation of two columns; 0 if one of them is constant."""
+    """Return the correlation of two columns, or 0 if one of them is constant."""
     x, y = x - x.mean(), y - y.mean()
     size = float(np.linalg.norm(x) * np.linalg.norm(y))
     return float(x @ y) / size if size > 0 else 0.0

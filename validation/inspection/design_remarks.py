@@ -1,4 +1,4 @@
-"""Write sentences about the effects that a campaign's design can and cannot show."""
+"""Write remarks about the effects that a campaign's design can and cannot reveal."""
 
 from itertools import combinations
 
@@ -14,22 +14,22 @@ from forcefit.validation.inspection.remark import CAREFUL, FINE, LOST, Remark
 from forcefit.validation.inspection.repeat_remarks import on_repeats
 from forcefit.validation.inspection.repeats import RepeatNoise
 
-# [1/K] Thermal expansion of aluminium; few machine materials expand more.
+# [1/K] Thermal expansion of aluminium; few engineering materials expand more.
 _EXPANSION = 2.4e-5
 _TOGETHER = 0.9  # correlation above which two covariates cannot be distinguished
-# Deviations above this fraction of the robot's size are hardly manufacturing errors.
+# Larger deviations, relative to the robot's size, are unlikely manufacturing errors.
 _UNIT = 0.02
 
 
 def remarks_on(
     campaign: Campaign, repeats: Revisits, visits: Revisits, noise: RepeatNoise | None
 ) -> list[Remark]:
-    """Return all remarks about a campaign; those about lost information are first.
+    """Return all remarks about a campaign, beginning with those about lost information.
 
     Args:
         campaign: campaign of R rows.
-        repeats: order of the repeats in the session.
-        visits: order of the configurations in the session.
+        repeats: order of the repeats within the session.
+        visits: order of the configurations within the session.
         noise: noise computed from the repeats; None without repeats.
     """
     remarks = [
@@ -42,12 +42,12 @@ def remarks_on(
 
 
 def _on_readings(campaign: Campaign) -> list[Remark]:
-    """Return remarks about unmeasured, constant, rounded and too large readings."""
+    """Return remarks about missing, constant, rounded and implausible readings."""
     remarks = []
     measured, sigma = campaign.measured, campaign.sigma
     absent = ", ".join(campaign.not_measured)
     if absent:
-        text = f"Never measured: {absent}. Effects on these alone cannot be found."
+        text = f"Never measured: {absent}. Effects on these alone remain hidden."
         remarks.append(Remark("readings", LOST, text))
     for k, name in enumerate(READING):
         column = measured[campaign.cells[:, k], k]
@@ -75,7 +75,7 @@ def _on_readings(campaign: Campaign) -> list[Remark]:
 
 
 def _on_configurations(campaign: Campaign, visits: Revisits) -> list[Remark]:
-    """Return remarks about joints that never move and the order of configurations."""
+    """Return remarks about joints that never move and about the measuring order."""
     remarks = []
     robot = campaign.robot
     still = [
@@ -86,8 +86,8 @@ def _on_configurations(campaign: Campaign, visits: Revisits) -> list[Remark]:
     count = len(np.unique(campaign.configuration))
     if count == 1:
         text = (
-            "One configuration only: errors of geometry, offsets and a wrong "
-            "registration all look alike."
+            "One configuration only: geometric errors, offsets and a wrong "
+            "registration cannot be distinguished."
         )
         remarks.append(Remark("configurations", LOST, text))
     elif still:
@@ -104,12 +104,12 @@ def _on_configurations(campaign: Campaign, visits: Revisits) -> list[Remark]:
 
 
 def _on_loads(campaign: Campaign) -> list[Remark]:
-    """Return remarks about load levels, and loads that vary with the configuration."""
+    """Return remarks about load levels and about loads that depend on configuration."""
     loads = campaign.loads
     if not loads.any():
         text = (
-            "No load was applied: compliance and clearances are visible only by the "
-            "machine's weight and internal forces; an error of the load is not visible."
+            "No load was applied: compliance and clearances show only through the "
+            "machine's weight and internal forces; load errors cannot be detected."
         )
         return [Remark("load", LOST, text)]
     remarks = []
@@ -124,14 +124,16 @@ def _on_loads(campaign: Campaign) -> list[Remark]:
         remarks.append(Remark("load", LOST, text))
     elif twice == 0:
         text = (
-            "No configuration was measured under two loads: effects of the load and "
-            "effects of the configuration are distinguished by the model alone."
+            "No configuration was measured under two loads: only the model separates "
+            "effects of the load from effects of the configuration."
         )
         remarks.append(Remark("load", CAREFUL, text))
     else:
         rank = np.linalg.matrix_rank(loads[:, 3:], 1e-6 * np.abs(loads).max())
         if rank == 1:
-            text = "The load always acts along one line: compliance is known along it."
+            text = (
+                "The load acts along a single line: only compliance along it is known."
+            )
             remarks.append(Remark("load", CAREFUL, text))
         else:
             text = f"{twice} configurations were measured under more than one load."
@@ -140,7 +142,7 @@ def _on_loads(campaign: Campaign) -> list[Remark]:
 
 
 def _on_temperature(campaign: Campaign) -> list[Remark]:
-    """Return remarks about whether thermal expansion is visible."""
+    """Return remarks about whether thermal expansion can be detected."""
     temperature = campaign.covariates.get("temperature")
     if temperature is None:
         text = (
@@ -171,19 +173,19 @@ def _on_temperature(campaign: Campaign) -> list[Remark]:
 
 
 def _on_approach(campaign: Campaign) -> list[Remark]:
-    """Return remarks about whether friction is visible."""
+    """Return remarks about whether friction can be detected."""
     side = campaign.covariates.get("approach")
     if side is None:
         text = "No cov.approach: friction can be neither found nor excluded."
         return [Remark("approach", LOST, text)]
     if np.ptp(side) == 0.0:
-        text = "Every row was approached from one side: friction equals an offset."
+        text = "Every row was approached from one side: friction looks like an offset."
         return [Remark("approach", LOST, text)]
     both = _in_both(campaign.configuration, side)
     if not both:
         text = (
-            "No configuration was approached from both sides: friction and the "
-            "configuration are distinguished by the model alone."
+            "No configuration was approached from both sides: only the model separates "
+            "friction from effects of the configuration."
         )
         return [Remark("approach", CAREFUL, text)]
     return [
@@ -192,11 +194,11 @@ def _on_approach(campaign: Campaign) -> list[Remark]:
 
 
 def _on_time(campaign: Campaign) -> list[Remark]:
-    """Return remarks about whether a drift is visible."""
+    """Return remarks about whether a drift can be detected."""
     if np.ptp(campaign.covariates.get("time", np.zeros(1))) == 0.0:
         text = (
             "No cov.time, or the same in every row: a drift can be neither found nor "
-            "excluded; the order of the file is taken as that of measurement."
+            "excluded; rows are assumed to be in the order of measurement."
         )
         return [Remark("time", LOST, text)]
     return []
@@ -213,7 +215,7 @@ def _on_covariates(campaign: Campaign) -> list[Remark]:
         if abs(together) > _TOGETHER:
             text = (
                 f"{a} and {b} vary together (correlation {together:+.2f}): their "
-                "effects look alike."
+                "effects are hard to distinguish."
             )
             remarks.append(Remark("covariates", CAREFUL, text))
     return remarks

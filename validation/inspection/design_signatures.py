@@ -1,4 +1,4 @@
-"""Compute the changes of a campaign's readings by each effect of the library."""
+"""Compute how each library effect changes the readings of a campaign."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -20,21 +20,21 @@ from forcefit.validation.diagnosis.signatures import (
 )
 from forcefit.validation.inspection.repeats import slow_changes
 
-# Finite motions are omitted: the effect has no unknown, and its exact model takes
-# seconds per row.
+# Finite motions are omitted, because this effect has no unknowns and its exact model
+# takes seconds per row.
 _NOT_COMPARED = tuple(name for name, effect in LIBRARY.items() if effect.finite)
 
 
 @dataclass(frozen=True, eq=False)
 class DesignSignatures:
-    """Changes of the readings over sigma, by unknowns of plausible size.
+    """Changes of the readings caused by unknowns of plausible size, divided by sigma.
 
     Attributes:
         columns: mapping from each effect to (N, k) changes of the readings.  Each frame
-            has separate unknowns.  The clearance is equal in all joints, and the load
-            determines the position of a joint within its clearance.
-        nuisance: (N, p) changes by an unknown pose of the device (registration).
-        untestable: mapping from the name of each effect without columns to the reason.
+            has separate unknowns.  All joints have the same clearance, and the load
+            determines the position of each joint within its clearance.
+        nuisance: (N, p) changes caused by an unknown device pose (registration).
+        untestable: mapping from each effect without columns to the reason.
         unregistered: reason why the registration cannot be estimated; empty if it can.
     """
 
@@ -49,9 +49,8 @@ def design_signatures(
 ) -> DesignSignatures:
     """Return the signatures of all library effects for a campaign.
 
-    The signatures are computed in the axes of the measuring device, so an unknown pose
-    of the device is estimated first.  If the pose cannot be estimated, the axes of the
-    base are used.
+    Signatures are expressed in the axes of the measuring device, so an unknown device
+    pose is estimated first.  If it cannot be estimated, base axes are used instead.
 
     Args:
         campaign: campaign of N measured cells.
@@ -100,7 +99,7 @@ def design_signatures(
 def changes_between_repeats(
     campaign: Campaign, signatures: DesignSignatures
 ) -> dict[str, NDArray]:
-    """Return the columns for :func:`.repeats.repeat_noise`.
+    """Return the columns of slow changes for :func:`.repeats.repeat_noise`.
 
     Args:
         campaign: campaign of N measured cells.
@@ -108,7 +107,7 @@ def changes_between_repeats(
 
     Returns:
         The columns of :func:`forcefit.validation.inspection.repeats.slow_changes`, and
-        the columns of thermal expansion and friction in each configuration.
+        columns of thermal expansion and friction in each configuration.
     """
     slow = slow_changes(campaign)
     acts = {"temperature": "thermal_expansion", "approach": "friction_hysteresis"}
@@ -119,7 +118,7 @@ def changes_between_repeats(
 
 
 def _one_each(every: list[Hypothesis]) -> dict[str, Hypothesis]:
-    """Return one hypothesis per effect: of those with most slots, the middle one."""
+    """Select one hypothesis per effect, the middle one of those with the most slots."""
     hypotheses: dict[str, Hypothesis] = {}
     for name in dict.fromkeys(h.effect for h in every):
         of = [h for h in every if h.effect == name]
@@ -134,7 +133,7 @@ def _one_each(every: list[Hypothesis]) -> dict[str, Hypothesis]:
 
 
 def _at_plausible_sizes(tangents: Tangents, hypothesis: Hypothesis) -> NDArray:
-    """Return (N, k) changes of the readings, each by one unknown of plausible size."""
+    """Return the changes (N, k) caused by each unknown at its plausible size."""
     effect = LIBRARY[hypothesis.effect]
     shapes = {n: s.start for s in hypothesis.slots if s.shape for n in s.names}
     rest = {
@@ -155,5 +154,5 @@ def _at_plausible_sizes(tangents: Tangents, hypothesis: Hypothesis) -> NDArray:
 
 
 def _given(campaign: Campaign, covariate: str) -> bool:
-    """Return whether a covariate is recorded and not zero in every row."""
+    """Return whether a covariate is recorded and nonzero in at least one row."""
     return bool(np.any(campaign.covariates.get(covariate, 0.0)))

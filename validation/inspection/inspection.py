@@ -1,4 +1,4 @@
-"""Inspect a campaign before any diagnosis: its content and its visible effects."""
+"""Inspect the content and the detectable effects of a campaign before a diagnosis."""
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
@@ -37,16 +37,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Inspection:
-    """Result of an inspection: effects that a campaign's design can and cannot show.
+    """Result of an inspection: the effects that a design can and cannot reveal.
 
     Attributes:
         campaign: campaign of R rows.
-        repeats: order of rows of the same configuration and load in the session.
-        visits: order of rows of the same configuration in the session.
+        repeats: measuring order of rows with the same configuration and load.
+        visits: measuring order of rows with the same configuration.
         noise: noise computed from the repeats; None if no row was measured twice.
-        signatures: signatures of the library's effects.
+        signatures: signatures of the library effects.
         separability: angles between the signatures.
-        remarks: sentences about the design; those about lost information are first.
+        remarks: remarks about the design, beginning with lost information.
         open: (R,) bool, True for rows whose pose the declared clearances leave
             undetermined.
     """
@@ -63,7 +63,7 @@ class Inspection:
     __repr__, _repr_html_ = short_repr, html_table
 
     def to_xarray(self) -> "xarray.Dataset":
-        """Return a data set over ``effect``: whether each effect is visible."""
+        """Convert to a data set over ``effect`` that states which are detectable."""
         s, absent = self.separability, self.signatures.untestable
         no, unknown = [False] * len(absent), [np.nan] * len(absent)
         size = number("norm of the change of the readings, divided by sigma")
@@ -79,11 +79,11 @@ class Inspection:
         return data.assign_attrs(campaign=self.campaign.name)
 
     def to_pandas(self) -> "pandas.DataFrame":
-        """Return a pandas table, one row per effect, columns (variable, component)."""
+        """Convert to a pandas table with one row per effect."""
         return frame_table(self.to_xarray(), "effect")
 
     def table(self) -> dict:
-        """Return the whole inspection as plain values for JSON."""
+        """Convert the inspection to plain values for JSON."""
         c = self.campaign
         return {
             "campaign": c.name,
@@ -113,7 +113,7 @@ class Inspection:
         }  # fmt: skip
 
     def _effect_table(self) -> dict:
-        """Return the visibility of each effect as plain values."""
+        """Return the detectability of each effect as plain values."""
         table: dict[str, dict] = {
             name: {"testable": False, "why": why}
             for name, why in self.signatures.untestable.items()
@@ -135,7 +135,7 @@ class Inspection:
 def inspect_campaign(
     campaign: Campaign, progress: Callable[[int, int], None] = lambda done, total: None
 ) -> Inspection:
-    """Inspect a campaign's design.
+    """Inspect the design of a campaign.
 
     Args:
         campaign: campaign to inspect.
@@ -167,7 +167,7 @@ def inspect_campaign(
 
 
 def _noise_table(c: Campaign, noise: RepeatNoise | None) -> dict | None:
-    """Return the noise from repeats, the declared noise, and the labels of suspects."""
+    """Return the noise from repeats, the declared noise, and suspect readings."""
     if noise is None:
         return None
     return {

@@ -1,9 +1,8 @@
-"""Determine the order of a campaign's repeats in the session.
+"""Determine when repeats were measured within a session.
 
 Repeats may be spread over the session or measured consecutively.  If the machine drifts
-slowly, consecutive repeats agree better with each other than with the other rows.
-Their scatter then underestimates the noise of the session, because it does not contain
-the drift.
+slowly, consecutive repeats agree better with each other than with other rows.  Their
+scatter then underestimates the noise of the session, because it excludes the drift.
 """
 
 from dataclasses import dataclass
@@ -14,21 +13,20 @@ from numpy.typing import NDArray
 from forcefit.validation.campaign.campaign import Campaign
 
 _FEW, _MOST = 0.2, 0.8  # limits of the fraction of consecutive repeats
-# Largest fraction of the session between the first and the last row of a set that
-# counts as consecutive.
+# Largest time span of a set that counts as consecutive, as a fraction of the session.
 _SHORT = 0.1
 
 
 @dataclass(frozen=True)
 class Revisits:
-    """Order in the session of rows that were measured more than once.
+    """Measuring order of rows that were measured more than once.
 
     Attributes:
-        sets: number of sets.  A set consists of all rows of one kind, for example of
-            one configuration, and contains at least two rows.
+        sets: number of sets.  A set consists of at least two rows of one kind, for
+            example all rows of one configuration.
         rows: number of rows in these sets.
         others: number of rows outside these sets.
-        adjacent: fraction of the repeats that directly follow another row of their set.
+        adjacent: fraction of repeats that directly follow a row of the same set.
         span: median time from the first to the last row of a set, as a fraction of the
             duration of the session.
     """
@@ -43,7 +41,7 @@ class Revisits:
     def order(self) -> str:
         """``"interleaved"``, ``"back to back"``, ``"mixed"``, ``"all"``, ``"none"``.
 
-        The value ``"all"`` means that the whole campaign is one set.
+        The value is ``"all"`` if the whole campaign is one set.
         """
         if self.sets == 0:
             return "none"
@@ -57,11 +55,10 @@ class Revisits:
 
 
 def revisits(campaign: Campaign, kinds: NDArray) -> Revisits:
-    """Return the order in the session of rows that were measured more than once.
+    """Return the measuring order of rows that were measured more than once.
 
     Args:
-        campaign: campaign of R rows, which are ordered by ``cov.time`` if it is
-            recorded.
+        campaign: campaign of R rows, ordered by ``cov.time`` if it is recorded.
         kinds: (R,) int, such as ``campaign.repeat`` or ``campaign.configuration``.
     """
     clock = session_clock(campaign)
@@ -89,11 +86,11 @@ def revisits(campaign: Campaign, kinds: NDArray) -> Revisits:
 
 
 def session_clock(campaign: Campaign) -> NDArray:
-    """Return (R,) relative times, 0 at the first and 1 at the last measurement.
+    """Return relative times (R,), from 0 at the first to 1 at the last measurement.
 
     Args:
-        campaign: campaign of R rows.  The order of the rows is used if ``cov.time`` is
-            absent or constant.
+        campaign: campaign of R rows.  If ``cov.time`` is absent or constant, rows are
+            assumed to be equally spaced in time.
     """
     order = np.arange(len(campaign), dtype=float)
     time = campaign.covariates.get("time", order)

@@ -1,15 +1,15 @@
-r"""Plan a campaign whose rows discriminate between effects.
+r"""Plan a measurement campaign that discriminates between effects.
 
-An exchange algorithm chooses, out of many possible rows, the rows that maximise
+An exchange algorithm selects rows from a pool of candidates so as to maximise
 
     sum over e, f of ln(1 + l_ef),
     l_ef = tr(S_ee - S_ef (S_ff + I)^-1 S_fe) / k_e,
 
 Here l_ef is the mean non-centrality of effect e if effect f is fitted instead.  This is
 the criterion of Atkinson and Fedorov, averaged over a normal prior.  The matrices S
-contain products of signatures, summed over the rows.  The derivative of the criterion
-by the weight of each row is known.  Rows with the smallest derivative are exchanged for
-rows with the largest derivative.
+contain products of signatures, summed over the rows.  In each step, rows with the
+smallest derivative of the criterion with respect to their weight are exchanged for rows
+with the largest derivative.
 
 Sources:
     Atkinson, Fedorov (1975), The design of experiments for discriminating between two
@@ -40,8 +40,7 @@ from forcefit.validation.synthetic.design import (
 from forcefit.validation.synthetic.generator import Synthetic
 
 _POOL = 600  # number of candidate rows, of which some are chosen
-# Number of rows with the smallest and with the largest derivatives between which
-# exchanges are tried.
+# Number of rows at either end of the ranking by derivative that exchanges involve.
 _TRIED = 4
 _BETTER = 1e-3  # smallest increase of the criterion for which rows are exchanged
 _AVERAGE = 20  # number of random plans for comparison
@@ -52,18 +51,17 @@ _FEWEST = 8  # minimum number of rows and configurations for held-out rows
 
 @dataclass(frozen=True, eq=False)
 class Planned:
-    """A plan of rows to be measured.
+    """A plan of measurements.
 
     Attributes:
         robot: declared robot.
-        plan: rows in the order of measurement.
-        design: quantities that may vary, and their ranges.
+        plan: rows in measuring order.
+        design: varied quantities and their ranges.
         sigma: [rad, m] noise of the measuring device.
         effects: names of the compared effects.
         apart: (e, e) [-] mean non-centrality of the row's effect if the column's effect
-            is fitted instead.  Each effect is scaled so that it changes the readings by
-            one sigma (rms).
-        random: (e, e) mean of ``apart`` over plans with the same number of random rows.
+            is fitted instead.  Each effect is scaled to an rms change of one sigma.
+        random: (e, e) mean of ``apart`` over random plans of the same size.
     """
 
     robot: Robot
@@ -80,14 +78,14 @@ def plan_rows(
     seed: int = 0,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> Planned:  # fmt: skip
-    """Choose rows that discriminate between the library's effects.
+    """Choose rows that discriminate between library effects.
 
     Args:
         robot: declared robot.
         rows: number of rows to choose.
-        design: quantities that may vary, their ranges, and the configurations.
+        design: varied quantities, their ranges, and the configurations.
         sigma: [rad, m] noise of the measuring device.
-        seed: seed of the random rows to choose from.
+        seed: random seed of the candidate rows.
         progress: function called with the number of finished effects and the total
             number.
 
@@ -95,7 +93,7 @@ def plan_rows(
         The plan.
 
     Raises:
-        BadInput: there are too few rows, the loops can be closed at hardly any
+        BadInput: there are too few rows, the loops can be closed in hardly any
             configuration, or no effect changes the readings.
     """
     if rows < _FEWEST:
@@ -103,8 +101,8 @@ def plan_rows(
     rng = np.random.default_rng(seed)
     count = max(_POOL, 4 * rows)
     pool = _pool(robot, replace(design, rows=count, corners=True), rows, rng)
-    # Clearances are omitted, because computing the pose within them takes long and has
-    # little effect here.
+    # Clearances are omitted: computing the pose within them is slow and has little
+    # effect here.
     tight = without_joint_clearances(robot)
     campaign = rows_as_campaign(tight, pool, design, sigma)
     columns = {
@@ -136,7 +134,7 @@ def plan_rows(
 def _pool(
     robot: Robot, design: CampaignDesign, wanted: int, rng: np.random.Generator
 ) -> CampaignPlan:
-    """Return the candidate rows, spread over the time needed for the planned rows."""
+    """Return the candidate rows, spread over the expected duration of the campaign."""
     # The temperature changes slowly, so rows at equal times have equal temperatures.
     plan = plan_campaign(robot, design, rng)
     time = np.array([row.covariates["time"] for row in plan.rows])
@@ -162,7 +160,7 @@ def rows_as_campaign(
     Args:
         robot: declared robot.
         plan: rows of the campaign.
-        design: design by which the rows were drawn.
+        design: design from which the rows were drawn.
         sigma: [rad, m] noise of the measuring device.
     """
     asked = np.array([list(row.coordinates.values()) for row in plan.rows])
@@ -185,13 +183,13 @@ def rows_as_campaign(
 
 
 def _alike(columns: NDArray) -> NDArray:
-    """Return the columns of an effect, scaled to an rms of one sigma per reading."""
+    """Scale the columns of an effect to an rms of one sigma per reading."""
     size = np.sqrt(np.mean(np.sum(columns**2, axis=1)))
     return columns / size
 
 
 def _ordered(plan: CampaignPlan, chosen: NDArray) -> CampaignPlan:
-    """Return the chosen rows in the order of measurement."""
+    """Return the chosen rows in measuring order."""
     time = [plan.rows[i].covariates["time"] for i in chosen]
     order = chosen[np.argsort(time, kind="stable")]
     return CampaignPlan(
@@ -201,7 +199,7 @@ def _ordered(plan: CampaignPlan, chosen: NDArray) -> CampaignPlan:
 
 
 class _Criterion:
-    """Criterion of a choice of rows, and its derivatives by the weight of each row."""
+    """Design criterion, and its derivatives with respect to the row weights."""
 
     def __init__(self, blocks: list[NDArray], rows: int) -> None:
         begin = np.cumsum([0, *(X.shape[1] for X in blocks)])
@@ -209,11 +207,11 @@ class _Criterion:
         self._X = np.hstack(blocks).reshape(rows, -1, begin[-1])
 
     def apart(self, chosen: NDArray) -> NDArray:
-        """Return the (e, e) mean non-centrality of each effect if another is fitted."""
+        """Return the mean non-centrality (e, e) of each effect if another is fitted."""
         return self._value(chosen)[0]
 
     def _value(self, chosen: NDArray) -> tuple[NDArray, NDArray]:
-        """Return ``apart``, and (rows,) derivatives of the criterion by the weights."""
+        """Return ``apart`` and the derivatives (rows,) with respect to the weights."""
         X = self._X[chosen].reshape(-1, self._X.shape[2])
         S = X.T @ X
         G, apart = np.zeros_like(S), np.full((len(self._own),) * 2, np.nan)
@@ -234,7 +232,7 @@ class _Criterion:
         return apart, slope
 
     def exchanged(self, start: NDArray) -> NDArray:
-        """Return the rows after single exchanges that increase the criterion."""
+        """Exchange single rows as long as the criterion increases."""
         chosen = start.copy()
         apart, slope = self._value(chosen)
         best, going = _told(apart), True
@@ -260,7 +258,7 @@ def _told(apart: NDArray) -> float:
 
 
 def table(planned: Planned) -> dict[str, Any]:
-    """Return a plan as plain values; the least distinguishable pairs are first."""
+    """Convert a plan to plain values, least distinguishable pairs first."""
     names = planned.effects
     pairs = [
         {
@@ -278,7 +276,7 @@ def table(planned: Planned) -> dict[str, Any]:
 
 
 def text(planned: Planned) -> str:
-    """Return the text of a plan, with the five least distinguishable pairs."""
+    """Format a plan as text with the five least distinguishable pairs."""
     shown = table(planned)
     lines = [f"{shown['rows']} rows of {shown['configurations']} configurations"]
     lines.append(
@@ -294,7 +292,7 @@ def text(planned: Planned) -> str:
 
 
 def unmeasured(planned: Planned) -> Synthetic:
-    """Return a plan as a campaign without readings, to be filled in later."""
+    """Convert a plan to a campaign without readings, which the user fills in."""
     missing = np.full((len(planned.plan.rows), 6), np.nan)
     return Synthetic(
         robot=planned.robot, plan=planned.plan,

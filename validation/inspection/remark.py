@@ -1,8 +1,7 @@
-"""Define a sentence about a campaign, and its importance.
+"""Define remarks about a campaign and their importance.
 
-The importance has three levels.  ``lost``: information that no analysis can recover.
-``careful``: an aspect of the campaign that needs care.  ``fine``: an aspect in good
-order.
+A remark has one of three levels: ``lost`` for information that no analysis can recover,
+``careful`` for a warning, and ``fine`` for an adequate aspect of the design.
 """
 
 from dataclasses import dataclass
@@ -12,12 +11,12 @@ LOST, CAREFUL, FINE = "lost", "careful", "fine"
 
 @dataclass(frozen=True)
 class Remark:
-    """A sentence about a campaign's design.
+    """A remark about the design of a campaign.
 
     Attributes:
-        about: subject of the sentence.
+        about: subject of the remark.
         weight: ``"lost"``, ``"careful"`` or ``"fine"``.
-        text: the sentence.
+        text: the remark as a sentence.
     """
 
     about: str

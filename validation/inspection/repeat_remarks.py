@@ -1,4 +1,4 @@
-"""Write sentences about the noise computed from the repeats of a campaign."""
+"""Write remarks about the noise estimated from the repeats of a campaign."""
 
 import numpy as np
 from scipy.stats import chi2
@@ -16,24 +16,24 @@ _SEVERAL = 4  # smallest number of suspect readings that suggests a common cause
 def on_repeats(
     campaign: Campaign, repeats: Revisits, noise: RepeatNoise | None
 ) -> list[Remark]:
-    """Return remarks about the noise computed from the repeats.
+    """Return remarks about the noise estimated from the repeats.
 
     Args:
         campaign: campaign of R rows.
-        repeats: order of the repeats in the session.
+        repeats: order of the repeats within the session.
         noise: noise computed from the repeats; None without repeats.
     """
     if noise is None:
         text = (
-            "Nothing was measured twice: the noise cannot be checked, and the fit of "
-            "the best model is judged by the stated sigma alone."
+            "Nothing was measured twice: the noise cannot be checked, and the goodness "
+            "of fit is judged by the stated sigma alone."
         )
         return [Remark("repeats", LOST, text)]
     remarks = []
     if repeats.order == "back to back":
         text = (
-            "Repeats were measured in a row: they do not contain slow drift. The "
-            "noise from repeats is then too small, and a correct model seems wrong."
+            "Repeats were measured consecutively, so they contain no slow drift: the "
+            "noise from repeats is too small, and a correct model may seem wrong."
         )
         remarks.append(Remark("repeats", CAREFUL, text))
     elif repeats.order == "mixed":
@@ -52,8 +52,8 @@ def on_repeats(
     squares = noise.degrees * noise.ratio**2
     if chi2.sf(squares, noise.degrees) < UNLIKELY:
         text = (
-            f"Repeats scatter {size}: sigma is stated too small, or something changes "
-            "in between that is neither time, temperature nor approach."
+            f"Repeats scatter {size}: sigma is stated too small, or a quantity other "
+            "than time, temperature or approach changes between them."
         )
         remarks.append(Remark("repeats", CAREFUL, text))
     elif chi2.cdf(squares, noise.degrees) < UNLIKELY:
@@ -70,7 +70,7 @@ def on_repeats(
 
 
 def _on_suspects(campaign: Campaign, noise: RepeatNoise) -> list[Remark]:
-    """Return a remark about readings that differ too much from their repeats."""
+    """Return a remark about readings that deviate too much from their repeats."""
     suspects = noise.suspects
     if len(suspects) < _SEVERAL:
         return []
@@ -78,14 +78,14 @@ def _on_suspects(campaign: Campaign, noise: RepeatNoise) -> list[Remark]:
     rows = sorted({int(order[i]) for s in suspects for i in s.rows})
     if 2 * np.count_nonzero(np.diff(rows) == 1) >= len(rows) - 1:
         text = (
-            "Readings far from their repeats follow each other in time: something "
-            "changed quickly; they are not likely to be single mistakes."
+            "Readings far from their repeats follow each other in time: the cause is "
+            "probably a sudden change, not isolated blunders."
         )
         return [Remark("suspects", CAREFUL, text)]
     if len(suspects) == MOST:
         text = (
-            f"{MOST} readings and perhaps more lie far from their repeats: the scatter "
-            "is not that of a normal distribution."
+            f"{MOST} or more readings lie far from their repeats: the scatter is not "
+            "normally distributed."
         )
         return [Remark("suspects", CAREFUL, text)]
     return []

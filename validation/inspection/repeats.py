@@ -1,9 +1,9 @@
-"""Compute the noise of a machine and its measuring device from repeated rows.
+"""Estimate the noise of machine and measuring device from repeated measurements.
 
-Rows of the same configuration and load form a set.  The residuals about the mean of a
-set contain noise and changes between the rows.  Slow changes with time, temperature and
-side of approach are fitted to all sets together.  They are subtracted, so that drift
-does not count as noise.
+Rows of the same configuration and load form a set.  Residuals about the mean of a set
+contain noise and changes between the rows.  Changes with time, temperature and side of
+approach are fitted to all sets together and subtracted, so that drift does not count as
+noise.
 
 ======  ============  ======  ========================================================
 symbol  code          shape   meaning
@@ -33,20 +33,20 @@ from forcefit.validation.campaign.campaign import READING, Campaign
 from forcefit.validation.diagnosis.separability import orthonormal_basis
 from forcefit.validation.inspection.measuring_order import session_clock
 
-_LEVEL = 0.01  # probability of a suspect row without any blunder
+_LEVEL = 0.01  # probability of a false alarm in data without blunders
 MOST = 20  # largest number of suspects
 
 
 @dataclass(frozen=True)
 class Suspect:
-    """A reading that differs too much from its repeats.
+    """A reading that deviates too much from its repeats.
 
     Attributes:
-        rows: row of the reading.  For a set of two rows, both rows are listed, because
-            either reading may be wrong.
+        rows: row of the reading.  If the set consists of two rows, both are listed,
+            because either reading may be wrong.
         component: component of the reading.
         size: [-] deleted residual (Student's t).
-        chance: probability that noise causes a residual at least as large anywhere in
+        chance: probability that noise alone causes a residual this large anywhere in
             the campaign.
     """
 
@@ -58,20 +58,21 @@ class Suspect:
 
 @dataclass(frozen=True, eq=False)
 class RepeatNoise:
-    """Noise computed from repeats, with 90 % confidence intervals.
+    """Noise estimated from repeats, with 90 % confidence intervals.
 
     Attributes:
-        ratio: [-] standard deviation over declared sigma, for all components together.
+        ratio: [-] standard deviation divided by the declared sigma, pooled over all
+            components.
         degrees: degrees of freedom of the ratio.
         interval: confidence interval of the ratio.
-        plain: the ratio without subtraction of slow changes.
-        taken_out: names of the slow changes that were fitted and subtracted, each with
-            the probability that noise causes a change at least as large.
+        plain: the ratio before subtraction of slow changes.
+        taken_out: subtracted slow changes by name, each with the probability that noise
+            alone causes a change this large.
         component: (6,) [rad, m] standard deviations; NaN for components without
             repeats.
         component_degrees: (6,) degrees of freedom.
         component_interval: (6, 2) [rad, m] confidence intervals.
-        suspects: readings that differ too much from their repeats.  They are excluded
+        suspects: readings that deviate too much from their repeats.  They are excluded
             from all values above.
     """
 
@@ -89,15 +90,15 @@ class RepeatNoise:
 def repeat_noise(
     campaign: Campaign, slow: Mapping[str, NDArray] | None = None
 ) -> RepeatNoise | None:
-    """Return the noise from a campaign's repeats; None if no row was measured twice.
+    """Return the noise estimated from repeats; None if no row was measured twice.
 
-    Slow changes are subtracted, but not if their fit would use more than half of the
+    Slow changes are subtracted unless their fit would use up more than half of the
     degrees of freedom.
 
     Args:
         campaign: campaign of N measured cells.
-        slow: mapping from the name of each slow change to its (N, p) columns over
-            sigma; by default the result of :func:`slow_changes`.
+        slow: mapping from the name of each slow change to its columns (N, p), divided
+            by sigma; by default the result of :func:`slow_changes`.
     """
     slow = slow_changes(campaign) if slow is None else slow
     suspects: list[Suspect] = []
@@ -115,16 +116,16 @@ def repeat_noise(
 
 
 def slow_changes(campaign: Campaign) -> dict[str, NDArray]:
-    """Return the columns of slow changes, which are equal in every configuration.
+    """Return the columns of slow changes that are the same in every configuration.
 
     Args:
         campaign: campaign of N measured cells.
 
     Returns:
-        Mapping from the name of each change to (N, p) columns over sigma, separate for
-        each component.  The changes are an exponential settling and a cubic function of
-        time, and shifts with temperature and side of approach if these vary.  Without a
-        time, the order of the file is used.
+        Mapping from the name of each change to its columns (N, p), divided by sigma and
+        separate for each component.  The changes are an exponential settling and a
+        cubic function of time, and, where these vary, shifts with temperature and side
+        of approach.  If no time was recorded, rows are assumed to be equally spaced.
     """
     clock = 2 * session_clock(campaign) - 1
     shapes = {
@@ -141,11 +142,11 @@ def slow_changes(campaign: Campaign) -> dict[str, NDArray]:
 
 
 def for_each_component(campaign: Campaign, shapes: NDArray) -> NDArray:
-    """Return (N, 6 p) columns over sigma with separate changes for each component.
+    """Return columns (N, 6 p), divided by sigma, with separate changes per component.
 
     Args:
         campaign: campaign of R rows and N measured cells.
-        shapes: (R, p) values of the changes in each row.
+        shapes: (R, p) value of each change in each row.
     """
     cells = campaign.cells
     row, component = np.nonzero(cells)
@@ -154,13 +155,13 @@ def for_each_component(campaign: Campaign, shapes: NDArray) -> NDArray:
 
 
 def _sets(campaign: Campaign) -> NDArray:
-    """Return the (N,) index of the set of repeats of each measured cell."""
+    """Return the set of repeats (N,) to which each measured cell belongs."""
     row, component = np.nonzero(campaign.cells)
     return campaign.repeat[row] * 6 + component
 
 
 def _repeated_cells(campaign: Campaign, out: set[int]) -> NDArray:
-    """Return (N,) bool, True for cells with a repeat in rows that are not excluded."""
+    """Return a mask (N,) of cells that are repeated in rows that are not excluded."""
     row, _ = np.nonzero(campaign.cells)
     kept = ~np.isin(row, list(out))
     sets = _sets(campaign)
@@ -169,7 +170,7 @@ def _repeated_cells(campaign: Campaign, out: set[int]) -> NDArray:
 
 
 class _RepeatFit:
-    """A fit of set means and slow changes to repeated cells."""
+    """Least-squares fit of set means and slow changes to repeated cells."""
 
     def __init__(
         self, campaign: Campaign, cells: NDArray, slow: Mapping[str, NDArray]
@@ -194,13 +195,13 @@ class _RepeatFit:
         self.rss = float(self.rest @ self.rest)
 
     def _centred(self, columns: NDArray) -> NDArray:
-        """Return the columns minus their mean in every set."""
+        """Subtract the mean of every set from the columns."""
         sums = np.zeros((len(self.count), columns.shape[1]))
         np.add.at(sums, self.set, columns)
         return columns - (sums / self.count[:, None])[self.set]
 
     def suspect(self) -> Suspect | None:
-        """Return the reading that differs most from its repeats; None if noise."""
+        """Return the most deviating reading, or None if noise explains it."""
         if self.degrees < 2 or self.rss == 0.0:
             return None
         free = np.maximum(1 - self.leverage, 1e-12)
@@ -217,7 +218,7 @@ class _RepeatFit:
         )
 
     def noise(self, suspects: list[Suspect]) -> RepeatNoise:
-        """Return the noise computed from the repeats without the suspect readings."""
+        """Return the noise estimated from the repeats without suspect readings."""
         free, rest = 1 - self.leverage, self.rest**2
         degrees = np.bincount(self.component, free, 6)
         cells = np.maximum(np.bincount(self.component, minlength=6), 1)
@@ -244,7 +245,7 @@ class _RepeatFit:
         )
 
     def _chance(self, name: str) -> float:
-        """Return the probability that noise causes a slow change at least as large."""
+        """Return the probability that noise alone causes a slow change this large."""
         others = [B for key, B in self.slow.items() if key != name]
         basis = _basis(others, len(self.z))
         rest = self.z - basis @ (basis.T @ self.z)
@@ -256,11 +257,11 @@ class _RepeatFit:
 
 
 def _basis(blocks: Iterable[NDArray], rows: int) -> NDArray:
-    """Return a (rows, rank) orthonormal basis of the columns of all blocks."""
+    """Return an orthonormal basis (rows, rank) of the columns of all blocks."""
     return orthonormal_basis(np.column_stack([np.zeros((rows, 0)), *blocks]))
 
 
 def _interval(degrees: float) -> tuple[float, float]:
-    """Return the 90 % interval of a standard deviation, as factors of its estimate."""
+    """Return the 90 % interval of a standard deviation, relative to its estimate."""
     low, high = chi2.ppf([0.05, 0.95], degrees)
     return float(np.sqrt(degrees / high)), float(np.sqrt(degrees / low))

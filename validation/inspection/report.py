@@ -1,4 +1,4 @@
-"""Create the report page of an inspection, which precedes any diagnosis."""
+"""Create the report page of an inspection."""
 
 from forcefit.page.page import Page, Provenance, Tile, listed, page, paragraph, section
 from forcefit.page.tables import Cell, Column, Value, table
@@ -16,15 +16,16 @@ from forcefit.validation.inspection.remark import CAREFUL, LOST
 _ASSUMED = (
     "Effects have the plausible sizes of the library; the campaign may have larger or "
     "smaller ones.",
-    "The noise of the readings is their stated sigma, unless repeats show another one.",
-    "Nothing is fitted: the readings are used only for the noise between repeats.",
+    "The noise of the readings is their stated sigma unless repeats indicate "
+    "otherwise.",
+    "Nothing is fitted: readings are used only to estimate the noise between repeats.",
 )
 _HEADS = {LOST: "What this campaign cannot determine", CAREFUL: "Warnings"}
 Cells = list[list[Cell]]
 
 
 def inspection_page(inspection: Inspection, provenance: Provenance) -> str:
-    """Return the page of an inspection, which is self-contained HTML.
+    """Return the report page of an inspection as self-contained HTML.
 
     Args:
         inspection: result of
@@ -56,14 +57,14 @@ def inspection_page(inspection: Inspection, provenance: Provenance) -> str:
 
 
 def _texts(inspection: Inspection, weight: str) -> list[str]:
-    """Return the remarks of one importance."""
+    """Return the texts of all remarks of one level."""
     return [one.text for one in inspection.remarks if one.weight == weight]
 
 
 def _verdict(inspection: Inspection) -> str:
-    """Return the number of detectable effects, of losses and of warnings as text."""
+    """Summarise the detectable effects, the losses and the warnings in one sentence."""
     seen, count = int(inspection.separability.visible.sum()), _library(inspection)
-    text = f"The design can show {seen} of {count} effects of the library"
+    text = f"The design can reveal {seen} of {count} library effects"
     counts = {
         "cannot be determined": len(_texts(inspection, LOST)),
         "warnings": len(_texts(inspection, CAREFUL)),
@@ -73,7 +74,7 @@ def _verdict(inspection: Inspection) -> str:
         else f"{n} {what[:-1] if n == 1 else what}"
         for what, n in counts.items() if n
     ]  # fmt: skip
-    return f"{text}; {', '.join(words) or 'nothing speaks against it'}."
+    return f"{text}; {', '.join(words) or 'no objections'}."
 
 
 def _library(inspection: Inspection) -> int:
@@ -82,7 +83,7 @@ def _library(inspection: Inspection) -> int:
 
 
 def _good(inspection: Inspection) -> bool | None:
-    """Return False if no diagnosis can begin, None if there are warnings, else True."""
+    """Return True, None if there are warnings, or False if no diagnosis is possible."""
     unregistered = bool(inspection.signatures.unregistered)
     if unregistered or not inspection.separability.visible.any():
         return False
@@ -90,7 +91,7 @@ def _good(inspection: Inspection) -> bool | None:
 
 
 def _tiles(inspection: Inspection) -> list[Tile]:
-    """Return tiles of the number of rows, the noise, and the effects."""
+    """Return tiles for the number of rows, the noise and the effects."""
     s, noise = inspection.separability, inspection.noise
     tiles = [
         Tile("Rows", [str(len(inspection.campaign))],
@@ -104,14 +105,14 @@ def _tiles(inspection: Inspection) -> list[Tile]:
     seen = f"{int(s.visible.sum())} of {_library(inspection)}"
     tiles.append(Tile("Detectable effects", [seen], ["at plausible sizes."]))
     groups = s.classes()
-    alike = "; ".join(", ".join(group) for group in groups) or "no complete imitation"
+    alike = "; ".join(", ".join(group) for group in groups) or "none"
     tiles.append(Tile("Groups that cannot be distinguished", [str(len(groups))],
                       [f"{alike}."]))  # fmt: skip
     return tiles
 
 
 def _remarks(inspection: Inspection) -> list[str]:
-    """Return a section for each kind of remark that occurs."""
+    """Return one section for each level of remarks."""
     found = {head: _texts(inspection, weight) for weight, head in _HEADS.items()}
     if inspection.open.any():
         found[_HEADS[CAREFUL]].append(f"{open_text(inspection.open)}.")
@@ -119,7 +120,7 @@ def _remarks(inspection: Inspection) -> list[str]:
 
 
 def _effects(inspection: Inspection) -> str:
-    """Return a table: each effect's smallest detectable size, or why it has none."""
+    """Tabulate the smallest detectable size of each effect."""
     s = inspection.separability
     rows: Cells = [
         [name, "yes" if s.visible[i] else "if larger" if s.traced[i] else "no",
@@ -129,7 +130,7 @@ def _effects(inspection: Inspection) -> str:
     ]  # fmt: skip
     head: list[str | Column] = [
         "effect", "detectable", Column("from this multiple of the plausible size"),
-        Column("signature [sigma]"), Column("share that the registration leaves"),
+        Column("signature [sigma]"), Column("fraction left by the registration"),
         "unknowns determined",
     ]  # fmt: skip
     untestable = [f"{k}: {why}" for k, why in inspection.signatures.untestable.items()]
@@ -140,7 +141,7 @@ def _effects(inspection: Inspection) -> str:
 
 
 def _distinguished(inspection: Inspection) -> str:
-    """Return the chart of effects that imitate each other, and the pairs as text."""
+    """Chart which effects imitate each other, and list indistinguishable effects."""
     s = inspection.separability
     texts = [f"{', '.join(group)} cannot be distinguished." for group in s.classes()]
     texts += [f"{b} can reproduce every effect of {a}." for a, b in s.imitated()]
@@ -151,7 +152,7 @@ def _distinguished(inspection: Inspection) -> str:
 
 
 def _readings(inspection: Inspection) -> str:
-    """Return a table of size, declared sigma and noise of each measured component."""
+    """Tabulate the size, declared sigma and noise of each measured component."""
     rows: Cells = []
     for k, one in enumerate(reading_counts(inspection.campaign).values()):
         if not one["measured"]:
@@ -170,7 +171,7 @@ def _readings(inspection: Inspection) -> str:
 
 
 def _suspects(inspection: Inspection) -> str:
-    """Return a table of readings that differ too much from their repeats."""
+    """Tabulate the readings that deviate too much from their repeats."""
     if inspection.noise is None or not inspection.noise.suspects:
         return ""
     ids = inspection.campaign.ids
@@ -183,7 +184,7 @@ def _suspects(inspection: Inspection) -> str:
 
 
 def _conditions(inspection: Inspection) -> str:
-    """Return a table of the levels and ranges of loads and covariates."""
+    """Tabulate the levels and ranges of loads and covariates."""
     loads = load_counts(inspection.campaign)
     rows: Cells = [
         [kind, str(loads["levels"]), *(Value(float(v), unit) for v in loads[kind])]

@@ -16,7 +16,7 @@ from forcefit.validation.inspection.repeats import RepeatNoise
 
 
 def inspection_text(inspection: Inspection) -> str:
-    """Return an inspection as text."""
+    """Format an inspection as text."""
     c = inspection.campaign
     kinds = row_counts(c.configuration)
     lines = [
@@ -40,7 +40,7 @@ def inspection_text(inspection: Inspection) -> str:
 
 
 def _separability_lines(inspection: Inspection) -> list[str]:
-    """Return lines about detectable effects, and about indistinguishable effects."""
+    """Return lines about detectable and about indistinguishable effects."""
     s = inspection.separability
     lines = ["Effects, at plausible sizes, in this design:"]
     shown = [n for n, seen in zip(s.names, s.visible, strict=True) if seen]
@@ -86,7 +86,7 @@ def _reading_lines(c: Campaign) -> list[str]:
 
 
 def _load_lines(c: Campaign) -> list[str]:
-    """Return the levels and magnitudes of the load."""
+    """Return one line about the levels and magnitudes of the load."""
     t = load_counts(c)
     return [
         f"load: {t['levels']} levels, up to {t['force'][1]:.4g} N and "
@@ -103,7 +103,7 @@ def _covariate_lines(c: Campaign) -> list[str]:
 
 
 def _noise_lines(c: Campaign, noise: RepeatNoise | None) -> list[str]:
-    """Return lines: each component's noise from repeats, and the suspect readings."""
+    """Return lines about the noise from repeats and about suspect readings."""
     if noise is None:
         return []
     low, high = noise.interval

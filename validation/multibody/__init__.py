@@ -1,4 +1,4 @@
-"""Simulate the forced assembly in Exudyn; only the robot's data are shared.
+"""Simulate the forced assembly in Exudyn, independently of the model.
 
 Start with ``simulation.py``.
 """

@@ -1,7 +1,7 @@
-"""Compute the axes and the section stiffness of beams in the simulation.
+"""Compute axes and section stiffness of simulated beams.
 
-This module is independent of :mod:`forcefit.assembly.model.links`, except for the
-constants of a cross-section.
+Apart from cross-section constants, this module is independent of
+:mod:`forcefit.assembly.model.links`.
 """
 
 import math
@@ -16,7 +16,7 @@ from forcefit.validation.multibody.motion import turned
 
 
 def beam_span(frame: Frame, link: BeamLink) -> tuple[float, NDArray]:
-    """Return the length [m] of a beam, and its direction (3,) in the frame's axes."""
+    """Return the length [m] and the direction (3,) of a beam, in frame axes."""
     if link.length is not None and link.axis is not None:
         return link.length, np.array(link.axis)
     x = turned(frame.rotation).T @ frame.translation
@@ -37,8 +37,8 @@ def element_stiffness(link: BeamLink, step: float) -> NDArray:
     """Return corrected EA, GA_y, GA_z, GJ, EI_y, EI_z for elements of a given length.
 
     An element of constant strain neglects the deflection step^3 / 12 EI of its own
-    bending.  If the shear stiffness is reduced by this deflection, the tip deflection
-    of a cantilever is exact for any number of elements.
+    bending.  With the shear stiffness reduced accordingly, the tip deflection of a
+    cantilever is exact for any number of elements.
 
     Args:
         link: the beam.

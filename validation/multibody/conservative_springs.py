@@ -2,14 +2,14 @@
 
 The energy of a spring is s.K s / 2, where s is the logarithm of the motion between its
 ends.  Exudyn applies the wrench K s half-way between the ends.  This wrench equals the
-gradient only to first order in the deformation.  The resulting error of forces, and of
-the stiffness of a robot with deformed springs, is of second order in the rotation.
-This module computes the exact gradient with the inverse of the derivative of the
-exponential map.  A screw is a dual vector, so the translational part of this inverse is
-the derivative of its rotational part along the translation.
+gradient only to first order in the deformation.  The resulting error in forces, and in
+the stiffness of a robot with deformed springs, is of second order in the rotation. This
+module computes the exact gradient with the inverse of the derivative of the exponential
+map.  A screw is a dual vector, so the translational part of this inverse is the
+derivative of its rotational part along the translation.
 
-Exudyn calls these functions about a hundred thousand times, so tuples are used as
-vectors because they are faster.
+Exudyn calls these functions about a hundred thousand times, so vectors are tuples,
+which are faster.
 
 Sources:
     Selig (2005), Geometric fundamentals of robotics, section 4.5 (the series in
@@ -70,7 +70,7 @@ def middle_wrench(K: Sequence[Sequence[float]], screw: Sequence[float]) -> list[
 
 
 def far_couple(screw: Sequence[float], force: Sequence[float]) -> list[float]:
-    """Return the couple that Exudyn omits at a spring's far end.
+    """Return the couple that Exudyn omits at the far end of a spring.
 
     Exudyn applies the wrench at half of the screw's translation from either end.  These
     two points coincide only without a rotation.  Perpendicular to the rotation axis, a

@@ -1,15 +1,15 @@
 """Model joint clearances as smooth, conservative contacts.
 
-Joints move freely inside bounds, called cones.  (TX, TY) and (RX, RY) are bounded by
-discs, and TZ and RZ by intervals.  Alternatively, a ball bounds (TX, TY, TZ).  At
-distance r from the middle of a cone of size c,
+Joints move freely within bounds, called cones.  (TX, TY) and (RX, RY) are bounded by
+discs, and TZ and RZ by intervals.  Alternatively, (TX, TY, TZ) is bounded by a ball.
+At distance r from the middle of a cone of size c,
 
     x = (r^2 - c^2) / 2c,   P = (x + sqrt(x^2 + w^2)) / 2,   energy = k P^2 / 2,
 
 so the force is k P P' r / c.  The force is nearly zero inside, is that of a stiff
-spring outside, and is smooth everywhere.  At the middle, a smoothing of r - c would be
-singular.  The width w, relative to c, is 3 at first, which centres the joint weakly.
-It is then reduced to 3e-4.
+spring outside, and is smooth everywhere.  Smoothing r - c instead would be singular at
+the middle.  The width w, relative to c, starts at 3, which weakly centres the joint,
+and is then reduced to 3e-4.
 
 A pin in two bushes has contacts at z = +h and z = -h.  At each contact, a disc bounds
 the position of the pin's axis, (TX + h RY, TY - h RX).  The two discs replace the
@@ -62,7 +62,7 @@ class ClearanceCone:
 
 @dataclass(frozen=True)
 class JointClearance:
-    """Motions of a joint that are possible without deformation of its springs.
+    """Motions of a joint that do not deform its springs.
 
     Attributes:
         cones: the bounds on the motions.
@@ -73,7 +73,7 @@ class JointClearance:
     free: tuple[int, ...]
 
     def softened(self, factor: float) -> "JointClearance":
-        """Return the clearance after multiplying its contact stiffness by a factor."""
+        """Multiply the contact stiffness of the clearance by a factor."""
         cones = (replace(c, stiffness=factor * c.stiffness) for c in self.cones)
         return replace(self, cones=tuple(cones))
 
@@ -88,7 +88,7 @@ class JointClearance:
 def joint_clearance(
     frame: Frame, scale: float = 1.0, bushes: bool = False
 ) -> JointClearance:
-    """Return the clearances of a frame's joint, and its motion if it has no spring.
+    """Return the clearances of a frame's joint, and its motion if it is unsprung.
 
     Args:
         frame: frame of a robot.
@@ -98,7 +98,7 @@ def joint_clearance(
             bushes follows from the tilt.
 
     Returns:
-        The clearance.  Every row is locked if the joint has neither clearance nor free
+        The clearance, with every row locked if the joint has neither clearance nor free
         motion.
     """
     given = frame.clearance or Clearance()

@@ -1,8 +1,8 @@
 """Build an Exudyn model of bodies, springs, contacts, closures and loads.
 
-Bodies are massless for the static solver.  A place is a point with axes that is fixed
-to a body.  Elastic parts and locked joints connect two places.  Exudyn orders screws
-and wrenches as [T R].  Arguments and results of this module are [R T] as in the whole
+Bodies are massless for the static solver.  A place is a coordinate frame fixed to a
+body.  Elastic parts and locked joints connect two places.  Exudyn orders screws and
+wrenches as [T R].  Arguments and results of this module are [R T] as in the whole
 library.  :mod:`forcefit.validation.multibody.exudyn_solver` solves the model,
 :mod:`forcefit.validation.multibody.exudyn_reading` evaluates it.
 """
@@ -29,7 +29,7 @@ from forcefit.validation.multibody.motion import inverse, shifted
 
 _SWAP = np.r_[3:6, 0:3]  # swaps [R T] and Exudyn's order [T R]
 IDLE_STIFFNESS = 1e-6  # [N m/rad, N/m] residual stiffness of free motions
-# [N m/rad, N/m] stiffness of free motions while the closures are closed
+# [N m/rad, N/m] Stiffness of free motions while the loops are closed.
 HOLDING_STIFFNESS = 1e-2
 # [N/m] Stiffness that centres clearances.  Its rotational value is 1e-3 times as large
 # [N m/rad], and 1e-6 times about the axis of the joint.
@@ -38,19 +38,17 @@ _CENTRING = 1e3
 
 @dataclass(frozen=True)
 class Regularisation:
-    """Springs and tolerances of the simulation that are not data of a robot.
+    """Springs and tolerances that belong to the simulation, not to a robot.
 
     Attributes:
         closing: [N m/rad, N/m] stiffness of the connectors that close the loops.
-            ``inf`` replaces the connectors by rigid joints, for a robot that is built
-            closed.
+            ``inf`` replaces them by rigid joints, for a robot that is built closed.
         idle: [N m/rad, N/m] residual stiffness of free motions.
-        narrow: [-] last width of the smoothing of contacts, which also centres
-            clearances.
+        narrow: [-] last smoothing width of contacts, which also centres clearances.
         tolerance: [m, rad, -] increment of Newton's method at which the iteration ends.
         contact: factor on the stiffness of contacts.
-        conservative: whether the wrench of a spring is the gradient of its energy,
-            instead of Exudyn's approximation.
+        conservative: whether spring wrenches are energy gradients instead of Exudyn's
+            approximation.
     """
 
     closing: float
@@ -71,8 +69,8 @@ class Model:
         width: [-] width of the contacts' smoothing, relative to the size of their
             cones.
         deadline: [s] value of ``time.monotonic`` after which the solver stops.
-        callback_error: exception that a user function raised.  It is stored here
-            because Exudyn reports only that there was an error.
+        callback_error: exception raised by a user function, stored because Exudyn
+            reports only that an error occurred.
         idle: Exudyn's numbers of the springs on free motions, and their axes.
         recorded: places whose motion is recorded while the loops are closed.
         history: (places, 4, 4) poses of these places at each step.
@@ -99,7 +97,7 @@ class Model:
         self.history: list[NDArray] = []
 
     def discard(self) -> None:
-        """Release the memory of the model, which Exudyn does not release by itself."""
+        """Release the memory of the model, which Exudyn does not do by itself."""
         self.mbs.SetPreStepUserFunction(0)
         self.mbs.Reset()
         self.container.Reset()
@@ -131,7 +129,7 @@ class Model:
             self.mbs.AddObject(joint)
         K = np.where(np.outer(soft, soft), K, 0.0)
         spring = self._connect(markers, K)
-        # For a single elastic axis, Exudyn's own wrench is the gradient.
+        # For a single elastic axis, Exudyn's own wrench is already the gradient.
         if self.regularisation.conservative and soft.sum() > 1:
             self._follow_energy(spring, markers[1], K)
         return Elastic(place, far, (spring,))
@@ -234,7 +232,7 @@ class Model:
         return tuple(parts), tuple(bodies)
 
     def add_closure(self, first: Place, second: Place, closed: NDArray) -> Closure:
-        """Add a connector that is free of stress while the loop is open."""
+        """Add a connector that is unstressed while the loop is open."""
         gap = inverse(first.built) @ second.built
         marker = self.add_marker(first.moved(gap))
         markers = [marker, self.add_marker(second)]
@@ -296,9 +294,8 @@ class Model:
             lacking[:] = far_couple(screw, wrench[3:])
             return wrench
 
-        # Exudyn evaluates connectors before loads.  When Exudyn differentiates loads,
-        # it moves only the far end, and the couple must not change.  The couple hardly
-        # changes if the near end moves too.
+        # Exudyn evaluates connectors before loads.  When it differentiates loads, it
+        # moves only the far end, and the couple must not change.
         load = self.item.LoadTorqueVector(
             markerNumber=far, bodyFixed=True,
             loadVectorUserFunction=lambda mbs, t, load: lacking,

@@ -13,7 +13,7 @@ from forcefit.validation.multibody.contact import JointClearance
 
 
 class SimulationFailed(RuntimeError):
-    """Error: the simulation found no equilibrium.
+    """Exception raised if the simulation found no equilibrium.
 
     Attributes:
         robot: name of the robot.
@@ -27,7 +27,7 @@ class SimulationFailed(RuntimeError):
 
 
 class OutOfTime(SimulationFailed):
-    """Error: the simulation stopped because its time limit was reached."""
+    """Exception raised if the simulation reached its time limit."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +56,7 @@ class Place:
 
 @dataclass(frozen=True, eq=False)
 class Elastic:
-    """An elastic part between two places that coincide without stress.
+    """An elastic part between two places that coincide when unstressed.
 
     Attributes:
         near: place on the inner body.
@@ -99,8 +99,7 @@ class MeshBody:
     """A meshed solid and its orientation in a robot.
 
     Attributes:
-        solid: the solid, which all links of one shape share and which is condensed
-            once.
+        solid: the solid, which links of equal shape share and which is condensed once.
         turn: (3, 3) the mesh's axes in the frame's axes.
     """
 

@@ -18,14 +18,14 @@ from forcefit.validation.multibody.motion import inverse, logarithm, matrix
 
 
 def pose(model: Model, place: Place) -> NDArray:
-    """Return the present (4, 4) pose of a place in the base frame."""
+    """Return the current pose (4, 4) of a place in the base frame."""
     read, kind = model.mbs.GetObjectOutputBody, model.exu.OutputVariableType
     R = np.reshape(read(place.body, kind.RotationMatrix), (3, 3))
     return matrix(R, read(place.body, kind.Position)) @ place.local
 
 
 def closure_error(model: Model, closure: Closure) -> NDArray:
-    """Return the (6,) [rad, m] screw from the closed position to the present one."""
+    """Return the screw (6,) [rad, m] from the closed to the current position."""
     first = pose(model, closure.first) @ closure.closed
     return logarithm(inverse(first) @ pose(model, closure.second))
 

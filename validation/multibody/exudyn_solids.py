@@ -1,4 +1,4 @@
-"""Add meshed links to an Exudyn model: solids in floating frames with rigid ends."""
+"""Add meshed links to an Exudyn model as solids in floating frames."""
 
 from typing import Any
 from weakref import WeakKeyDictionary
@@ -94,7 +94,7 @@ def _floating(fem: Any, solid: MeshedSolid) -> Any:
         link.nodes = {"Position": solid.nodes}
         link.surface = [{"Name": "none", "Trigs": []}]
         link.stiffnessMatrix = solid.stiffness
-        # Exudyn requires a mass matrix but does not use it.
+        # Exudyn requires a mass matrix but does not use it here.
         link.massMatrix = identity(3 * len(solid.nodes), format="csr")
         link.ComputeHurtyCraigBamptonModes(
             [solid.base.tolist(), solid.tip.tolist()],

@@ -1,8 +1,8 @@
-"""Solve an Exudyn model statically in stages, from the open robot to equilibrium.
+"""Solve an Exudyn model statically, in stages from open robot to equilibrium.
 
-First the loops are closed while the loads increase.  Then contacts stiffen, if there
-are any, and free motions are released.  Finally the target of each closure is corrected
-by its remaining closure error until all errors vanish.
+First, the loops are closed while the loads increase.  Then contacts, if any, are
+stiffened and free motions are released.  Finally, the target of each closure is
+corrected by its closure residual until all residuals vanish.
 
 The time limit is enforced in two ways.  Exudyn measures processor time and stops
 between two steps, and the user functions check the clock.  Exceptions in user
@@ -31,15 +31,15 @@ from forcefit.validation.multibody.exudyn_reading import (
 )
 from forcefit.validation.multibody.motion import exponential, inverse, logarithm
 
-_CLOSED = 1e-12  # [rad, m] closure errors below this value count as zero
+_CLOSED = 1e-12  # [rad, m] closure residuals below this value count as zero
 _LOAD_STEPS = 4
-# number of steps in which the springs on free motions are weakened
+# Number of steps in which the springs on free motions are weakened.
 _RELEASING_STEPS = 4
 # Number of steps, geometrically spaced, in which the smoothing of the contacts is
 # reduced.
 _NARROWING_STEPS = 30
 _CLOSING_STEPS = 30
-# Largest number of steps; each reduces the residual by a factor of a million.
+# Largest number of steps, each of which reduces the residual by a factor of a million.
 _RELAXING_STEPS = 4
 _RESTS = 1e-10  # [rad, m] change below which free motions count as at rest
 NO_EQUILIBRIUM = "no equilibrium"  # begins the status of a solution that fails
@@ -63,7 +63,7 @@ def solve(
         steps: smallest number of steps for closing the loops.
 
     Returns:
-        The shifts of the targets, with which :func:`close` continues if loads change.
+        The target shifts, with which :func:`close` continues if loads change.
 
     Raises:
         SimulationFailed: no equilibrium was found; :class:`OutOfTime` if the model's
@@ -100,7 +100,7 @@ def close(model: Model, closures: list[Closure], shift: NDArray) -> None:
     raise SimulationFailed(
         model.robot,
         f"a closure stays open by {largest_gap(model, closures):.2g} rad or m: "
-        "the rigid parts do not fit",
+        "the rigid parts do not fit together",
     )
 
 
@@ -109,8 +109,8 @@ def relax(
 ) -> None:
     """Set the rest positions of the weak springs on free motions to the present state.
 
-    Otherwise these springs would displace the equilibrium.  The stiffness of a robot
-    that deforms during such a motion would then be different.
+    Otherwise these springs would displace the equilibrium and thereby change the
+    stiffness of a robot that deforms during such motions.
 
     Args:
         model: model in equilibrium.
@@ -211,7 +211,7 @@ def raise_callback_error(model: Model, stage: str) -> None:
 
 
 def static_settings(model: Model, start: float, steps: int) -> Any:
-    """Return Exudyn's settings for :func:`equilibrate`."""
+    """Return the Exudyn settings of :func:`equilibrate`."""
     settings = model.exu.SimulationSettings()
     settings.linearSolver.solverType = model.exu.LinearSolverType.EigenSparse
     settings.solution.file.write = False
@@ -231,7 +231,7 @@ def static_settings(model: Model, start: float, steps: int) -> Any:
 
 
 def _record(model: Model) -> None:
-    """Record the present poses of the recorded places."""
+    """Record the current poses of the recorded places."""
     if model.recorded:
         model.history.append(np.array([pose(model, place) for place in model.recorded]))
 

@@ -1,10 +1,10 @@
 """Compute small vibrations of an Exudyn model about its equilibrium.
 
 Exudyn linearises the model by forward differences and projects it onto the motions that
-its joints allow.  Differences of two step sizes are combined so that the first-order
-error cancels.  Without this combination, the frequencies of a stiff robot are wrong by
-1e-6 to 1e-2.  The mass matrix is singular, because only bodies with a given mass or
-given moments of inertia contribute.  Degrees of freedom without inertia are therefore
+its joints allow.  Differences with two step sizes are combined so that the first-order
+error cancels; without this, the frequencies of a stiff robot have errors of 1e-6 to
+1e-2.  The mass matrix is singular, because only bodies with a given mass or given
+moments of inertia contribute.  Degrees of freedom without inertia are therefore
 condensed statically.
 """
 

@@ -1,15 +1,14 @@
-"""Compute the platform's compliance from the linearised system of the simulation.
+"""Compute the platform compliance from the linearised simulation.
 
 Exudyn's residual is differentiated at the equilibrium, while loads and the reactions of
 joints and closures are held constant.  The derivatives are computed along motions that
 joints and closures allow, so that stiff directions add no noise.  These motions are
 modes of Exudyn's own Jacobian, which separate compliant from stiff directions.  The
-differences are extrapolated to step zero.
+differences are extrapolated to zero step.
 
-Weak springs of stiffness k hold free motions, so that the model can be solved.  Their
-effect is removed by adding k X (1 - k B)^-1 X' to the compliance (Woodbury identity).
-X and B are the responses of the platform and of the free joints to loads on these
-joints.
+Weak springs of stiffness k hold free motions so that the model can be solved.  Their
+effect is removed by adding k X (1 - k B)^-1 X' to the compliance (Woodbury identity). X
+and B are the responses of the platform and of the free joints to loads on these joints.
 """
 
 from collections.abc import Callable
@@ -153,7 +152,7 @@ def _compliance(
 
 
 def _is_stable(model: Model, K: NDArray, V: NDArray) -> bool:
-    """Return whether no motion lowers the potential beyond the uncertainty of K."""
+    """Return whether the equilibrium is stable within the uncertainty of K."""
     # The computed curvature of free motions is a rounding error and may have either
     # sign.
     K = K + 1e3 * model.regularisation.idle * V[6:].T @ V[6:]
@@ -163,12 +162,12 @@ def _is_stable(model: Model, K: NDArray, V: NDArray) -> bool:
 
 
 def _held(model: Model, K: NDArray, V: NDArray) -> NDArray:
-    """Return the stiffness of the modes including the weak springs."""
+    """Return the modal stiffness including the weak springs."""
     return K + model.regularisation.idle * V[6:].T @ V[6:]
 
 
 def _by_modes(model: Model, K: NDArray, V: NDArray) -> NDArray:
-    """Return the compliance from the stiffness of the modes without weak springs."""
+    """Return the compliance from the modal stiffness without weak springs."""
     whole = V @ _solve(_held(model, K, V), V.T)
     k, coupled = model.regularisation.idle, whole[:6, 6:]
     held, ways = np.linalg.eigh(np.eye(len(whole) - 6) - k * whole[6:, 6:])
@@ -180,7 +179,7 @@ def _by_modes(model: Model, K: NDArray, V: NDArray) -> NDArray:
 
 
 def _solve(K: NDArray, right: NDArray) -> NDArray:
-    """Return K^-1 right for stiffnesses of very different magnitudes."""
+    """Solve K x = right for stiffnesses of very different magnitudes."""
     K = (K + K.T) / 2
     size = 1.0 / np.sqrt(np.abs(np.diag(K)))
     scaled = K * np.outer(size, size)

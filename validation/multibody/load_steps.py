@@ -1,11 +1,10 @@
-"""Compute the platform's compliance from small loads, with its uncertainty.
+"""Compute the platform compliance from small load steps, with its uncertainty.
 
 At the equilibrium, small loads are applied to the platform along each axis in both
 directions, with decreasing steps.  The compliance is half the difference of the
 platform's motions divided by the load.  Its error is proportional to the square of the
-step.  The size of this error depends on internal motions, because a joint may rotate a
-hundred times as much as the platform.  Therefore the differences are extrapolated to
-step zero.
+step.  Its size depends on internal motions, because a joint may rotate a hundred times
+as much as the platform, so the differences are extrapolated to zero step.
 """
 
 from functools import partial
@@ -89,7 +88,7 @@ def stepped_compliance(
             except OutOfTime:
                 raise
             except SimulationFailed:
-                # A large step may leave the range in which an equilibrium exists.
+                # There may be no equilibrium under a large step.
                 if step <= _LARGEST / size / _RATIO ** (_SIZES - 3):
                     raise
                 slopes.clear()

@@ -1,4 +1,4 @@
-"""Build the open robot without stress from bodies with geometric errors.
+"""Build the unstressed robot with its loops cut open and its geometric errors.
 
 At each frame, three motions are applied in the order of the paper: the geometric error,
 the deformation of the link, and the motion of the joint.  Rotation vector and
@@ -31,7 +31,7 @@ from forcefit.validation.multibody.motion import inverse, matrix, placement, shi
 
 
 class PostureLike(Protocol):
-    """The properties of a posture that the simulation uses (protocol)."""
+    """Protocol of the posture properties that the simulation uses."""
 
     @property
     def robot(self) -> Robot:
@@ -44,7 +44,7 @@ class PostureLike(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """Description of the model to be built.
+    """Description of the model to build.
 
     Attributes:
         posture: the robot and its joint coordinates.
@@ -54,7 +54,7 @@ class Case:
         meshes: mapping from frame to meshed body, for links that are solids.
         elements: number of elements of each beam; all other links are beams.
         clearances: whether joints have their clearances.
-        bushes: whether a pin is held in two bushes.
+        bushes: whether pins are held in two bushes.
         load: (6,) [N m, N] load on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] gravity in base axes.
         couple: (3,) [N m] additional couple of dead forces on the platform, base axes.
@@ -113,7 +113,7 @@ def link_springs(
 
 @dataclass(frozen=True, eq=False)
 class OpenTree:
-    """Parts of a complete model, by name of the frame.
+    """Parts of a complete model, by frame name.
 
     Attributes:
         platform: (4, 4) nominal pose of the platform in the base frame.
@@ -137,7 +137,7 @@ class OpenTree:
 
 
 def build(model: Model, case: Case) -> OpenTree:
-    """Build the open robot without stress, with errors, closures and loads.
+    """Build the unstressed open robot and add its errors, closures and loads.
 
     Args:
         model: empty model.
@@ -264,7 +264,7 @@ def _add_weights(model: Model, robot: Robot, tree: OpenTree, gravity: NDArray) -
 
     The weight of a beam acts at its nodes, with the end moments of a clamped beam under
     uniform load.  The tip deflection of a cantilever is then exact for any number of
-    nodes.  The moments are pairs of forces on arms that rotate with the ends.  Like
+    nodes.  The moments are pairs of forces on arms that rotate with the ends; like
     weight, these forces have a constant direction and a potential.
     """
     for frame in robot.frames:

@@ -1,9 +1,9 @@
 """Simulate the forced assembly as a multibody system, independently of the model.
 
-In the open robot, every body is placed without stress and with its full geometric
-error.  Forces then close the loops, and Exudyn computes the static equilibrium with
-finite rotations.  Only the data of the robot and its joint coordinates are shared with
-the virtual-joint model.  Placement, beams and equilibrium are computed independently.
+In the open robot, every body is placed unstressed with its full geometric error.
+Forces then close the loops, and Exudyn computes the static equilibrium with finite
+rotations. Only the robot data and the joint coordinates are shared with the
+virtual-joint model; placement, beams and equilibrium are computed independently.
 
 At each frame, three motions are applied in the order of the paper: the geometric error,
 the deformation of the link, and the motion of the joint.  Rotation vector and
@@ -78,9 +78,9 @@ LINKS = ("beam", "spring")
 # [s] Largest time of a simulation; the slowest known one took 26 s on an idle core.
 TIME_LIMIT = 600.0
 _FINEST = 1e-10  # [m, rad, -] smallest tolerance of Newton's last increment
-# Regularisations that are tried in turn.  With contacts, connectors must not be much
-# more compliant than contacts.  A rod between two spherical joints may rotate by
-# radians about its axis under its weight unless this motion is held.
+# Regularisations, tried in turn.  With contacts, connectors must not be much more
+# compliant than contacts.  A rod between two spherical joints may rotate by radians
+# about its axis under its weight unless this motion is held.
 _TIGHT = (
     Regularisation(1e10, IDLE_STIFFNESS),
     Regularisation(1e10, HOLDING_STIFFNESS),
@@ -136,10 +136,11 @@ class SimulationModel:
 
 
 _STANDARD = SimulationModel()
-# reason for a failure without loads, appended to the message
+# Likely reason for a failure without loads, appended to the message.
 _UNDETERMINED = (
-    "; without a load, rounding errors decide where a joint without force is in its "
-    "clearance; expected a load that presses the joints against their bounds"
+    "; without a load, the position of an unloaded joint within its clearance is "
+    "determined by round-off; expected a load that presses the joints against their "
+    "bounds"
 )
 
 
@@ -148,7 +149,7 @@ class MultibodyAssembly:
     """A robot assembled by the simulation.
 
     Rows are frames in the robot's order.  Screws and wrenches are at the frame, in its
-    axes; they are zero for a frame without that spring.
+    axes, and zero for frames without the corresponding spring.
 
     Attributes:
         platform_screw: (6,) [rad, m] rotation vector of R_actual R_nominal^T, and
@@ -166,7 +167,7 @@ class MultibodyAssembly:
         transforms: (n, 4, 4) frames in the base frame, before the motion of their
             joints.
         gap: [rad, m] largest component of a closure error.
-        idle_energy: [J] energy in the weak springs on free motions, which must be
+        idle_energy: [J] energy in the weak springs on free motions, which should be
             nearly zero.
         contact_energy: [J] energy in the compliance of contacts.
         held: whether springs of 0.01 N m/rad or N/m hold free motions, because no
@@ -207,7 +208,7 @@ def simulate_assembly(
     couple: ArrayLike | None = None,
     time_limit: float = TIME_LIMIT,
 ) -> MultibodyAssembly:
-    """Assemble a robot by force in Exudyn.
+    """Simulate the forced assembly of a robot in Exudyn.
 
     Args:
         posture: the robot and its joint coordinates; actuated joints are locked there.
@@ -274,14 +275,14 @@ def _is_loaded(case: Case) -> bool:
 
 
 def _vector(given: ArrayLike | None, size: int) -> NDArray:
-    """Return the given (size,) vector, or zeros for None."""
+    """Return the given vector (size,), or zeros for None."""
     return np.zeros(size) if given is None else np.asarray(given, dtype=float)
 
 
 def _simulate(
     case: Case, regularisation: Regularisation, started: float, limit: float
 ) -> MultibodyAssembly:
-    """Build and solve a model, read its results, and release the memory."""
+    """Build and solve a model, read its results, and release its memory."""
     robot = case.posture.robot
     # The tolerance is proportional to the scale, so that it is constant relative to the
     # clearances.
@@ -324,7 +325,7 @@ def simulated_frequencies(
         meshes={}, elements=elements, clearances=False, bushes=False,
         load=np.zeros(6), gravity=np.zeros(3), couple=np.zeros(3),
     )  # fmt: skip
-    # The robot is built with closed loops and without load, so it is in equilibrium.
+    # The unloaded robot is built with closed loops, so it is in equilibrium.
     model = Model(
         *import_exudyn(), robot.name, Regularisation(math.inf, IDLE_STIFFNESS)
     )
@@ -361,7 +362,7 @@ def closing_sequence(
 
     Returns:
         (k, n, 4, 4) poses of the frames in the base frame.  The first state is open and
-        without stress, and the last state is closed. k is at least ``steps + 1``.
+        unstressed, and the last state is closed. k is at least ``steps + 1``.
 
     Raises:
         BadInput: the stiffness of a link is unknown.

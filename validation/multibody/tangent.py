@@ -1,4 +1,4 @@
-"""Compute the platform's compliance in the simulation by two methods.
+"""Compute the platform compliance in the simulation by two methods.
 
 Errors, loads and weight act as in :func:`.simulation.simulate_assembly`.  The wrench of
 a spring is the gradient of its energy, so that the tangent stiffness is symmetric.
@@ -31,14 +31,14 @@ from forcefit.validation.multibody.simulation import (
     import_exudyn,
 )
 
-# Rounding of the closures' forces is 1e-16 of their stiffness, and such forces move
-# compliant robots.
+# Round-off of the closure forces is 1e-16 of their stiffness, enough to move compliant
+# robots.
 _REGULARISATIONS = (
     Regularisation(1e8, 1e-8), Regularisation(1e8, 1e-6), Regularisation(1e10, 1e-6)
 )  # fmt: skip
 
 # Numbers of load steps that are tried if the equilibrium is unstable.  A large step may
-# pass a bifurcation and reach an unstable equilibrium.
+# cross a bifurcation and end at an unstable equilibrium.
 _SMALLER_STEPS = (16, 64)
 
 
@@ -86,12 +86,12 @@ def simulated_tangent(
         load: (6,) [N m, N] load on the platform at its origin, base axes.  The force is
             a dead force, and the moment is a couple of dead forces.
         gravity: (3,) [m/s^2] gravity in base axes.
-        steps: whether small loads are used too.
+        steps: whether to apply load steps as well.
         time_limit: [s] largest time of the whole computation.
 
     Returns:
         Both compliances.  If the equilibrium is unstable, the solution is repeated with
-        smaller load steps.  It is returned as unstable only if they also lead to an
+        smaller load steps, and reported as unstable only if these also lead to an
         unstable equilibrium.
 
     Raises:
@@ -102,8 +102,8 @@ def simulated_tangent(
     """
     started = time.monotonic()
     case = _case(posture, model, load, gravity)
-    # Without deformed springs, their nonlinear law does not matter, and Exudyn's own
-    # law is faster.
+    # If no spring deforms, its nonlinear law is irrelevant, and Exudyn's own law is
+    # faster.
     bent = is_bent(posture.robot.errors, load, gravity)
     hard = tuple(r for r in WITH_CLEARANCES if r.contact == 1.0)
     tried = hard[:2] if model.clearances else _REGULARISATIONS

@@ -1,4 +1,4 @@
-"""Compute accuracy and repeatability according to ISO standards from repeats.
+"""Compute accuracy and repeatability according to ISO standards.
 
 Start with ``figures.py``.
 """

@@ -1,4 +1,4 @@
-"""Compute characteristics of ISO 9283 and ISO 230-2 from a campaign's repeats."""
+"""Compute ISO 9283 and ISO 230-2 characteristics from the repeats of a campaign."""
 
 import math
 from collections.abc import Iterator
@@ -27,7 +27,7 @@ _MOST_PAIRS = 2000  # largest number of evaluated pairs of positions
 
 @dataclass(frozen=True)
 class PoseFigures:
-    """ISO 9283 characteristics at one pose, load and side of approach.
+    """ISO 9283 characteristics for one pose, load and side of approach.
 
     Attributes:
         label: id of the first row of the pose.
@@ -71,14 +71,13 @@ class StandardFigures:
 
     Attributes:
         campaign: name of the campaign.
-        registration: ``"known"`` or ``"unknown"``; AP includes the error of the
-            registration.
+        registration: ``"known"`` or ``"unknown"``.  AP includes registration errors.
         poses: poses measured at least twice.
         distances: characteristics of pairs of poses with equal load, session, point and
             side of approach.
         axes: mapping from name to the ISO 230-2 characteristics of each reading that
-            was approached from both sides.  Characteristics are separate for each load,
-            session and point.  The name contains the id of the first row.
+            was approached from both sides.  Each load, session and point is evaluated
+            separately.  The name contains the id of the first row.
     """
 
     campaign: str
@@ -100,7 +99,7 @@ class StandardFigures:
         }
 
     def text(self) -> str:
-        """Return a table as text, with the worst value of each kind at the end."""
+        """Format as a table, followed by the worst value of each characteristic."""
         rows = {
             pose.label: [
                 pose.cycles,
@@ -134,13 +133,13 @@ class StandardFigures:
 
 
 def standard_figures(campaign: Campaign) -> StandardFigures:
-    """Return the characteristics of ISO 9283 and ISO 230-2 of a campaign.
+    """Return the ISO 9283 and ISO 230-2 characteristics of a campaign.
 
     Args:
         campaign: campaign with rows measured more than once.
 
     Returns:
-        The characteristics.  For ISO 9283, both sides of approach are evaluated
+        The characteristics.  For ISO 9283, the two sides of approach are evaluated
         separately.
 
     Raises:
@@ -152,9 +151,8 @@ def standard_figures(campaign: Campaign) -> StandardFigures:
     sets = [_in_time(campaign, rows) for rows in sets if len(rows) > 1]
     if not sets:
         raise BadInput(
-            f"campaign {quoted(campaign.name)}: found no command that was "
-            "measured twice; expected repeats, from which the characteristics of the "
-            "standards are computed"
+            f"campaign {quoted(campaign.name)}: found no command that was measured "
+            "twice; expected repeated measurements, which both standards require"
         )
     return StandardFigures(
         campaign.name,
@@ -166,7 +164,7 @@ def standard_figures(campaign: Campaign) -> StandardFigures:
 
 
 def _in_time(campaign: Campaign, rows: NDArray) -> NDArray:
-    """Return the rows in the order of measurement."""
+    """Return the rows in measuring order."""
     time = campaign.covariates.get("time")
     return rows if time is None else rows[np.argsort(time[rows], kind="stable")]
 
@@ -190,7 +188,7 @@ def _pose(campaign: Campaign, rows: NDArray) -> PoseFigures:
 
 
 def _circumstances(campaign: Campaign) -> NDArray:
-    """Return (R,) indices of each row's combination of load, session and point."""
+    """Return the index (R,) of each row's combination of load, session and point."""
     names = [
         np.unique(column, return_inverse=True)[1]
         for column in (campaign.session, campaign.point)
@@ -200,11 +198,11 @@ def _circumstances(campaign: Campaign) -> NDArray:
 
 
 def _distances(campaign: Campaign, sets: list[NDArray]) -> Iterator[DistanceFigures]:
-    """Yield the ISO 9283 characteristics of distances between different poses.
+    """Yield the ISO 9283 characteristics of the distances between poses.
 
-    In the standard, the cycles alternate between two poses under one load.  Poses under
-    different loads would differ by a deflection, and poses of different sessions by the
-    position of the device.
+    In the standard, the cycles alternate between two poses under one load.  Only poses
+    with the same load and session are compared: a different load would add a
+    deflection, and a different session a displacement of the device.
 
     Yields:
         The characteristics of each pair.

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 @dataclass(frozen=True)
 class AxisFigures:
-    """Characteristics of one component over m positions [m or rad].
+    """ISO 230-2 characteristics [m or rad] of one component over m positions.
 
     Attributes:
         reversal: B, the largest absolute reversal.
@@ -44,9 +44,9 @@ def axis_figures(
     """Return the ISO 230-2 characteristics from repeated approaches to m positions.
 
     Args:
-        forward: for each position at least two deviations [m or rad], approached from
+        forward: for each position, at least two deviations [m or rad] on approach from
             below.
-        backward: for each position at least two deviations, approached from above.
+        backward: for each position, at least two deviations on approach from above.
 
     Returns:
         The characteristics.
@@ -70,6 +70,6 @@ def axis_figures(
 
 
 def _moments(positions: Sequence[ArrayLike]) -> tuple[NDArray, NDArray]:
-    """Return the (m,) means and (m,) standard deviations of the deviations."""
+    """Return the mean (m,) and the standard deviation (m,) at each position."""
     rows = [np.asarray(row, dtype=float) for row in positions]
     return np.array([r.mean() for r in rows]), np.array([r.std(ddof=1) for r in rows])

@@ -3,7 +3,7 @@
 Sources:
     ISO 9283:1998, Manipulating industrial robots, performance criteria and related test
     methods: 7.2 (AP, RP), 7.3 (AD, RD), 7.6 (drift of AP).  The standard requires 30
-    cycles; here any number is allowed.
+        cycles; these functions accept any number.
 """
 
 import numpy as np
@@ -27,7 +27,7 @@ def position_accuracy(deviations: ArrayLike) -> float:
 
 
 def position_repeatability(deviations: ArrayLike) -> float:
-    """Return RP_l [m], the radius of a sphere about the mean: mean distance + 3 S_l.
+    """Return RP_l [m], the mean distance from the mean position plus 3 S_l.
 
     Args:
         deviations: (n, 3) [m] attained minus commanded positions, n >= 2.
@@ -47,7 +47,7 @@ def orientation_accuracy(angles: ArrayLike) -> NDArray:
         angles: (n, 3) [rad] attained minus commanded angles.
 
     Returns:
-        The differences [rad], with their signs.
+        The signed differences [rad].
     """
     return np.mean(np.asarray(angles, dtype=float), axis=0)
 
@@ -59,7 +59,7 @@ def orientation_repeatability(angles: ArrayLike) -> NDArray:
         angles: (n, 3) [rad] attained minus commanded angles, n >= 2.
 
     Returns:
-        Half of the width of each range [rad].
+        Half-width of each range [rad].
     """
     return 3 * np.std(np.asarray(angles, dtype=float), axis=0, ddof=1)
 
@@ -70,7 +70,7 @@ def distance_accuracy(
     """Return AD_P and RD [m] of the distance between two positions.
 
     Args:
-        first: (n, 3) [m] attained positions, cycle by cycle.
+        first: (n, 3) [m] attained positions, one per cycle.
         second: (n, 3) [m] attained positions, n >= 2.
         commanded: [m] commanded distance.
 
@@ -83,11 +83,11 @@ def distance_accuracy(
 
 
 def accuracy_drift(deviations: ArrayLike, cycles: int = DRIFT_CYCLES) -> float | None:
-    """Return dAP_P [m], the largest change of AP_P from the first to a later block.
+    """Return dAP_P [m], the largest change of AP_P relative to the first block.
 
     Args:
-        deviations: (n, 3) [m] attained minus commanded, in the order of measurement.
-        cycles: number of cycles of a block; an incomplete last block is ignored.
+        deviations: (n, 3) [m] attained minus commanded positions, in measuring order.
+        cycles: number of cycles per block; an incomplete last block is ignored.
 
     Returns:
         The change [m]; None if there are fewer than two blocks.

@@ -1,4 +1,4 @@
-"""Create the report page of the characteristics of ISO 9283 and ISO 230-2."""
+"""Create the report page of ISO 9283 and ISO 230-2 characteristics."""
 
 from dataclasses import asdict
 
@@ -25,7 +25,7 @@ Cells = list[list[Cell]]
 
 
 def standards_page(figures: StandardFigures, provenance: Provenance) -> str:
-    """Return the page of the characteristics of a campaign.
+    """Create the report page of a campaign's characteristics.
 
     Args:
         figures: result of
@@ -53,7 +53,7 @@ def standards_page(figures: StandardFigures, provenance: Provenance) -> str:
 
 
 def _verdict(figures: StandardFigures) -> str:
-    """Return the worst accuracy and repeatability of all poses as text."""
+    """State the worst accuracy and repeatability over all poses."""
     worst = [
         f"{words} {Value(max(known), unit).text}"
         for words, unit, known in (
@@ -74,7 +74,7 @@ def _known(figures: StandardFigures, key: str) -> list[float]:
 
 
 def _reservations(figures: StandardFigures) -> list[str]:
-    """Return text about the limitations of the characteristics."""
+    """State the limitations of the characteristics."""
     found = []
     fewest = min(pose.cycles for pose in figures.poses)
     if fewest < CYCLES:
@@ -85,7 +85,7 @@ def _reservations(figures: StandardFigures) -> list[str]:
 
 
 def _tiles(figures: StandardFigures) -> list[Tile]:
-    """Return tiles of the worst pose, the worst distance and the worst reversal."""
+    """Return tiles for the worst pose, the worst distance and the worst reversal."""
     tiles = []
     for key, words in (("accuracy", "Pose accuracy AP"),
                        ("repeatability", "Pose repeatability RP")):  # fmt: skip
@@ -111,7 +111,7 @@ def _tiles(figures: StandardFigures) -> list[Tile]:
 
 
 def _poses(figures: StandardFigures) -> str:
-    """Return a table of the ISO 9283 characteristics at every pose."""
+    """Tabulate the ISO 9283 characteristics at every pose."""
     turns = [f"{kind} about {axis}" for kind in ("AP", "RP") for axis in "xyz"]
     head: list[str | Column] = [
         "pose", Column("cycles"), *(Column(name, "rad") for name in turns),
@@ -136,17 +136,17 @@ def _poses(figures: StandardFigures) -> str:
 
 
 def _angles(pose: PoseFigures) -> list[float]:
-    """Return AP and RP of the three angles; NaN if no rotation was measured."""
+    """Return AP and RP of the three angles, or NaN if no rotation was measured."""
     return [*(pose.angles or [np.nan] * 3), *(pose.angle_repeatability or [np.nan] * 3)]
 
 
 def _number(value: float | None) -> float:
-    """Return a number; NaN for None."""
+    """Convert None to NaN."""
     return np.nan if value is None else value
 
 
 def _distances(figures: StandardFigures) -> str:
-    """Return a table of distances between poses; empty if there are none."""
+    """Tabulate the distances between poses; return an empty text if there are none."""
     rows: Cells = [
         [f"{a} to {b}", one.commanded, one.accuracy, one.repeatability]
         for one in figures.distances
@@ -162,7 +162,7 @@ def _distances(figures: StandardFigures) -> str:
 
 
 def _axes(figures: StandardFigures) -> str:
-    """Return a table of readings approached from both sides; empty without any."""
+    """Tabulate the readings approached from both sides, if there are any."""
     if not figures.axes:
         return ""
     rows: Cells = []

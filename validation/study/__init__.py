@@ -1,4 +1,4 @@
-"""Run all checks that a study file requests, and write one report.
+"""Run the checks that a study file requests and write a single report.
 
 Start with ``study.py``.
 """

@@ -1,4 +1,4 @@
-"""Create report sections about parts within the tolerances of the drawing."""
+"""Create report sections about drawing tolerances."""
 
 from typing import Any
 
@@ -9,14 +9,14 @@ from forcefit.validation.study.study import StudyResults
 
 
 def drawn_section(results: StudyResults) -> str:
-    """Return statistics, importance and worst case of drawn parts as HTML."""
+    """Return statistics, importance and worst case of randomly drawn parts as HTML."""
     found = results.statistics
     if found is None:
         return ""
     about = paragraph(
-        f"{found['draws']} machines of parts within the tolerances of the drawing, "
-        f"seed {found['seed']}, at this pose. Their errors take the place of those of "
-        "the study, and fits have a clearance of each machine. Pose errors: clearance "
+        f"{found['draws']} machines with parts within the drawing tolerances, seed "
+        f"{found['seed']}, at this pose. Their errors replace those of the study, and "
+        "the clearance of each fit differs between machines. Pose errors: clearance "
         f"{found['clearance']}: {found['clearance_means']}. The other sections use the "
         "errors of the study and the mean clearance of fits."
     )
@@ -27,7 +27,7 @@ def drawn_section(results: StudyResults) -> str:
 
 
 def drawn_tiles(found: dict[str, Any] | None, worst: dict[str, Any]) -> list[Tile]:
-    """Return the tile of the worst case over all parts within the tolerances.
+    """Return the tile of the worst case over all parts within tolerance.
 
     Args:
         found: statistics of the study, or None.
@@ -35,7 +35,7 @@ def drawn_tiles(found: dict[str, Any] | None, worst: dict[str, Any]) -> list[Til
             :func:`forcefit.validation.study.headline.worst_clearance`.
 
     Returns:
-        A list of one tile; empty without such a bound.
+        A list of one tile; empty if there is no such bound.
     """
     if found is None or "drawn" not in worst:
         return []
@@ -43,8 +43,7 @@ def drawn_tiles(found: dict[str, Any] | None, worst: dict[str, Any]) -> list[Til
     name, share = max(shift["shares"].items(), key=lambda pair: pair[1])
     total = sum(shift["shares"].values())
     note = [
-        "Over all parts within the tolerances of the drawing and all clearances, at "
-        "this pose",
+        "Over all parts within the drawing tolerances and all clearances, at this pose",
         *(["; over the map ", *_bounds(over)] if over is not None else []),
         f"; {worst['drawn']['assumption']}.",
     ]  # fmt: skip
@@ -54,5 +53,5 @@ def drawn_tiles(found: dict[str, Any] | None, worst: dict[str, Any]) -> list[Til
 
 
 def _bounds(found: dict[str, float]) -> list[str | Value]:
-    """Return the bounds of the rotation and of the translation error as text."""
+    """Format the bounds of the rotation and translation errors."""
     return rotation_and_translation(found["rotation"], found["translation"], 3)

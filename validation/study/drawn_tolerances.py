@@ -1,6 +1,6 @@
-"""Compute statistics and worst case of drawing tolerances at the pose of a study.
+"""Compute statistics and the worst case of drawing tolerances at a study's pose.
 
-The table ``[statistics]`` of a study file changes the defaults.  The errors of randomly
+The table ``[statistics]`` of a study file overrides the defaults.  Errors of randomly
 drawn parts replace the errors in the study file.
 """
 
@@ -35,19 +35,19 @@ IN_BOUNDS = (
     "errors above alone, and the mean clearance of fits"
 )
 DRAWN_ERRORS = {key: f"drawn_{key}_error" for key in POSE_ERRORS}
-# [-] relative accuracy of the certified bounds at each point of a map
+# [-] Relative accuracy of the certified bounds at each map point.
 _MAP_TOLERANCE = 1e-3
 
 
 @dataclass(frozen=True)
 class DrawnTolerances:
-    """Requested results for the tolerances of the robot's drawing.
+    """Results requested for the robot's drawing tolerances.
 
     Attributes:
         draws: number of randomly drawn machines.
         seed: seed of the random draws.
         importance: number of base draws for Sobol indices; 0 for no indices.
-        limits: mapping from quantity to its limit [rad, m, J, ..].
+        limits: mapping from each quantity to its limit [rad, m, J, ..].
     """
 
     draws: int = 1000
@@ -57,19 +57,20 @@ class DrawnTolerances:
 
 
 def read_statistics(root: Table, robot: Robot) -> DrawnTolerances | None:
-    """Return the table ``[statistics]`` of a study file, or its defaults.
+    """Read the table ``[statistics]`` of a study file.
 
     Args:
         root: root table of the file.
         robot: robot of the study.
 
     Returns:
-        The requested results.  None if the robot has no drawing tolerances.  None also
-        if the table is absent and the study closes the loops of the robot.
+        The requested results, with defaults for an absent table.  None if the robot has
+        no drawing tolerances, or if the table is absent and the study closes the
+        robot's loops.
 
     Raises:
-        BadInput: the table violates a rule; the robot has no tolerances; or the study
-            closes the loops of the robot by errors, which are not errors of parts.
+        BadInput: the table is invalid, the robot has no tolerances, or the study closes
+            the robot's loops by errors that are not part errors.
     """
     drawn = bool(robot.callouts or robot.fits)
     closing = [key for key in ("rest", "mismatch") if root.has(key)]
@@ -80,7 +81,7 @@ def read_statistics(root: Table, robot: Robot) -> DrawnTolerances | None:
         raise root.bad("statistics", f"{fault}; expected only one of the two")
     table = root.table("statistics")
     if not drawn:
-        fault = "found this table for a robot without [[tolerance]] and without fits"
+        fault = "found this table for a robot without fits and [[tolerance]] entries"
         raise root.bad("statistics", f"{fault}, expected no such table")
     draws = _count(table, "draws", 1000, 2)
     importance = _count(table, "importance", 64, 0)
@@ -93,7 +94,7 @@ def read_statistics(root: Table, robot: Robot) -> DrawnTolerances | None:
 
 
 def _count(table: Table, key: str, default: int, least: int) -> int:
-    """Return a number of draws."""
+    """Read a number of random draws."""
     value = table.integer(key, default)
     if not least <= value <= _MOST_DRAWS:
         raise table.bad(key, f"found {value}, expected {least} to {_MOST_DRAWS}")
@@ -101,7 +102,7 @@ def _count(table: Table, key: str, default: int, least: int) -> int:
 
 
 def _limits(table: Table) -> dict[str, float]:
-    """Return the limits by quantity in SI units."""
+    """Read the limit of each quantity in SI units."""
     if not table.has("limits"):
         return {}
     given, names = table.table("limits"), limit_names()
@@ -117,18 +118,18 @@ def _limits(table: Table) -> dict[str, float]:
 def drawn_at_pose(
     posture: Posture, asked: DrawnTolerances, progress: Callable[[int, int], None]
 ) -> tuple[dict[str, Any], "xarray.Dataset"]:
-    """Return statistics, importance and worst case of randomly drawn parts at a pose.
+    """Return statistics, importance and worst case of random parts at a pose.
 
     Args:
         posture: the robot's configuration; its geometric errors are not used.
-        asked: the requested results.
+        asked: requested results.
         progress: function called with the number of finished draws and the total
             number.
 
     Returns:
-        The summary with the keys of ``assembly statistics``, and the draws.  If there
-        is no worst case, the summary contains the reason ``worst_case_left_out``
-        instead of ``worst_case``.
+        The summary, with the keys of ``assembly statistics``, and the draws.  If no
+        worst case can be computed, ``worst_case_left_out`` states the reason instead of
+        ``worst_case``.
 
     Raises:
         BadInput: a limit refers to a quantity that is not computed for this robot.
@@ -159,17 +160,17 @@ def drawn_at_pose(
 def bounds_over_grid(
     maps: "xarray.Dataset", robot: Robot, progress: Callable[[int, int], None]
 ) -> "xarray.Dataset":
-    """Add bounds over all parts within the tolerances to the maps of a study.
+    """Return a study's maps with bounds over all parts within tolerance added.
 
     Args:
         maps: data set over the grid.
-        robot: robot of the study, with tolerances of a drawing or fits.
+        robot: robot of the study, with drawing tolerances or fits.
         progress: function called with the number of finished points and the total
             number.
 
     Returns:
-        The maps, with certified upper bounds of rotation and translation over all parts
-        and clearances at every point.  The bounds are NaN at points without a solution.
+        The maps, with certified upper bounds on rotation and translation over all parts
+        and clearances at every point; NaN at points without a solution.
     """
     sources, axes = sources_of(robot), [str(axis) for axis in maps["status"].dims]
     bounds = np.full((maps["status"].size, len(POSE_ERRORS)), np.nan)

@@ -1,4 +1,4 @@
-"""Compute certified error bounds of a robot after making one part perfect."""
+"""Compute certified error bounds of a robot in which one part is perfect."""
 
 from dataclasses import replace
 from typing import Any
@@ -24,21 +24,20 @@ ERROR, CLEARANCE = "geometric error", "clearance"
 
 
 def governing(posture: Posture, assumption: str = "frozen") -> list[dict[str, Any]]:
-    """Return the bounds of problem (27) without one part's error or clearance.
+    """Return the bounds of problem (27) with one imperfection removed at a time.
 
-    The given errors of the robot are used.  Two errors may compensate each other.
-    Removing one of them then increases the bound.
+    The given errors of the robot are used.  If two errors compensate each other,
+    removing one of them increases the bound.
 
     Args:
         posture: configuration of a robot with errors or clearances.
         assumption: assumption of problem (27).
 
     Returns:
-        A mapping for each frame with errors and each joint with clearances.  It
-        contains the name (``part``), the removed imperfection (``what``), and the upper
-        bounds ``rotation`` [rad] and ``translation`` [m] without this imperfection.
-        The mapping with the smallest translation is first.  Bounds are None without a
-        solution.
+        One mapping for each frame with errors and each joint with clearances, sorted by
+        translation in ascending order.  It contains the name (``part``), the removed
+        imperfection (``what``), and the upper bounds ``rotation`` [rad] and
+        ``translation`` [m] without this imperfection, or None if there is no solution.
     """
     rows: list[dict[str, Any]] = []
     for part, what, robot in _improved(posture.robot):
@@ -57,14 +56,14 @@ def governing(posture: Posture, assumption: str = "frozen") -> list[dict[str, An
 
 
 def _by_translation(row: dict[str, Any]) -> tuple[float, float]:
-    """Return the sort key: smallest bound first, missing bounds last."""
+    """Return a sort key that puts the smallest bound first and missing bounds last."""
     if row["translation"] is None:
         return (np.inf, np.inf)
     return (row["translation"], row["rotation"])
 
 
 def _improved(robot: Robot) -> list[tuple[str, str, Robot]]:
-    """Return copies of the robot, each without one of its imperfections."""
+    """Return copies of the robot, each lacking one of its imperfections."""
     cases = []
     declared = robot.declared_errors
     for i, frame in enumerate(robot.frames):
@@ -81,7 +80,7 @@ def _improved(robot: Robot) -> list[tuple[str, str, Robot]]:
 
 
 def _loose_parts(robot: Robot) -> dict[str, list[int]]:
-    """Return the indices of frames with clearance, by joint (one or more frames)."""
+    """Return the frame indices of each joint with clearance."""
     parts: dict[str, list[int]] = {}
     names = names_of(robot)
     for i, frame in enumerate(robot.frames):
@@ -93,7 +92,7 @@ def _loose_parts(robot: Robot) -> dict[str, list[int]]:
 
 
 def _finite_bounds(frame: Frame) -> dict[str, float]:
-    """Return a joint's clearances; infinite ones are free motions and are omitted."""
+    """Return the finite clearances of a joint; infinite ones are free motions."""
     if frame.clearance is None:
         return {}
     own = own_cone(frame)
@@ -105,7 +104,7 @@ def _finite_bounds(frame: Frame) -> dict[str, float]:
 
 
 def _tight(frame: Frame) -> Frame:
-    """Return the joint without its clearances."""
+    """Remove the clearances of a joint."""
     assert frame.clearance is not None
     tight = replace(frame.clearance, **dict.fromkeys(_finite_bounds(frame)))
     return replace(frame, clearance=tight)

@@ -1,7 +1,7 @@
-"""Write the conclusions of a study: assembly, pose error and checks.
+"""State the conclusions of a study about assembly, pose error and checks.
 
 The first pose error is the certified bound over all positions within the clearances.
-Every other pose error is printed with its assumption about the clearances.
+Every other pose error is stated with its assumption about the clearances.
 """
 
 from typing import Any
@@ -20,24 +20,23 @@ _CHECKED = {
     "energy": "energy", "margin": "zone margin", "margin_free": "free zone margin"
 }  # fmt: skip
 _OUTCOMES = ("passed", "failed", "not decided")  # possible results of a check
-# [-] A required fraction of the clearances below this value is a rounding error.
+# [-] A required fraction of the clearances below this value is round-off.
 _NO_CLEARANCE = 1e-6
 
 
 def worst_clearance(results: StudyResults) -> dict[str, Any]:
-    """Return certified upper bounds of the platform's error within the clearances.
+    """Return certified upper bounds on the platform error within the clearances.
 
     Args:
         results: results of :func:`forcefit.validation.study.study.run_study`.
 
     Returns:
         Bounds ``rotation`` [rad] and ``translation`` [m] under the assumption
-        ``frozen`` of problem (27), at the pose of the study (``pose``) and their
-        largest values over its ``map``.  ``points`` is the number of points with
-        bounds, and ``of`` is the number of all points.  A bound is None if it was not
-        computed, and infinite if the pose is unbounded.  For a robot with drawing
-        tolerances, ``drawn`` contains the bounds over all parts within the tolerances,
-        and the assumption.
+        ``frozen`` of problem (27), at the study's pose (``pose``) and as maxima over
+        its ``map``. ``points`` of the ``of`` map points have bounds.  A bound is None
+        if it was not computed, and infinite if the pose is unbounded.  For a robot with
+        drawing tolerances, ``drawn`` contains the bounds over all parts within
+        tolerance and the corresponding assumption.
     """
     parts = ("rotation", "translation")
     error = results.error.get(WORST)
@@ -57,7 +56,7 @@ def worst_clearance(results: StudyResults) -> dict[str, Any]:
 
 
 def _worst_drawn(results: StudyResults) -> dict[str, Any] | None:
-    """Return certified upper bounds over all parts within the tolerances, or None."""
+    """Return certified upper bounds over all parts within tolerance, or None."""
     found = results.statistics
     if found is None or "worst_case" not in found:
         return None
@@ -78,22 +77,22 @@ def _worst_drawn(results: StudyResults) -> dict[str, Any] | None:
 
 
 def verdict(results: StudyResults) -> str:
-    """Return the conclusions of a study as one text; see :func:`conclusions`."""
+    """Join the conclusions of a study to one text; see :func:`conclusions`."""
     return " ".join(conclusions(results))
 
 
 def conclusions(results: StudyResults) -> list[str]:
-    """Return the conclusions of a study, the main one first.
+    """Return the conclusions of a study, most important first.
 
-    The pose error begins with the certified bound within the clearances, and with its
-    largest value over the map if there is a map.  The pose error at least energy
+    Pose errors begin with the certified bound within the clearances and, if there is a
+    map, its maximum over the map.  The pose error of the minimum-energy solution
     follows.
 
     Args:
         results: results of :func:`forcefit.validation.study.study.run_study`.
 
     Returns:
-        Sentences.  The first sentence is about the assembly.
+        A list of sentences, of which the first concerns the assembly.
     """
     solution = results.solution
     if solution["status"] == BEYOND_LIMITS:
@@ -102,7 +101,8 @@ def conclusions(results: StudyResults) -> list[str]:
         reason = solution["reason"]
         return [f"{reason[0].upper()}{reason[1:]}.", _checks_text(results)]
     if solution["status"] != "ok":
-        return [f"No answer at this pose: {solution['status']}, {solution['reason']}."]
+        why = f"{solution['status']}, {solution['reason']}"
+        return [f"No solution at this pose: {why}."]
     parts = (
         _assembly_text(results) + ".", _pose_error_text(results), _drawn_text(results),
         _checks_text(results),
@@ -111,13 +111,13 @@ def conclusions(results: StudyResults) -> list[str]:
 
 
 def by_force(results: StudyResults) -> bool:
-    """Return whether the robot can be assembled only with elastic deformation.
+    """Return whether assembly requires elastic deformation.
 
     Args:
         results: results of :func:`forcefit.validation.study.study.run_study`.
 
     Returns:
-        True or False; also False if the robot cannot be assembled at all.
+        True or False; False also if the robot cannot be assembled at all.
     """
     if results.solution["status"] != "ok":
         return False
@@ -127,15 +127,15 @@ def by_force(results: StudyResults) -> bool:
 
 
 def _assembly_text(results: StudyResults) -> str:
-    """Return a sentence about the assembly: by clearances, or by force and energy."""
+    """State whether the robot assembles by its clearances or only by force."""
     zone, assembly = results.solution["zone"], results.assembly
     assert assembly is not None
     if not by_force(results):
         if zone["margin"] is not None and zone["margin"] < _NO_CLEARANCE:
-            return "It assembles without force, and needs no clearance"
+            return "It assembles without force or clearance"
         text = "It assembles by its clearances alone"
         return text + (
-            "" if zone["assemblable"] else " if its compliant joints turn freely"
+            "" if zone["assemblable"] else " if its compliant joints rotate freely"
         )
     text = f"It assembles only by force: {assembly.energy:.4g} J"
     if zone["margin_free"] is not None:
@@ -144,17 +144,17 @@ def _assembly_text(results: StudyResults) -> str:
 
 
 def _pose_error_text(results: StudyResults) -> str:
-    """Return the platform's pose error as text; the certified bound is first."""
+    """State the platform's pose error, beginning with the certified bound."""
     worst = worst_clearance(results)
     screw = results.solution["platform_screw"]
     turn, shift = (float(np.linalg.norm(half)) for half in (screw[:3], screw[3:]))
-    at_rest = f"in the least-energy solution it is {_pose_text(turn, shift)} away."
+    at_rest = f"in the minimum-energy solution it is {_pose_text(turn, shift)} away."
     if worst["pose"] is None:
-        return f"No bound of its pose error within the clearances was found; {at_rest}"
+        return f"No bound on its pose error within the clearances was found; {at_rest}"
     where, drawn = "For all positions within the clearances", ""
     if "drawn" in worst:
         one = worst["drawn"]
-        drawn = "For all parts within the tolerances of the drawing and all positions "
+        drawn = "For all parts within the drawing tolerances and all positions "
         drawn += f"within the clearances its platform is {_bounds_text(one)} "
         drawn += f"(certified bounds; {one['assumption']}). "
         at_mean = ", with fits at their mean clearance," if results.robot.fits else ""
@@ -168,7 +168,7 @@ def _pose_error_text(results: StudyResults) -> str:
 
 
 def _bounds_text(worst: dict[str, Any]) -> str:
-    """Return the bounds at the pose, and the largest bounds over the map, as text."""
+    """Format the bounds at the pose and their maxima over the map."""
     text = f"{_bound_text(worst['pose'])} from the nominal pose"
     if worst["map"] is not None:
         over = worst["map"]
@@ -178,12 +178,12 @@ def _bounds_text(worst: dict[str, Any]) -> str:
 
 
 def _drawn_text(results: StudyResults) -> str:
-    """Return sentences about the parts within the tolerances of the drawing."""
+    """State the statistics of parts within the drawing tolerances."""
     if not (results.robot.callouts or results.robot.fits):
         return ""
     found, text = results.statistics, ""
     if found is None or "worst_case" not in found:
-        text = "The certified bounds leave out the tolerances of the drawing"
+        text = "The certified bounds exclude the drawing tolerances"
         text += ", with fits at their mean. " if results.robot.fits else ". "
     if found is None:
         return text.strip()
@@ -196,7 +196,7 @@ def _drawn_text(results: StudyResults) -> str:
 
 
 def _other_assumptions(results: StudyResults) -> str:
-    """Return bounds under other assumptions if they are over one per cent larger."""
+    """Format bounds under other assumptions that are more than one per cent larger."""
     text = ""
     own = results.error[WORST]
     for assumption, error in results.error.items():
@@ -208,25 +208,25 @@ def _other_assumptions(results: StudyResults) -> str:
 
 
 def _bound_text(bounds: dict[str, float]) -> str:
-    """Return an upper bound of the pose error as text."""
+    """Format an upper bound on the pose error."""
     if not all(np.isfinite([bounds["rotation"], bounds["translation"]])):
         return "free to move without bound"
     return f"at most {_pose_text(bounds['rotation'], bounds['translation'])}"
 
 
 def _pose_text(rotation: float, translation: float) -> str:
-    """Return a pose error [rad, m] as text in mrad and mm."""
+    """Format a pose error [rad, m] in mrad and mm."""
     return f"{in_unit(rotation, 'mrad', 3)} and {in_unit(translation, 'mm', 3)}"
 
 
 def covered(results: StudyResults) -> list[str]:
-    """Return the object and the result of each independent check that was run.
+    """Return the subject and outcome of each independent check that was run.
 
     Args:
         results: results of :func:`forcefit.validation.study.study.run_study`.
 
     Returns:
-        A phrase for each check; checks without a significant comparison are omitted.
+        One phrase per check; checks without a significant comparison are omitted.
     """
     phrases = []
     verdicts = results.verdicts
@@ -248,7 +248,7 @@ def covered(results: StudyResults) -> list[str]:
 
 
 def _checks_text(results: StudyResults) -> str:
-    """Return a sentence about independent checks: their results, and missing checks."""
+    """State the outcomes of independent checks and which checks are missing."""
     phrases, missing = covered(results), results.unchecked
     text = "No independent check was requested."
     if phrases:
@@ -256,7 +256,7 @@ def _checks_text(results: StudyResults) -> str:
         if worst_clearance(results)["pose"] is not None:
             text += " No independent check covers the certified bounds."
     elif results.verdicts:
-        text = "No independent check of these numbers could be made."
+        text = "No independent check of these results was possible."
     if missing:
         names = ", ".join(missing)
         text += f" Not checked: {names}."

@@ -1,4 +1,4 @@
-"""Create the report section about the grid of poses: maps and largest values."""
+"""Create the report section with maps over the grid of poses."""
 
 from collections.abc import Iterator
 from typing import Any, NamedTuple
@@ -14,7 +14,7 @@ from forcefit.results.quantities import unit_of
 from forcefit.stiffness.screws import WRENCH
 from forcefit.validation.study.drawn_tolerances import DRAWN_ERRORS
 
-# Quantities that are shown as maps: name in the results, and description.
+# Quantities shown as maps: name in the results and description.
 MAPPED = {
     "translation_error": "largest translation, eq. (27), over all clearances",
     "rotation_error": "largest rotation, eq. (27), over all clearances",
@@ -26,7 +26,7 @@ _UNITS = {"tx": "m", "ty": "m", "tz": "m", "rx": "rad", "ry": "rad", "rz": "rad"
 
 
 class Mapped(NamedTuple):
-    """A quantity over the grid.
+    """A quantity mapped over the grid.
 
     Attributes:
         key: name of the quantity in the results.
@@ -42,14 +42,14 @@ class Mapped(NamedTuple):
 
 
 def mapped(maps: Any) -> Iterator[Mapped]:
-    """Yield the quantities of a study's maps; upper bounds for pose errors."""
+    """Yield the quantities of a study's maps; pose errors are upper bounds."""
     for key, words in MAPPED.items():
         one = maps[key].sel(bound="upper") if "bound" in maps[key].dims else maps[key]
         yield Mapped(key, words, unit_of(key), one)
     for part, unit in (("translation", "m"), ("rotation", "rad")):
         key = DRAWN_ERRORS[part]
         if key in maps:
-            words = f"largest {part} over all parts within the tolerances"
+            words = f"largest {part} over all parts within tolerance"
             yield Mapped(key, words, unit, maps[key])
     if "deflection" in maps:
         for part, name, half, unit in (
@@ -59,7 +59,7 @@ def mapped(maps: Any) -> Iterator[Mapped]:
             size = np.sqrt((maps["deflection"].isel(screw=half) ** 2).sum(
                 "screw", skipna=False
             ))  # fmt: skip
-            words = f"{name} by load and weight, least-energy solution"
+            words = f"{name} by load and weight, minimum-energy solution"
             yield Mapped(f"deflection_{part}", words, unit, size)
     if "stiffness" in maps:
         for name in WRENCH:
@@ -74,7 +74,7 @@ def mapped(maps: Any) -> Iterator[Mapped]:
 
 
 def finite(one: Mapped) -> NDArray:
-    """Return the values of a map: NaN without a solution, infinite without a bound."""
+    """Return the values of a map, NaN where unsolved and infinite where unbounded."""
     values = np.asarray(one.values, dtype=float).ravel()
     if one.key.endswith("_error"):
         return values[~np.isnan(values)]
@@ -82,7 +82,7 @@ def finite(one: Mapped) -> NDArray:
 
 
 def maps_section(maps: Any, summary: dict[str, Any]) -> str:
-    """Return the section with the maps over the grid.
+    """Return the report section with the maps over the grid.
 
     Args:
         maps: data set over the grid.
@@ -90,8 +90,8 @@ def maps_section(maps: Any, summary: dict[str, Any]) -> str:
 
     Returns:
         HTML with counts, a table of smallest, median and largest values, and the map.
-        If the grid has more than two axes, the map shows two axes at fixed values of
-        the others.
+        If the grid has more than two axes, the map is a section along two of them at
+        fixed values of the others.
     """
     title = "Over the workspace"
     counts = ", ".join(f"{k}: {v}" for k, v in summary["status"].items())
@@ -116,12 +116,11 @@ def maps_section(maps: Any, summary: dict[str, Any]) -> str:
 
 
 def _drawn(maps: Any, first: Mapped) -> str:
-    """Return the map over two axes, and a sentence about values of other axes."""
+    """Draw the map over two axes, and state the values of the other axes."""
     names = [str(d) for d in maps["energy"].dims if maps.sizes[d] > 1]
     if not names:
         return ""
-    # The map shows the two axes with the most values.  Of axes with equally many
-    # values, the first is shown.
+    # The map shows the two axes with the most values; ties go to the first axis.
     axes = sorted(sorted(names, key=lambda n: -maps.sizes[n])[:2], key=names.index)
     at = {name: i for name, i in _largest(first).items() if name not in axes}
     held = {name: i for name, i in at.items() if name in names}
@@ -144,7 +143,7 @@ def _drawn(maps: Any, first: Mapped) -> str:
 
 
 def _largest(one: Mapped) -> dict[str, int]:
-    """Return the index along each axis at which a map is largest."""
+    """Return the grid index of the maximum of a map."""
     values = np.nan_to_num(np.asarray(one.values, dtype=float), nan=-np.inf)
     if not one.key.endswith("_error"):
         values = np.where(np.isposinf(values), -np.inf, values)
@@ -153,7 +152,7 @@ def _largest(one: Mapped) -> dict[str, int]:
 
 
 def _where(maps: Any, one: Mapped) -> str:
-    """Return the coordinates at which a map is largest as text."""
+    """Format the coordinates of the maximum of a map."""
     known = finite(one)
     bounded = bool(np.isfinite(known).all())
     if bounded and np.ptp(known) <= 1e-9 * np.abs(known).max():
@@ -162,7 +161,7 @@ def _where(maps: Any, one: Mapped) -> str:
 
 
 def _place(maps: Any, at: dict[str, int]) -> str:
-    """Return the coordinates of a point as text."""
+    """Format the coordinates of a grid point."""
     return ", ".join(
         f"{name} = {float(maps[name].values[i]):.6g} {_UNITS.get(name, '')}".rstrip()
         for name, i in at.items()

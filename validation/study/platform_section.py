@@ -1,4 +1,4 @@
-"""Create the report section about the platform's stiffness."""
+"""Create the report section on platform stiffness."""
 
 from typing import Any
 
@@ -17,15 +17,14 @@ from forcefit.stiffness.screws import WRENCH
 
 
 def platform_section(stiffness: dict[str, Any]) -> str:
-    """Return K_C at the study's pose, and the most compliant parts, as HTML.
+    """Return K_C at the study's pose and the most compliant parts as HTML.
 
     Args:
         stiffness: result of
             :func:`forcefit.assembly.report.platform_stiffness.stiffness_of`.
 
     Returns:
-        HTML with tables, and a chart of the contribution of each part to the
-        compliance.
+        HTML with tables and a chart of each part's contribution to the compliance.
     """
     K = np.asarray(stiffness["stiffness"])
     eigen = ", ".join(f"{one['stiffness']:.4g}" for one in stiffness["eigen"])
@@ -48,9 +47,9 @@ def platform_section(stiffness: dict[str, Any]) -> str:
             f"{stiffness['characteristic_length']:.4g} m: {eigen}."
         ),
         paragraph(
-            "Shares of the parts in the compliance along each axis [%], the largest "
+            "Contributions of the parts to the compliance along each axis [%], largest "
             "first."
         ),
         table(["part", *DIRECTIONS], blame),
-        share_chart(stiffness["shares"], "Contribution of each part of the table."),
+        share_chart(stiffness["shares"], "Contribution of each part in the table."),
     )

@@ -1,4 +1,4 @@
-"""Write the report of a study: a self-contained HTML page, and the results as JSON."""
+"""Write a study's report as a self-contained HTML page, and its results as JSON."""
 
 from importlib.metadata import version
 from pathlib import Path
@@ -44,7 +44,7 @@ _ASSUMED = (
     "Links are elastic between their ends; no contact stiffness, friction, temperature "
     "or dynamics.",
     "Both models of the cross-check have no clearances.",
-    "Between the points of a grid nothing is certified.",
+    "Results between the points of a grid are not certified.",
 )
 
 
@@ -75,7 +75,7 @@ def write_study(results: StudyResults) -> Path:
 
 
 def results_table(results: StudyResults) -> dict[str, Any]:
-    """Return the results of a study as plain values."""
+    """Convert the results of a study to plain values."""
     table: dict[str, Any] = {
         "program": f"forcefit {version('forcefit')}",
         "title": results.study.title,
@@ -105,7 +105,7 @@ def results_table(results: StudyResults) -> dict[str, Any]:
 
 
 def map_summary(maps: Any) -> dict[str, Any]:
-    """Return smallest, median and largest value of each map, and counts of statuses."""
+    """Return the minimum, median and maximum of each map, and counts of statuses."""
     names, counts = np.unique(maps["status"].values.astype(str), return_counts=True)
     summary: dict[str, Any] = {"status": dict(zip(names, counts.tolist(), strict=True))}
     for one in mapped(maps):
@@ -118,7 +118,7 @@ def map_summary(maps: Any) -> dict[str, Any]:
 
 
 def report_page(results: StudyResults) -> str:
-    """Return the report as a self-contained HTML page."""
+    """Create the report as a self-contained HTML page."""
     study, robot = results.study, results.robot
     body = [
         unchecked_section(results),
@@ -162,7 +162,7 @@ def report_page(results: StudyResults) -> str:
 
 
 def _verdict(results: StudyResults) -> str:
-    """Return the sentence about the assembly, and the checks that did not pass."""
+    """State how the robot assembles and which checks did not pass."""
     first = conclusions(results)[0].removesuffix(".")
     missed = [
         f"{in_words(name)} {outcome}"
@@ -173,10 +173,10 @@ def _verdict(results: StudyResults) -> str:
 
 
 def _good(results: StudyResults) -> bool | None:
-    """Return True if the robot is assembled without force and all checks passed.
+    """Return True if the robot assembles without force and all checks passed.
 
-    The result is None if assembly needs force or a check has no outcome.  The result is
-    False without a solution, or if a check failed.
+    The result is None if assembly requires force or a check has no outcome, and False
+    if there is no solution or a check failed.
     """
     if results.solution["status"] != OK or FAILED in results.verdicts.values():
         return False
@@ -201,7 +201,7 @@ def _tiles(results: StudyResults) -> list[Tile]:
         tiles.append(Tile(title, bounds[0], [
             "Over all positions within the clearances, at this pose",
             *(["; over the map ", *bounds[1]] if over is not None else []), ".",
-            " Without the tolerances of the drawing." if drawn else "",
+            " Drawing tolerances are excluded." if drawn else "",
         ]))  # fmt: skip
         tiles += _governing_tiles(results, worst["pose"])
     tiles.append(_force_tile(results.assembly))
@@ -215,7 +215,7 @@ def _tiles(results: StudyResults) -> list[Tile]:
 
 
 def _force_tile(assembly: Assembly) -> Tile:
-    """Return the tile of the largest moment and largest force through a body."""
+    """Return the tile of the largest moment and the largest force through any body."""
     wrenches = without_rounding(assembly.tip_wrenches)
     shown: list[str | Value] = []
     names = []
@@ -231,7 +231,7 @@ def _force_tile(assembly: Assembly) -> Tile:
 
 
 def _governing_tiles(results: StudyResults, worst: dict[str, float]) -> list[Tile]:
-    """Return tiles of the governing part, and of the tolerance to be tightened."""
+    """Return tiles for the governing part and the tolerance to tighten."""
     known = [
         one for one in results.governing
         if one["translation"] is not None and np.isfinite(one["translation"])
@@ -242,7 +242,7 @@ def _governing_tiles(results: StudyResults, worst: dict[str, float]) -> list[Til
     best = known[0]
     won = 1 - best["translation"] / whole
     if won < 0.01:
-        none = "No single part: each alone changes it by less than 1 %."
+        none = "No single part: none alone changes it by 1 % or more."
         return [Tile("Governing part", ["many parts"], [none])]
     further = ", ".join(
         f"{one['part']} ({one['what']}, {_percent(one['translation'] / whole)})"
@@ -259,5 +259,5 @@ def _governing_tiles(results: StudyResults, worst: dict[str, float]) -> list[Til
 
 
 def _percent(ratio: float) -> str:
-    """Return the change that a factor causes, as text in per cent."""
+    """Format the change that a factor causes, in per cent."""
     return f"{100 * (ratio - 1):+.0f} %"

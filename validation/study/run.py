@@ -1,4 +1,4 @@
-"""A study in one call: read its file, run every check, write its report."""
+"""Read a study file, run every check and write the report in a single call."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -16,21 +16,21 @@ def run_study(
     *,
     output: Path | str | None = None,
 ) -> StudyResults:
-    """Run every check of a study; write the report if a folder is given.
+    """Run every check of a study and, if a folder is given, write the report.
 
     Args:
-        study: study file (TOML), or a study that was read from one.
+        study: path of a study file (TOML), or a study read from such a file.
         progress: function called with the name of a check, the number of finished steps
             and the total number.
         output: folder for ``report.html``, ``results.json`` and ``results.nc``; None to
-            write no file.
+            write no files.
 
     Returns:
         The results.
 
     Raises:
-        BadInput: the study file or its robot violates a rule, the robot does not reach
-            the pose, a surface cannot be meshed, or the folder cannot be written.
+        BadInput: the study file or its robot is invalid, the pose is unreachable, a
+            surface cannot be meshed, or the folder cannot be written.
         ModuleNotFoundError: a package that a check requires is missing.
     """
     if not isinstance(study, Study):

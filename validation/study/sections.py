@@ -1,4 +1,4 @@
-"""Create sections of a study's page: tables, charts, maps and the robot, as HTML."""
+"""Create the HTML sections of a study's report page."""
 
 from typing import Any
 
@@ -25,28 +25,28 @@ from forcefit.validation.study.study import StudyResults
 _CLEARANCE_OF = {
     "frozen": "any position without a change of deformation",
     "free": "any position; compliant joints also rotate about their axis",
-    "budget": "any position and deformation of at most 5 % more than the least energy",
+    "budget": "any position and deformation within 5 % of the minimum energy",
 }
 _PARTS = ("rotation", "translation")
 _UNITS = {"rx": "rad", "ry": "rad", "rz": "rad", "tx": "m", "ty": "m", "tz": "m"}
 
 
 def unchecked_section(results: StudyResults) -> str:
-    """Return the section on checks that were not done, with the reasons."""
+    """Return the section on checks that were not run, with the reasons."""
     rows = [[in_words(name), why] for name, why in results.unchecked.items()]
     if not rows:
         return ""
-    return section("Checks that could not be made", table(["check", "reason"], rows))
+    return section("Checks that were not possible", table(["check", "reason"], rows))
 
 
 def robot_section(results: StudyResults) -> str:
-    """Return the section with a view of the forced robot."""
+    """Return the section that shows the forced robot."""
     if results.assembly is None or "picture" not in results.study.checks:
         return ""
     caption = (
-        "Nominal (grey) and forced robot of least energy. Red: elastic links; blue: "
-        "rigid bodies; orange: driven joints; yellow: possible platform errors within "
-        f"the clearances (assumption {WORST}), with the same exaggeration."
+        "Nominal robot (grey) and minimum-energy forced robot. Red: elastic links; "
+        "blue: rigid bodies; orange: driven joints; yellow: possible platform errors "
+        f"within the clearances (assumption {WORST}), with the same exaggeration."
     )
     if results.closing is not None:
         caption += " The closing is simulated without clearances."
@@ -58,7 +58,7 @@ def robot_section(results: StudyResults) -> str:
 
 
 def _error_body(results: StudyResults) -> ErrorBody | None:
-    """Return a 3-D body of the possible platform translations; None if unbounded."""
+    """Return a 3-D body of the possible platform translations, or None if unbounded."""
     assert results.assembly is not None
     reach = reachable_screws(results.assembly, WORST)
     if reach.unbounded(3):
@@ -70,7 +70,7 @@ def _error_body(results: StudyResults) -> ErrorBody | None:
 
 
 def governing_section(results: StudyResults) -> str:
-    """Return the section about the certified worst case with one part made perfect."""
+    """Return the section on the certified worst case with one part made perfect."""
     worst = worst_clearance(results)["pose"]
     if worst is None or not results.governing:
         return ""
@@ -87,15 +87,15 @@ def governing_section(results: StudyResults) -> str:
         paragraph(
             "The certified bound at this pose is ",
             *rotation_and_translation(worst["rotation"], worst["translation"]),
-            ". The table gives it with one imperfection removed. Errors may cancel "
-            "each other; the bound then rises.",
+            ". The table lists the bound with one imperfection removed. It rises if "
+            "the removed error compensated another one.",
         ),
         table(head, flat, "governing parts"),
     )  # fmt: skip
 
 
 def _change(one: dict[str, Any], worst: dict[str, float], part: str) -> list[Any]:
-    """Return a bound without one part, and its change in per cent."""
+    """Return the bound without one imperfection, and its change in per cent."""
     value = one[part]
     if value is None or not np.isfinite([value, worst[part]]).all():
         return ["none" if value is None else Value(value, unit_of(part)), "-"]
@@ -105,7 +105,7 @@ def _change(one: dict[str, Any], worst: dict[str, float], part: str) -> list[Any
 
 
 def solution_section(results: StudyResults) -> str:
-    """Return the section on the assembly at the study's pose and on its certificate."""
+    """Return the section on the assembly at the study's pose and its certificate."""
     solution = results.solution
     pose = [
         text
@@ -125,7 +125,7 @@ def solution_section(results: StudyResults) -> str:
     if solution["status"] == "ok":
         rows.append(["energy, eq. (22)", Value(solution["energy"], "J", 9)])
         for k, value in enumerate(solution["platform_screw"]):
-            quantity = f"platform error {SCREW[k]}, least energy"
+            quantity = f"platform error {SCREW[k]}, minimum energy"
             rows.append([quantity, Value(value, SCREW_UNITS[k], 6)])
         for key, value in solution["certificate"].items():
             rows.append([f"certificate: {in_words(key)}", _number(value, unit_of(key))])
@@ -141,7 +141,7 @@ def solution_section(results: StudyResults) -> str:
 
 
 def _linearisation_rows(error: dict[str, Any]) -> list[list[Any]]:
-    """Return table rows about the error of linear closures against finite motions."""
+    """Return table rows on the linearisation error of the closures."""
     if error["status"] != "ok":
         return [["linearisation error", error["status"]]]
     turn, shift = (float(np.linalg.norm(error[k])) for k in ("rotation", "translation"))
@@ -153,7 +153,7 @@ def _linearisation_rows(error: dict[str, Any]) -> list[list[Any]]:
 
 
 def _pose_error(results: StudyResults) -> str:
-    """Return a table of the bounds of problem (27) under each assumption."""
+    """Tabulate the bounds of problem (27) under each assumption."""
     rows = [
         [
             assumption,
@@ -172,12 +172,12 @@ def _pose_error(results: StudyResults) -> str:
         Column("translation at least", "m", 6), Column("at most", "m", 6), "clearances",
     ]  # fmt: skip
     return paragraph(
-        "Certified bounds of the platform's largest pose error, problem (27)."
+        "Certified bounds on the platform's largest pose error, problem (27)."
     ) + table(head, rows, "pose errors")
 
 
 def _wrenches(results: StudyResults) -> str:
-    """Return a table of the wrench through each elastic link."""
+    """Tabulate the wrench through each elastic link."""
     frames = results.solution["frames"]
     elastic = [f.name for f in results.robot.frames if f.link is not None]
     wrenches = without_rounding(
@@ -196,7 +196,7 @@ def _wrenches(results: StudyResults) -> str:
 
 
 def reference_section(results: StudyResults) -> str:
-    """Return the section about the problems of the paper, solved with cvxpy."""
+    """Return the section on the paper's problems solved with cvxpy."""
     reference, solution = results.reference, results.solution
     title = "The same problems as printed, in cvxpy"
     if reference is None:
@@ -214,15 +214,16 @@ def reference_section(results: StudyResults) -> str:
     return section(
         title,
         paragraph(
-            "Every screw of every frame is a variable, every constraint an equation of "
-            f"the paper; differences must be below {reference['tolerance']:g}."
+            "Every screw of every frame is a variable and every constraint is an "
+            "equation of the paper; differences must be below "
+            f"{reference['tolerance']:g}."
         ),
         table(["quantity", "reduced problem", "cvxpy", "relative difference"], rows),
     )
 
 
 def stiffness_section(results: StudyResults) -> str:
-    """Return the section that compares a beam with finite elements."""
+    """Return the section that compares beam theory with finite elements."""
     if not results.stiffness:
         return ""
     stiffness = results.stiffness
@@ -240,10 +241,10 @@ def stiffness_section(results: StudyResults) -> str:
         "Link stiffness K_E: beam and finite elements",
         paragraph(
             f"Link {name}{shared}, {count} cubic tetrahedra, estimated error "
-            f"{100 * compared['relative_error_estimate']:.2g} %. A solid held at a "
-            "rigid face is stiffer than a beam by a share of about r/L, and a beam "
-            "without shear (Euler-Bernoulli) is stiffer than one with it: a few per "
-            "cent between the columns are physics, not an error."
+            f"{100 * compared['relative_error_estimate']:.2g} %. A solid clamped at a "
+            "rigid face is stiffer than a beam by a fraction of about r/L, and an "
+            "Euler-Bernoulli beam is stiffer than one with shear: differences of a "
+            "few per cent between the columns are physical, not numerical errors."
         ),
         table(
             ["entry", "Euler-Bernoulli", "Timoshenko", "finite elements",
@@ -253,20 +254,20 @@ def stiffness_section(results: StudyResults) -> str:
         matrix(
             100 * scaled(fea - timoshenko, timoshenko), SCREW,
             "difference [% of sqrt(K_ii K_jj)]",
-            "Finite elements minus Timoshenko beam, entry by entry.", around=True,
+            "Finite elements minus Timoshenko beam, entrywise.", around=True,
         ),
     )  # fmt: skip
 
 
 def _significant(K: NDArray) -> NDArray:
-    """Return (6, 6) bool: entries above one thousandth of sqrt(K_ii K_jj)."""
+    """Return a mask (6, 6) of entries above one thousandth of sqrt(K_ii K_jj)."""
     size = np.sqrt(np.diag(K))
     return np.abs(K) > 1e-3 * np.outer(size, size)
 
 
 def crosscheck_section(results: StudyResults) -> str:
-    """Return the section about the multibody simulation."""
-    check, title = results.crosscheck, "Against a multibody simulation"
+    """Return the section on the multibody simulation."""
+    check, title = results.crosscheck, "Comparison with a multibody simulation"
     if check is None:
         if not results.crosscheck_failure:
             return ""
@@ -282,5 +283,5 @@ def crosscheck_section(results: StudyResults) -> str:
 
 
 def _number(value: float | None, unit: str, digits: int = 6) -> str | Value:
-    """Return a number with its unit as text, or "none" if there is no number."""
+    """Format a number with its unit, or return "none" if there is no number."""
     return "none" if value is None else Value(value, unit, digits)

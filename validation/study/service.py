@@ -1,7 +1,7 @@
 """Compute deflection, stiffness and natural frequencies of a robot under load.
 
 The table ``[service]`` of a study file requests these results.  They are computed at
-the pose of the study.  Over the grid, they are additional variables of the maps.
+the study's pose.  Over the grid, they become additional variables of the maps.
 """
 
 from collections.abc import Callable, Mapping
@@ -32,13 +32,13 @@ _KEPT = ("stiffness", "eigen_stiffness", "stiffness_condition", "share", "freque
 
 @dataclass(frozen=True, eq=False)
 class Service:
-    """Requested results for the robot under load.
+    """Results requested for the robot under load.
 
     Attributes:
         load: (6,) [N m, N] load on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] gravity in base axes.
-        stiffness: whether the stiffness along each axis is computed over the grid.
-        frequencies: number of natural frequencies.
+        stiffness: whether to compute the stiffness along each axis over the grid.
+        frequencies: number of natural frequencies to compute.
     """
 
     load: NDArray
@@ -48,25 +48,24 @@ class Service:
 
     @property
     def loaded(self) -> bool:
-        """Whether there is a load or gravity."""
+        """Whether a load or gravity acts on the robot."""
         return bool(self.load.any() or self.gravity.any())
 
 
 def read_service(root: Table, robot: Robot, links: bool = True) -> Service | None:
-    """Return the table ``[service]`` of a study file; None if it is absent.
+    """Return the table ``[service]`` of a study file, or None if it is absent.
 
     Args:
         root: root table of the file.
         robot: robot of the study.
-        links: whether the stiffness of meshed links is computed, so that masses are
-            known.
+        links: whether the stiffness of meshed links is computed, which determines their
+            masses.
 
     Returns:
         The requested results.
 
     Raises:
-        BadInput: the table violates a rule, or requests frequencies of a robot without
-            mass.
+        BadInput: the table is invalid, or requests frequencies of a robot without mass.
     """
     if not root.has("service"):
         return None
@@ -91,7 +90,7 @@ def read_service(root: Table, robot: Robot, links: bool = True) -> Service | Non
 
 
 def at_pose(posture: Posture, service: Service, unloaded: Mapping) -> dict[str, Any]:
-    """Return the results of the robot under load at one pose.
+    """Return the results for the robot under load at a single pose.
 
     Args:
         posture: the robot's configuration.
@@ -99,11 +98,11 @@ def at_pose(posture: Posture, service: Service, unloaded: Mapping) -> dict[str, 
         unloaded: solution without loads, with the keys of ``assembly solve``.
 
     Returns:
-        Mapping with ``status`` and, after a failure, ``reason``; ``load`` and
-        ``gravity``; and ``frequencies`` with the keys of ``assembly frequencies``.
-        With a load or gravity, the mapping also contains ``solution`` with the keys of
-        ``assembly solve``, and ``deflection``: (6,) the platform's screw with loads
-        minus its screw without loads.  Both screws are solutions of least energy.
+        Mapping with ``status`` and, on failure, ``reason``; ``load`` and ``gravity``;
+        and ``frequencies`` with the keys of ``assembly frequencies``.  With a load or
+        gravity, it also contains ``solution`` with the keys of ``assembly solve``, and
+        ``deflection`` (6,), the platform screw with loads minus the screw without
+        loads, both from minimum-energy solutions.
     """
     found: dict[str, Any] = {
         "status": OK, "load": service.load, "gravity": service.gravity
@@ -127,7 +126,7 @@ def over_grid(
     maps: "xarray.Dataset", robot: Robot, service: Service,
     grid: Mapping[str, NDArray], progress: Callable[[int, int], None],
 ) -> "xarray.Dataset":  # fmt: skip
-    """Add maps of the robot under load to the maps of a study.
+    """Return the maps of a study with those of the robot under load added.
 
     Args:
         maps: maps without loads.
@@ -139,7 +138,7 @@ def over_grid(
 
     Returns:
         The maps with ``deflection`` as in :func:`at_pose`, and ``loaded_status``.  If
-        requested, the maps also contain ``stiffness`` with its further variables, and
+        requested, they also contain ``stiffness`` with its accompanying variables, and
         ``frequency``.
     """
     targets = grid_targets(grid)
@@ -153,8 +152,8 @@ def over_grid(
     if service.loaded:
         moved = data["platform_screw"] - maps["platform_screw"]
         new["deflection"] = moved.assign_attrs(
-            units="rad, m", long_name="platform's screw with load and weight minus "
-            "without, least-energy solution",
+            units="rad, m", long_name="platform screw with load and weight minus "
+            "without, minimum-energy solution",
         )  # fmt: skip
         new["loaded_status"] = data["status"]
     return maps.assign(new)

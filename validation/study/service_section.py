@@ -1,4 +1,4 @@
-"""Create the report section about the robot under load and weight."""
+"""Create the report section on the robot under load and weight."""
 
 from typing import Any
 
@@ -30,13 +30,13 @@ def service_section(service: dict[str, Any] | None) -> str:
 
 
 def _loaded(service: dict[str, Any]) -> list[str]:
-    """Return a table of the platform's pose error under load and weight."""
+    """Tabulate the platform's pose error under load and weight."""
     load = ", ".join(f"{v:.6g}" for v in service["load"])
     weight = ", ".join(f"{v:.6g}" for v in service["gravity"])
     about = paragraph(
         f"Load on the platform [{load}] N m, N at its origin, gravity [{weight}] "
-        "m/s^2, both in base axes; least-energy solution. The certified bounds "
-        "above are without them."
+        "m/s^2, both in base axes; minimum-energy solution. The certified bounds above "
+        "exclude them."
     )
     if "deflection" not in service:
         return [about, paragraph(f"{service['status']}: {service.get('reason', '')}.")]
@@ -52,7 +52,7 @@ def _loaded(service: dict[str, Any]) -> list[str]:
 
 
 def _frequencies(found: dict[str, Any]) -> str:
-    """Return a table of natural frequencies, and parts that deform in each mode."""
+    """Tabulate natural frequencies and the parts that deform in each mode."""
     if "frequencies" not in found:
         return paragraph(f"Frequencies: {found['status']}, {found['reason']}.")
     rows: list[list[Cell]] = []
@@ -61,20 +61,20 @@ def _frequencies(found: dict[str, Any]) -> str:
         shares = ", ".join(f"{name} {100 * share:.3g} %" for name, share in parts)
         rows.append([str(k), Value(mode["frequency"], "Hz", 5), shares])
     return paragraph(
-        "Natural frequencies of the nominal robot without load and weight, the drives "
-        "held, clearances at zero."
+        "Natural frequencies of the nominal robot without load and weight, with drives "
+        "locked and zero clearances."
     ) + table(["mode", "frequency", "where its spring energy is"], rows, "frequencies")
 
 
 def service_tile(service: dict[str, Any] | None) -> list[Tile]:
-    """Return a tile of the deflection under load, or of the lowest frequency."""
+    """Return a tile with the deflection under load, or else the lowest frequency."""
     if service is None:
         return []
     tiles = []
     if "deflection" in service:
         screw = np.asarray(service["deflection"])
         turn, shift = (float(np.linalg.norm(half)) for half in (screw[:3], screw[3:]))
-        note = "The platform's motion at this pose, least-energy solution."
+        note = "Platform motion at this pose, minimum-energy solution."
         tiles.append(
             Tile("By load and weight", rotation_and_translation(turn, shift, 3), [note])
         )

@@ -1,4 +1,4 @@
-"""Run every check of a study file on one robot.
+"""Run every check of a study file on its robot.
 
 The file is read by :mod:`forcefit.validation.study.study_file`.  The results are
 written by :mod:`forcefit.validation.study.report`.
@@ -59,13 +59,13 @@ _PACKAGES = {  # packages that each check requires
 
 @dataclass(frozen=True, eq=False)
 class StudyResults:
-    """Results of a study; results that were not requested are None.
+    """Results of a study; those that were not requested are None.
 
     Attributes:
         study: content of the study file.
-        robot: robot with the link stiffnesses that were used in the computations.
+        robot: robot with the link stiffnesses used in the computations.
         solution: solution at the study's pose, with the keys of ``assembly solve``.
-        assembly: assembly of the solution; None if the robot cannot be assembled.
+        assembly: assembly of this solution; None if the robot cannot be assembled.
         error: bounds of problem (27) by assumption, with the keys of ``assembly
             error``.
         reference: result of
@@ -79,8 +79,8 @@ class StudyResults:
             :func:`forcefit.validation.study.governing.governing`.
         service: the robot under load, from
             :func:`forcefit.validation.study.service.at_pose`.
-        statistics: statistics of drawn parts at the pose, with the keys of ``assembly
-            statistics``; None for a robot without drawing tolerances.
+        statistics: statistics of randomly drawn parts at the pose, with the keys of
+            ``assembly statistics``; None for a robot without drawing tolerances.
         draws: data set of the random draws, or None.
         closing: (k, n, 4, 4) poses of the frames while the simulation closes the loops;
             None if the simulation failed.
@@ -107,7 +107,7 @@ class StudyResults:
 
     @property
     def verdicts(self) -> dict[str, str]:
-        """Verdict of each requested independent check.
+        """Verdicts of the requested independent checks.
 
         The verdict is ``"passed"``, ``"failed"``, ``"not decided"``, ``"no signal"`` if
         there is nothing to compare, or ``"not run"`` if there is no assembly to check.
@@ -124,8 +124,8 @@ class StudyResults:
 
     @property
     def unchecked(self) -> dict[str, str]:
-        """Checks that were not done, with the reasons."""
-        silent = "its errors need neither springs nor clearances at this pose"
+        """Checks that were not run, with the reasons."""
+        silent = "at this pose its errors engage neither springs nor clearances"
         if not self.robot.errors.any():
             silent = "the robot has no geometric errors; [errors] would give it some"
         why = {NOT_RUN: "there is no assembly to check", NO_SIGNAL: silent}
@@ -142,7 +142,7 @@ class StudyResults:
 
     @property
     def passed(self) -> bool:
-        """Whether there is a certified solution and every check passed.
+        """Whether a certified solution exists and every check passed.
 
         A check without a signal counts as not passed if it was requested, or if no
         other check was run.
@@ -169,7 +169,7 @@ def run_study(study: Study, progress: Progress = lambda *_: None) -> StudyResult
         The results; no file is written.
 
     Raises:
-        BadInput: the robot does not reach the pose, or a surface cannot be meshed.
+        BadInput: the pose is unreachable, or a surface cannot be meshed.
         ModuleNotFoundError: a package that a check requires is missing.
     """
     wanted = set(study.checks)
@@ -245,7 +245,7 @@ def points_solved(maps: Any) -> int:
 
 
 def _closing(posture: Posture) -> NDArray | None:
-    """Return the frames while the loops are closed; None without link stiffnesses."""
+    """Return the frame poses during closing, or None without link stiffnesses."""
     tight = replace(posture, robot=without_clearance(posture.robot))
     try:
         return closing_sequence(tight)
@@ -256,7 +256,7 @@ def _closing(posture: Posture) -> NDArray | None:
 def _compare_links(
     study: Study, progress: Progress
 ) -> tuple[dict[str, dict[str, Any]], Robot]:
-    """Return K_E by beam theory and finite elements; replace the links if requested."""
+    """Return K_E by beam theory and finite elements, and replace links if requested."""
     compared: dict[str, dict[str, Any]] = {}
     links: dict[str, MatrixLink] = {}
     for done, (name, mesh) in enumerate(study.meshes.items()):
@@ -279,7 +279,7 @@ def _compare_links(
 
 
 def _beams(frame: Frame) -> dict[str, NDArray]:
-    """Return K_E of a frame's beam by both beam theories."""
+    """Return K_E of a frame's beam according to both beam theories."""
     assert isinstance(frame.link, BeamLink)
     links = {name: replace(frame.link, theory=name) for name in THEORIES}
     return {

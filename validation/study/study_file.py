@@ -1,8 +1,7 @@
-"""Read a study file: a robot and the checks to be run on this robot.
+"""Read a study file, which names a robot and the checks to run on it.
 
-The file format is TOML. It is described in ``docs/study.md``, and
-``examples/irsbot2.toml`` is an example.  The whole content is checked before any
-computation.
+The file format (TOML) is described in ``docs/study.md``; see ``examples/irsbot2.toml``
+for an example.  The whole file is validated before any computation.
 """
 
 import os.path
@@ -45,27 +44,27 @@ _CHECKS = ("reference", "stiffness", "maps", "picture", "crosscheck")
 
 @dataclass(frozen=True, eq=False)
 class Study:
-    """The content of a study file.
+    """Content of a study file.
 
     Attributes:
         title: title of the report.
         robot: robot with its errors and its original links.
-        errors: sentence about the origin of the errors.
-        source: source of the links' stiffness, ``"beam"`` (declared) or ``"fea"``.
-        meshes: mapping from frame to meshed link, for the comparison and for ``"fea"``.
+        errors: sentence that states the origin of the errors.
+        source: source of the link stiffness, ``"beam"`` (declared) or ``"fea"``.
+        meshes: mapping from frame to meshed link, for comparison and for ``"fea"``.
         accuracy: required accuracy of the finite elements.
         pose: nominal platform pose for the detailed checks.
         grid: mapping from pose component to its values in the maps; empty without maps.
         scales: scales of the errors in the cross-check; empty without a cross-check.
         checks: names of the checks to run.
-        asked: names of the checks that the file requests explicitly, by a grid or by
-            scales.
+        asked: names of the checks that the file requests explicitly, through a grid or
+            through scales.
         folder: folder of the report.
         files: files that were read: the study file, a robot file, surfaces.
-        service: results requested for the robot under load; None without a table
+        service: results requested for the robot under load; None if there is no table
             ``[service]``.
-        statistics: results requested for the tolerances of the robot's drawing; None
-            without tolerances.
+        statistics: results requested for the robot's drawing tolerances; None if it has
+            none.
     """
 
     title: str
@@ -94,15 +93,15 @@ def read_study(
 
     Args:
         path: path of the TOML file.
-        folder: folder of the report, instead of the one in the file.
-        links: whether the stiffness of meshed links is computed, which is required for
-            running the study.
+        folder: folder of the report, which overrides the one in the file.
+        links: whether to compute the stiffness of meshed links, which running the study
+            requires.
 
     Returns:
-        The study, after a check of its whole content.
+        The validated study.
 
     Raises:
-        BadInput: the study file or the robot file violates a rule.
+        BadInput: the study file or the robot file is invalid.
     """
     path = Path(path)
     root = read_toml(path)
@@ -158,7 +157,7 @@ def read_study(
 
 
 def _files(path: Path, root: Table, meshes: dict[str, MeshLink]) -> tuple[Path, ...]:
-    """Return the files of a study, each listed once."""
+    """Return the files of a study without duplicates."""
     robot = path.parent / root.text("robot")
     surfaces = (named_solid(mesh.surface)[0] for mesh in meshes.values())
     return tuple(
@@ -167,7 +166,7 @@ def _files(path: Path, root: Table, meshes: dict[str, MeshLink]) -> tuple[Path, 
 
 
 def _robot(root: Table, folder: Path, links: bool) -> Robot:
-    """Return the robot, built in or from a file, with closed kinematic loops."""
+    """Load the robot, built in or from a file, and close its kinematic loops."""
     if not root.has("robot") and (root.has("frame") or root.has("body")):
         line = f'robot = "{Path(root.file).name}"'
         expected = f"a study file, in the simplest case with the one line {line}"
@@ -184,7 +183,7 @@ def _robot(root: Table, folder: Path, links: bool) -> Robot:
 
 
 def _closed(root: Table, name: Path | str, links: bool) -> Robot:
-    """Return the robot with loops closed as the keys of the study request."""
+    """Close the loops of the robot as the study file requests."""
     rest = root.text("rest") if root.has("rest") else None
     mismatch = root.choice("mismatch", ("spring",)) if root.has("mismatch") else None
     own_errors = not root.has("errors")
@@ -207,7 +206,7 @@ def _closed(root: Table, name: Path | str, links: bool) -> Robot:
 
 
 def _errors(root: Table, robot: Robot) -> tuple[Robot, str]:
-    """Return the robot with the requested errors, and a sentence about them."""
+    """Apply the requested errors to the robot, and state their origin."""
     if not root.has("errors"):
         return robot, "geometric errors as in the robot file"
     closing = root.has("rest") or root.has("mismatch")
@@ -241,7 +240,7 @@ def _errors(root: Table, robot: Robot) -> tuple[Robot, str]:
 
 
 def _frames(table: Table, robot: Robot, default: list[str]) -> tuple[str, ...]:
-    """Return the frames named by the key ``frames``."""
+    """Read the frames listed under the key ``frames``."""
     names = table.get("frames", default)
     if not isinstance(names, list) or not all(isinstance(n, str) for n in names):
         raise table.bad("frames", "expected a list of frame names")
@@ -249,7 +248,7 @@ def _frames(table: Table, robot: Robot, default: list[str]) -> tuple[str, ...]:
 
 
 def _known(table: Table, key: str, robot: Robot, names: list[str]) -> tuple[str, ...]:
-    """Return the full names of frames; raise BadInput at an unknown name."""
+    """Return the full names of frames; raise BadInput if a name is unknown."""
     try:
         return frames_named(robot, names)
     except BadInput as error:
@@ -257,7 +256,7 @@ def _known(table: Table, key: str, robot: Robot, names: list[str]) -> tuple[str,
 
 
 def _links(root: Table, robot: Robot) -> tuple[str, dict[str, MeshLink], float]:
-    """Return the source of the links' stiffness, and the meshes compared with beams."""
+    """Read the source of the link stiffness and the meshes to compare with beams."""
     if not root.has("links"):
         return "beam", {}, 0.005
     table = root.table("links")
@@ -292,7 +291,7 @@ def _links(root: Table, robot: Robot) -> tuple[str, dict[str, MeshLink], float]:
 
 
 def _pose(root: Table) -> dict[str, float]:
-    """Return the pose for the detailed checks; the default is the home pose."""
+    """Read the pose of the detailed checks, which defaults to the home pose."""
     if not root.has("pose"):
         return {}
     table = root.table("pose")
@@ -302,7 +301,7 @@ def _pose(root: Table) -> dict[str, float]:
 
 
 def _scales(root: Table) -> tuple[float, ...]:
-    """Return the scales of the cross-check."""
+    """Read the scales of the cross-check."""
     if not root.has("scales"):
         return SCALES
     value = root.get("scales")
@@ -321,7 +320,7 @@ def _scales(root: Table) -> tuple[float, ...]:
 def _checks(
     root: Table, meshes: bool, grid: bool, scales: bool
 ) -> tuple[tuple[str, ...], set[str]]:
-    """Return the checks to run, and the names of the checks in the table [checks]."""
+    """Return the checks to run, and the names of those requested in [checks]."""
     possible = {"stiffness": meshes, "maps": grid, "crosscheck": scales}
     if not root.has("checks"):
         return tuple(c for c in _CHECKS if possible.get(c, True)), set()

@@ -1,4 +1,4 @@
-"""Synthetic measurement data of a simulated machine with hidden effects.
+"""Generate synthetic measurements of a simulated machine with hidden effects.
 
 Start with ``generator.py``.
 """

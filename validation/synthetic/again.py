@@ -1,8 +1,8 @@
-"""Compute the distance of a simulated machine from the wanted poses.
+"""Measure how far a simulated machine is from its target poses.
 
-The distance is that of the true pose, without noise and without errors of the measuring
-device.  A correction of commands is thus judged independently of the readings from
-which it was computed.
+The distance refers to the true pose, without noise and without device errors.  It
+therefore tests corrected commands independently of the readings from which they were
+computed.
 """
 
 from collections.abc import Sequence
@@ -30,19 +30,19 @@ def distances(
     coordinates: NDArray,
     program: str = "multibody",
 ) -> NDArray:
-    """Return the distances of a machine from the wanted poses.
+    """Return the distance between the true pose and the target pose of each command.
 
     Args:
         robot: the declared robot.
-        effects: effects of the machine; effects that change only the readings are
+        effects: effects of the machine; those that change only the readings are
             ignored.
-        targets: commands at which the nominal robot would have the wanted poses.
+        targets: commands at which the nominal robot reaches the target poses.
         coordinates: (R, n) [rad or m] nominal coordinates of the commands.
         program: name of the simulation program.
 
     Returns:
-        (R, 2) distance of the actual from the wanted reference point [m], and angle of
-        rotation between both orientations [rad].
+        (R, 2) distance between actual and target reference point [m], and angle between
+        actual and target orientation [rad].
     """
     names = [frame.name for frame in robot.frames]
 

@@ -1,4 +1,4 @@
-"""Compute temperatures that follow the recorded temperature with a time constant."""
+"""Compute temperatures that lag behind the recorded temperature."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -13,15 +13,15 @@ def behind(time_constant: float) -> str:
 
 
 def with_delays(rows: Sequence[Row], time_constants: Iterable[float]) -> list[Row]:
-    """Return rows with lagged temperatures, by linear interpolation between rows.
+    """Add lagged temperatures to the rows, assuming linear variation between rows.
 
     Args:
         rows: rows in the order of time.
         time_constants: [s] time constant of each lagged temperature.
 
     Returns:
-        The rows with one lagged temperature for each time constant.  In the first row,
-        all lagged temperatures equal the recorded one.
+        The rows with one lagged temperature per time constant.  In the first row, all
+        lagged temperatures equal the recorded one.
     """
     rows = list(rows)
     for late in dict.fromkeys(time_constants):

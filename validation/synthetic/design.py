@@ -18,7 +18,7 @@ _PERIOD = 2400.0  # [s] period of the temperature
 _STEP = 60.0  # [s] time between measurements
 _DRAWS = 40  # largest number of random draws per configuration
 _DIGITS = 6  # number of decimal digits of commanded coordinates
-# attributes of the design that effects require
+# Attributes of the design that each effect requires.
 _VARIED_FOR: dict[str, dict[str, Any]] = {
     "_humidity": {"humidity": True},
     "_quadratic_temperature": {"temperature": "around"},
@@ -37,19 +37,19 @@ class CampaignDesign:
         reach: [rad] largest change of a revolute drive from its home position; for a
             prismatic drive it is multiplied by ``size``.
         size: [m] length by which ``reach`` is multiplied.
-        load: [N] largest force on the platform.
+        load: [N] largest force applied to the platform.
         levels: levels of the load: ``"many"`` for many magnitudes and directions;
             ``"one"`` for the same force in every row.
         temperature: ``"swing"``: -0.5 ... 6.5 K; ``"around"``: -4 ... 4 K;
             ``"constant"``: 6 K.
-        command: form of commands in the file, ``"joints"`` or ``"pose"``.
+        command: form of the commands in the file, ``"joints"`` or ``"pose"``.
         humidity: whether the covariate ``humidity`` [%] is recorded.
         tilt: [rad] magnitude of the covariate ``tilt``; 0 if it is not recorded.
         gravity: [m/s^2] magnitude of the recorded gravity, which points vertically
             down.
         reference_point: [m] measured point, at which loads act, platform axes.
-        corners: whether every drive is at an end of its reach in half of the
-            configurations.
+        corners: whether half of the configurations have every drive at an end of its
+            reach.
     """
 
     configurations: int = 24
@@ -91,14 +91,14 @@ class CampaignDesign:
 
 
 def varied_for(design: CampaignDesign, names: Iterable[str]) -> CampaignDesign:
-    """Return a design that varies the covariates on which effects depend.
+    """Extend a design so that it varies the covariates on which effects depend.
 
     Args:
         design: initial design.
         names: names of the effects.
 
     Returns:
-        The design, with additional varying conditions if the effects require them.
+        The design, with additional varying conditions where the effects require them.
     """
     given = {key: v for n in names for key, v in _VARIED_FOR.get(n, {}).items()}
     return replace(design, **given)
@@ -106,12 +106,12 @@ def varied_for(design: CampaignDesign, names: Iterable[str]) -> CampaignDesign:
 
 @dataclass(frozen=True, eq=False)
 class CampaignPlan:
-    """The rows of a design for a robot.
+    """Rows of a design, planned for a robot.
 
     Attributes:
-        rows: rows in the order of measurement.
+        rows: rows in measuring order.
         configuration: (rows,) index of the configuration of each row.
-        commands: (rows, m) values as written to the file.
+        commands: (rows, m) values written to the file.
         columns: names of the m columns.
     """
 
@@ -124,18 +124,18 @@ class CampaignPlan:
 def plan_campaign(
     robot: Robot, design: CampaignDesign, rng: np.random.Generator
 ) -> CampaignPlan:
-    """Draw configurations, loads and conditions at random.
+    """Draw random configurations, loads and conditions.
 
     Args:
         robot: the declared robot.
         design: design of the campaign.
-        rng: random number generator of the draws.
+        rng: random number generator.
 
     Returns:
         The plan.
 
     Raises:
-        BadInput: the loops can be closed at hardly any configuration within the reach.
+        BadInput: the loops can be closed in hardly any configuration within the reach.
     """
     coordinates = _configurations(robot, design, rng)
     commands, columns, coordinates = _commands(robot, design, coordinates)
@@ -172,7 +172,7 @@ def plan_campaign(
 def _configurations(
     robot: Robot, design: CampaignDesign, rng: np.random.Generator
 ) -> NDArray:
-    """Return the (k, n) joint coordinates that close the loops of the nominal robot."""
+    """Return joint coordinates (k, n) that close the loops of the nominal robot."""
     home = home_posture(robot)
     spans = np.array([
         0.0 if not f.actuated
@@ -193,7 +193,7 @@ def _configurations(
         if len(reachable) >= design.configurations:
             return np.array(reachable[: design.configurations])
     raise BadInput(
-        f"{robot.name}: the loops can be closed at hardly any configuration within "
+        f"{robot.name}: the loops can be closed in hardly any configuration within "
         f"{design.reach:g} rad of the home position; expected a smaller reach"
     )
 
@@ -201,7 +201,7 @@ def _configurations(
 def _commands(
     robot: Robot, design: CampaignDesign, coordinates: NDArray
 ) -> tuple[NDArray, tuple[str, ...], NDArray]:
-    """Return the commands of the file, their columns, and the resulting coordinates."""
+    """Return the commands for the file, their columns and the coordinates."""
     driven = [i for i, f in enumerate(robot.frames) if f.actuated]
     if design.command == "joints":
         columns = tuple(f"q.{robot.frames[i].name}" for i in driven)
@@ -220,14 +220,14 @@ def _commands(
 
 
 def _interleaved(design: CampaignDesign, rng: np.random.Generator) -> NDArray:
-    """Return (rows,) configurations; each pass visits all of them in a new order."""
+    """Return the configuration of each row; each pass visits all in a new order."""
     passes = -(-design.rows // design.configurations)
     orders = [rng.permutation(design.configurations) for _ in range(passes)]
     return np.concatenate(orders)[: design.rows]
 
 
 def _loads(design: CampaignDesign, order: NDArray, rng: np.random.Generator) -> NDArray:
-    """Return (rows, 6) [N m, N] loads; each configuration repeats two of its loads."""
+    """Return loads (rows, 6) [N m, N]; each configuration repeats two of its loads."""
     loads = np.zeros((design.rows, 6))
     if design.levels == "one":
         loads[:, 3:] = (design.load * _direction(rng)).round(3)
@@ -245,7 +245,7 @@ def _loads(design: CampaignDesign, order: NDArray, rng: np.random.Generator) -> 
 
 
 def _load(largest: float, rng: np.random.Generator) -> NDArray:
-    """Return a force (3,) [N]: full or half along an axis, or in a random direction."""
+    """Return a force (3,) [N], full or half, along an axis or in a random direction."""
     if rng.random() < 0.5:
         axis = np.zeros(3)
         axis[rng.integers(3)] = rng.choice([-1.0, -0.5, 0.5, 1.0])
@@ -254,7 +254,7 @@ def _load(largest: float, rng: np.random.Generator) -> NDArray:
 
 
 def _direction(rng: np.random.Generator) -> NDArray:
-    """Return a (3,) unit vector in a random direction."""
+    """Return a unit vector (3,) in a random direction."""
     vector = rng.normal(size=3)
     return vector / np.linalg.norm(vector)
 
@@ -262,7 +262,7 @@ def _direction(rng: np.random.Generator) -> NDArray:
 def _temperature(
     design: CampaignDesign, time: NDArray, rng: np.random.Generator
 ) -> NDArray:
-    """Return the (rows,) [K] temperatures."""
+    """Return the temperature (rows,) [K] of each row."""
     if design.temperature == "constant":
         return np.full(len(time), 6.0)
     middle, size = (3.0, 3.5) if design.temperature == "swing" else (0.0, 4.0)

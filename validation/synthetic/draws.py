@@ -1,4 +1,4 @@
-"""Draw plausible parameters of hidden effects, and scale effects by a factor."""
+"""Draw plausible parameters of hidden effects and scale effects."""
 
 import math
 from collections.abc import Callable, Iterable
@@ -25,23 +25,23 @@ SLIDING = ("_lead", "_lead_backlash")  # effects of prismatic joints only
 
 
 class NotApplicable(ValueError):
-    """Error: an effect cannot act at any place of the robot."""
+    """Exception raised if an effect cannot act anywhere on the robot."""
 
 
 def draw_effect(
     name: str, robot: Robot, duration: float, rng: np.random.Generator
 ) -> Hidden:
-    """Return an effect with plausible parameters, at one place or at all places.
+    """Return an effect with plausible random parameters, at one place or everywhere.
 
     Args:
         name: name of the effect.
         robot: the robot with the effect.
         duration: [s] duration of the session.
-        rng: random number generator of the draws.
+        rng: random number generator.
 
     Raises:
         BadInput: the name of the effect is unknown.
-        NotApplicable: the effect cannot act at any place of the robot.
+        NotApplicable: the effect cannot act anywhere on the robot.
     """
     # Effects outside the library are only for tests, so the message does not list them.
     if name not in (*LIBRARY, *OUTSIDE):
@@ -52,7 +52,7 @@ def draw_effect(
 
 
 def strengthened(effect: Hidden, factor: float) -> Hidden:
-    """Return the effect with its contribution to the readings scaled by a factor.
+    """Return the effect with its contribution to the readings multiplied by a factor.
 
     Args:
         effect: effect with its parameters.
@@ -79,12 +79,12 @@ def strengthened(effect: Hidden, factor: float) -> Hidden:
 
 
 def _one(frames: list[Frame], rng: np.random.Generator) -> str:
-    """Return the name of one of the frames, at random."""
+    """Pick the name of a random frame."""
     return frames[rng.integers(len(frames))].name
 
 
 def _some(frames: list[Frame], rng: np.random.Generator) -> list[str]:
-    """Return the name of one of the frames, or all names, at random."""
+    """Pick either the name of a random frame or all names."""
     if not frames:
         raise NotApplicable("the robot has no frame on which the effect acts")
     return [_one(frames, rng)] if rng.random() < 0.5 else [f.name for f in frames]
@@ -95,7 +95,7 @@ def _beams(robot: Robot) -> list[Frame]:
 
 
 def _bodies(robot: Robot) -> list[Frame]:
-    """Return the beams or, if there are none, all bodies with a length."""
+    """Return the beams, or all bodies with a length if there are no beams."""
     return _beams(robot) or [f for f in robot.frames if f.translation.any()]
 
 
@@ -108,20 +108,20 @@ def _turning(robot: Robot) -> list[Frame]:
 
 
 def _vector(name: str, components: Iterable[str], values: NDArray) -> Parameters:
-    """Return the components of a vector as parameters ``<name>.<component>``."""
+    """Name the components of a vector as parameters ``<name>.<component>``."""
     keys = (f"{name}.{component}" for component in components)
     return dict(zip(keys, values.tolist(), strict=True))
 
 
 def _wave(name: str, size: float, rng: np.random.Generator) -> Parameters:
-    """Return the amplitude and the phase of a wave at a frame."""
+    """Return a random amplitude and phase of a harmonic error at a frame."""
     amplitude = size * rng.uniform(0.5, 1.0)
     phase = rng.uniform(-math.pi, math.pi)
     return {f"{name}.amplitude": amplitude, f"{name}.phase": phase}
 
 
 def _errors(frames: list[Frame], rng: np.random.Generator) -> Parameters:
-    """Return errors of about 1e-4 rad or m with random signs."""
+    """Draw errors of about 1e-4 rad or m with random signs."""
     names = _some(frames, rng)
     signs = rng.choice([-1.0, 1.0], len(names)) * rng.uniform(0.4, 1.0, len(names))
     return dict(zip(names, (1e-4 * signs).tolist(), strict=True))
@@ -244,7 +244,7 @@ def _stepped(robot: Robot, rng: np.random.Generator, _: float) -> Parameters:
     return {f"{name}.below": soft, f"{name}.above": hard, f"{name}.knee": 4.0}
 
 
-# functions of the robot, the random number generator and the duration [s]
+# Functions of robot, random number generator and duration [s].
 _DRAWS: dict[str, Callable[[Robot, np.random.Generator, float], Parameters]] = {
     "self_weight": _weight,
     "thermal_expansion": lambda r, rng, _: dict.fromkeys(_some(_bodies(r), rng), 2e-5),

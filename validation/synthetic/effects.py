@@ -1,16 +1,16 @@
-"""Model the effects of a simulated machine by their physics.
+"""Model physical effects in a simulated machine.
 
-The machine is a tree of frames, and most effects are additional frames.  For example,
-an elastic drive is a spring after the joint.  An encoder error is a finite rotation
-after the joint.  An elastic foundation is a spring below all frames.  Other effects
-change a body (length, compliance, clearance) or the load (weight, or a load that
-differs from the recorded load).  Further effects change the measuring frame, or only
-the reading.
+The machine is a tree of frames, and most effects insert frames into it.  For example,
+an elastic drive is a spring after the joint, an encoder error is a finite rotation
+after the joint, and an elastic foundation is a spring below all frames.  Other effects
+change a body (length, compliance, clearance) or the load (weight, or a difference from
+the recorded load).  The remaining effects change the measuring frame, or only the
+reading.
 
-A diagnosis fits effects with its own code, which is not used here.  An error in that
-code must not affect the data with which it is tested.  Effects have their public names
-and parameters.  Springs, rotations and translations of joints act about or along the z
-axis of the joint.
+The effect models of the diagnosis are deliberately not used here, so that an error in
+them cannot affect the test data.  Names and parameters of effects are the public ones.
+Springs, rotations and translations of joints act about or along the z axis of the
+joint.
 """
 
 import math
@@ -41,7 +41,7 @@ class Row:
             m].
         load: (6,) [N m, N] recorded load at the reference point, base axes.
         covariates: values of ``temperature`` [K], ``time`` [s], ``approach`` and
-            further covariates.  ``gravity.x`` .. ``gravity.z`` [m/s^2] are the
+            additional covariates.  ``gravity.x`` .. ``gravity.z`` [m/s^2] are the
             components of gravity.
     """
 
@@ -52,13 +52,13 @@ class Row:
 
 @dataclass(frozen=True, eq=False)
 class Machine:
-    """The simulated machine in one row of a design.
+    """Simulated machine in one row of a design.
 
     Attributes:
-        robot: robot with the frames that effects have added.  The load acts at its
+        robot: robot with the frames that effects inserted.  The load acts on its
             platform, whose pose is measured.
-        coordinates: mapping from frame to joint coordinate [rad or m]; missing joints
-            are at 0.
+        coordinates: mapping from frame to joint coordinate [rad or m]; 0 for missing
+            joints.
         load: (6,) [N m, N] applied load.
         gravity: (3,) [m/s^2] gravity in base axes.
         laws: mapping from frame to the nonlinear spring of its joint, or to the
@@ -82,8 +82,8 @@ class Rest:
     Attributes:
         transforms: (n, 4, 4) poses of the frames in the base frame, before the motion
             of their joints.
-        joint_wrenches: (n, 6) [N m, N] wrenches of joint springs, in the frame's axes.
-        joint_screws: (n, 6) [rad, m] deformations of joint springs.
+        joint_wrenches: (n, 6) [N m, N] wrenches of the joint springs, in frame axes.
+        joint_screws: (n, 6) [rad, m] deformations of the joint springs.
     """
 
     transforms: NDArray
@@ -96,21 +96,21 @@ Moved = Callable[[NDArray, Row, Parameters], NDArray]
 
 
 def insert_after(robot: Robot, name: str, suffix: str, **given: Any) -> Robot:
-    """Return a robot with a fixed frame inserted between a joint and its children."""
+    """Insert a fixed frame between a joint and its children."""
     new = f"{name}~{suffix}"
     frames = [replace(f, parent=new) if f.parent == name else f for f in robot.frames]
     return replace(robot, frames=(*frames, Frame(new, name, **given)))
 
 
 def along_own_axis(frame: Frame, value: float, others: float = 0.0) -> NDArray:
-    """Return a (6,) vector with one value along a joint's motion and one elsewhere."""
+    """Return (6,) with one value along a joint's motion and another elsewhere."""
     screw = np.full(6, others)
     screw[frame.own_axis] = value
     return screw
 
 
 def sprung(frame: Frame, stiffness: float) -> NDArray:
-    """Return a (6, 6) stiffness, finite along a joint's motion and rigid elsewhere."""
+    """Return a stiffness (6, 6), finite along a joint's motion and rigid elsewhere."""
     return np.diag(along_own_axis(frame, stiffness, math.inf))
 
 
@@ -123,7 +123,7 @@ def beam_length(robot: Robot, name: str) -> float:
 
 
 def lengthened(robot: Robot, name: str, change: float) -> Robot:
-    """Return a robot with a body longer by ``change`` [m] along its actual axis."""
+    """Lengthen a body by ``change`` [m] along its actual axis."""
     frame = robot.frame(name)
     if not isinstance(frame.link, BeamLink):  # lengthen the line between its joints
         longer = 1.0 + change / float(np.linalg.norm(frame.translation))
@@ -137,13 +137,13 @@ def lengthened(robot: Robot, name: str, change: float) -> Robot:
 
 
 def with_frame(robot: Robot, frame: Frame) -> Robot:
-    """Return the robot with the frame of the same name replaced."""
+    """Replace the frame of the same name."""
     frames = (frame if f.name == frame.name else f for f in robot.frames)
     return replace(robot, frames=tuple(frames))
 
 
 def misread(machine: Machine, name: str, suffix: str, change: float) -> Machine:
-    """Return a machine with a joint displaced by ``change`` [rad or m]."""
+    """Displace a joint by ``change`` [rad or m] from its reported coordinate."""
     screw = along_own_axis(machine.robot.frame(name), change)
     robot = insert_after(machine.robot, name, suffix, geometric_error=screw)
     return replace(machine, robot=robot)
@@ -152,7 +152,7 @@ def misread(machine: Machine, name: str, suffix: str, change: float) -> Machine:
 def displacing(
     suffix: str, component: str, amount: Callable[[Row, Parameters, str], float]
 ) -> Change:
-    """Return the change of a machine that displaces drives by an amount [rad or m].
+    """Return a function that displaces the drives of a machine by an amount [rad or m].
 
     The drives are the frames in parameters ``<frame>.<component>``, or in parameters
     ``<frame>`` without a component.
@@ -167,7 +167,7 @@ def displacing(
 
 
 def on_ground(robot: Robot, ground: Frame) -> Robot:
-    """Return a robot with a frame inserted between the base and its children."""
+    """Insert a frame between the base and its children."""
     frames = [
         replace(f, parent=ground.name) if f.parent == BASE else f for f in robot.frames
     ]
@@ -175,7 +175,7 @@ def on_ground(robot: Robot, ground: Frame) -> Robot:
 
 
 def own_compliance(frame: Frame) -> float:
-    """Return the compliance of a declared joint along its motion; 0 if it is rigid."""
+    """Return the declared compliance of a joint along its motion; 0 if it is rigid."""
     K = frame.springs
     if K is None or not np.isfinite(K[frame.own_axis, frame.own_axis]):
         return 0.0
@@ -227,7 +227,7 @@ def _base_compliance(machine: Machine, row: Row, given: Parameters) -> Machine:
 
 
 def wave(given: Parameters, name: str, angle: float) -> float:
-    """Return the displacement [rad or m] of a drive by a wave of an angle [rad]."""
+    """Return the displacement [rad or m] of a drive by a harmonic of an angle [rad]."""
     return given[f"{name}.amplitude"] * math.sin(angle + given[f"{name}.phase"])
 
 
@@ -281,7 +281,7 @@ def _load_gain(machine: Machine, row: Row, given: Parameters) -> Machine:
 
 
 def _body_mass(machine: Machine, row: Row, given: Parameters) -> Machine:
-    """Add a mass [kg] to a body; its centre is the moment [kg m] over the mass."""
+    """Add a mass [kg] to a body, centred at the moment [kg m] divided by the mass."""
     robot = machine.robot
     keys = ("mass", "moment.x", "moment.y", "moment.z")
     for name in dict.fromkeys(n for key in keys for n in named(given, key)):
@@ -299,7 +299,7 @@ def _geometric_stiffening(machine: Machine, row: Row, given: Parameters) -> Mach
 
 
 def _registration(pose: NDArray, row: Row, given: Parameters) -> NDArray:
-    """Return the pose of a displaced point in a displaced measuring frame."""
+    """Express the pose of a displaced point in a displaced measuring frame."""
     screw = np.array([given.get(f"base.{k}", 0.0) for k in SCREW])
     tool = [given.get(f"tool.{k}", 0.0) for k in SCREW[3:]]
     measured = pose.copy()
@@ -308,7 +308,7 @@ def _registration(pose: NDArray, row: Row, given: Parameters) -> NDArray:
 
 
 def _device_scale(pose: NDArray, row: Row, given: Parameters) -> NDArray:
-    """Return the pose after scaling all lengths from the origin of the device."""
+    """Scale all lengths measured from the origin of the device."""
     measured = pose.copy()
     measured[:3, 3] *= given["factor"]
     return measured
@@ -322,7 +322,7 @@ def _drift(reading: NDArray, row: Row, given: Parameters) -> NDArray:
 
 
 def named(given: Parameters, component: str) -> list[str]:
-    """Return the frames in parameters ``<frame>.<component>`` for a component."""
+    """Return the frames named in parameters ``<frame>.<component>`` of a component."""
     end = f".{component}"
     return [key.removesuffix(end) for key in given if key.endswith(end)]
 
@@ -348,14 +348,14 @@ CHANGES: dict[str, Change] = {
     "body_mass": _body_mass,
     "geometric_stiffening": _geometric_stiffening,
 }
-# functions that change the measured pose (4, 4), by name of the effect
+# Functions that change the measured pose (4, 4), by effect name.
 POSES: dict[str, Moved] = {
     "registration": _registration,
     "device_scale": _device_scale,
 }
-# functions that change the reading (6,), by name of the effect
+# Functions that change the reading (6,), by effect name.
 READINGS: dict[str, Moved] = {"drift": _drift}
-# names of the covariates that change the machine, by name of the effect
+# Covariates that change the machine, by effect name.
 COVARIATES: dict[str, tuple[str, ...]] = {
     "thermal_expansion": ("temperature",),
     "friction_hysteresis": ("approach",),

@@ -1,16 +1,15 @@
-"""Find effects that a campaign's design cannot distinguish from the hidden effects.
+"""Find effects that a design cannot distinguish from the hidden effects.
 
 The signature of an effect is the first-order change of the readings, divided by the
-noise.  The program of ``springs.py`` computes the signatures of all public effects, not
-the model under test.  A set of effects explains the data as well as the hidden effects
-under one condition: a combination of its signatures equals the contribution of the
-hidden effects within the noise.  A diagnosis that names such a set is therefore not
-wrong.
+noise.  Signatures of all public effects are computed by ``springs.py``, not by the
+model under test.  A set of effects explains the data as well as the hidden effects do
+if a combination of its signatures equals their contribution within the noise.  A
+diagnosis that names such a set is therefore not wrong.
 
-The signature of a rotated drive or a lengthened beam depends only on the configuration.
-The signatures of temperature, approach and contact follow from these signatures.  An
-arm therefore requires 600 solutions instead of 5000.  Clearance and geometric
-stiffening are omitted, because they have no linear signature.
+The signature of a rotated drive or a lengthened beam depends only on the configuration,
+and the signatures of temperature, approach and contact follow from it.  An arm
+therefore requires 600 solutions instead of 5000.  Clearance and geometric stiffening
+are omitted, because they have no linear signature.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -37,13 +36,13 @@ _SOFT = 1e9  # [N m/rad, N/m] stiffness of a spring added for a finite differenc
 
 @dataclass(frozen=True, eq=False)
 class Alternative:
-    """A set of effects compared with the hidden ones.
+    """A set of effects that is compared with the hidden effects.
 
     Attributes:
         names: names of the effects.
         parameters: number of their parameters.
-        residual: [-] chi-square of the noise-free contribution of the hidden effects
-            that this set does not explain.
+        residual: [-] chi-square of the part of the hidden effects' noise-free
+            contribution that this set does not explain.
     """
 
     names: tuple[str, ...]
@@ -52,14 +51,14 @@ class Alternative:
 
 
 def alternatives(campaign: Synthetic, size: int = 1) -> list[Alternative]:
-    """Return all small sets of public effects, the best set first.
+    """Return all small sets of public effects, best set first.
 
     Args:
         campaign: campaign with its hidden effects.
         size: largest number of effects in a set.
 
     Returns:
-        The sets, each with the residual of the hidden effects' contribution.
+        The sets, with the unexplained contribution of the hidden effects.
     """
     known = np.isfinite(campaign.readings)
     target = (campaign.added / campaign.sigma)[known]
@@ -77,7 +76,7 @@ def alternatives(campaign: Synthetic, size: int = 1) -> list[Alternative]:
 
 
 def _residual(A: NDArray, target: NDArray) -> float:
-    """Return the squared norm of the part of a vector outside the span of columns."""
+    """Return the squared distance of a vector from the span of columns."""
     norms = np.linalg.norm(A, axis=0)
     A = A[:, norms > 0] / norms[norms > 0]
     if not A.shape[1]:
@@ -95,8 +94,8 @@ def signatures(campaign: Synthetic) -> dict[str, NDArray]:
         campaign: campaign with the design and the noise.
 
     Returns:
-        Mapping from name to an array (6 rows, parameters).  There is one drift for each
-        time constant.
+        Mapping from name to an array (6 rows, parameters), with one drift per time
+        constant.
     """
     raw = dict(_raw(campaign))
     sigma = np.tile(campaign.sigma, len(campaign.plan.rows))
@@ -108,7 +107,7 @@ def signatures(campaign: Synthetic) -> dict[str, NDArray]:
 
 
 def _raw(campaign: Synthetic) -> Iterator[tuple[str, NDArray]]:
-    """Return the (rows, 6, parameters) derivatives by effect."""
+    """Return the derivatives (rows, 6, parameters) of each effect."""
     differences = _FiniteDifferences(campaign)
     covariate = {
         name: np.array([row.covariates[name] for row in campaign.plan.rows])[:, None]
@@ -157,7 +156,7 @@ def _of_drives_and_lengths(
 def _of_loads(
     campaign: Synthetic, differences: "_FiniteDifferences"
 ) -> Iterator[tuple[str, NDArray]]:
-    """Return columns of effects that depend on loads: springs, weight, load errors."""
+    """Return the columns of load-dependent effects: springs, weight, load errors."""
     beams = [f for f in campaign.robot.frames if isinstance(f.link, BeamLink)]
     base = [
         differences.loaded("base_compliance", f"stiffness.{k}", _SOFT, 1 / _SOFT)
@@ -184,7 +183,7 @@ def _of_loads(
 def _of_the_device(
     differences: "_FiniteDifferences", time: NDArray
 ) -> Iterator[tuple[str, NDArray]]:
-    """Return the columns of effects of the measuring device: its pose and its drift."""
+    """Return the columns of device effects: its pose and its drift."""
     keys = [*(f"base.{k}" for k in SCREW), "tool.tx", "tool.ty", "tool.tz"]
     frame = [differences.unloaded("registration", key, _STEP) for key in keys]
     yield "registration", _columns(frame)
@@ -196,12 +195,12 @@ def _of_the_device(
 
 
 def _columns(screws: Sequence[NDArray]) -> NDArray:
-    """Return screws as (rows, 6, parameters)."""
+    """Stack screws as columns (rows, 6, parameters)."""
     return np.stack(screws, axis=-1) if screws else np.zeros((0, 6, 0))
 
 
 class _FiniteDifferences:
-    """Readings of the declared machine, and their derivatives by effects."""
+    """Readings of the declared machine and their derivatives by effects."""
 
     def __init__(self, campaign: Synthetic) -> None:
         self._robot, self._point = campaign.robot, campaign.reference_point
@@ -216,19 +215,19 @@ class _FiniteDifferences:
         return simulate_readings(self._robot, self._point, rows, effects, "springs")
 
     def loaded(self, name: str, key: str, value: float, step: float) -> NDArray:
-        """Return (rows, 6) derivative of the readings by a parameter of an effect."""
+        """Return the derivative (rows, 6) of the readings by an effect parameter."""
         readings = self._read(self._rows, [Hidden(name, {key: value})])
         return (readings - self._loaded_readings) / step
 
     def unloaded(self, name: str, key: str, step: float) -> NDArray:
-        """Return the derivative by an effect that does not depend on the load."""
+        """Return the derivative by a parameter of a load-independent effect."""
         readings = self._read(self._unloaded, [Hidden(name, {key: step})])
         return ((readings - self._unloaded_readings) / step)[self._of]
 
 
 def _stiffening(softer: NDArray, offset: NDArray) -> NDArray:
     """Return the columns of a Hertz contact, offset x load^(2/3), of a drive."""
-    # [1/m] Factors that make lengths comparable with angles.
+    # [1/m] Factors that make lengths commensurate with angles.
     scale = np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])
     a, b = softer * scale, offset * scale
     moments = (a * b).sum(axis=1) / (b * b).sum(axis=1)

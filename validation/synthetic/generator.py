@@ -1,12 +1,13 @@
-"""Generate synthetic campaigns: data of a simulated machine with hidden effects.
+"""Generate synthetic campaigns of a simulated machine with hidden effects.
 
 The machine is simulated in Exudyn with finite rotations and geometrically exact beams,
-not by the model that is fitted later.  Each effect has the requested strength: the rms
-of its contribution to the readings is a multiple of the noise.  The strength of weight
-and geometric stiffening is fixed, so for these effects the noise is adjusted instead.
+independently of the model that is fitted later.  Each effect is scaled so that the rms
+of its contribution to the readings is the requested multiple of the noise.  The
+strength of weight and geometric stiffening is fixed, so for these effects the noise is
+adjusted instead.
 
-The folder contains the data that a measurement would provide.  The hidden effects are
-stored separately, in the truth format of the practice campaigns.
+The campaign folder contains only data that a measurement would provide.  Hidden effects
+are stored separately, in the truth format of the practice campaigns.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -60,8 +61,8 @@ class Synthetic:
         effects: hidden effects with their parameters.
         strength: mapping from the name of each effect to the rms of its contribution
             [sigma].
-        outliers: rows with a blunder.
-        hidden_base: (6,) screw of the measuring frame; None if it is known.
+        outliers: rows that contain a blunder.
+        hidden_base: (6,) screw of the measuring frame; None if its pose is known.
     """
 
     robot: Robot
@@ -88,7 +89,7 @@ class Noise:
         rotation: [rad] standard deviation of rotations.
         position: [m] standard deviation of positions.
         outliers: number of rows with a blunder in one reading.
-        missing: fraction of cells without a measurement.
+        missing: fraction of missing cells.
         hidden_frame: [rad, m] size of the unknown pose of the measuring frame; 0 if the
             pose is known.
     """
@@ -126,13 +127,14 @@ def generate_campaign(
     Args:
         robot: the declared robot; its geometric errors are known.
         wanted: pairs of an effect and its requested strength, as a multiple of the
-            noise.  The parameters of an effect that is given only by its name are drawn
-            at random.
+            noise. If only the name of an effect is given, its parameters are drawn at
+            random.
         design: design of the campaign.
         noise: errors of the readings.
-        seed: seed of all random draws.
+        seed: random seed.
         program: ``"multibody"`` or, much faster, ``"springs"``.
-        update: function called with a stage, the finished rows and their total.
+        update: function called with the stage, the number of finished rows and the
+            total number.
 
     Returns:
         The campaign.
@@ -140,8 +142,8 @@ def generate_campaign(
     Raises:
         BadInput: an effect is unknown, there are more blunders than rows, or the robot
             cannot execute the design.
-        NotApplicable: an effect cannot act at any place of the robot, or it is hardly
-            visible in every draw.
+        NotApplicable: an effect cannot act anywhere on the robot, or is hardly visible
+            in every draw.
         SimulationFailed: no equilibrium was found for a row.
     """
     design, noise = design or CampaignDesign(), noise or Noise()
@@ -186,7 +188,7 @@ def generate_campaign(
 
 @dataclass(frozen=True, eq=False)
 class _Shown:
-    """Hidden effects, scaled so that they are visible in the readings.
+    """Hidden effects after scaling, with the readings that they cause.
 
     Attributes:
         effects: effects with their parameters.
@@ -206,7 +208,7 @@ class _Shown:
 
 @dataclass(eq=False)
 class _SimulatedMachine:
-    """A robot and the rows of a design that are simulated."""
+    """A robot and the rows of a design in which it is simulated."""
 
     robot: Robot
     point: NDArray
@@ -215,7 +217,7 @@ class _SimulatedMachine:
     update: Progress | None
 
     def read(self, effects: Sequence[Hidden], stage: str) -> NDArray:
-        """Return the readings of all rows without noise."""
+        """Return the noise-free readings of all rows."""
         update = self.update
         progress = None if update is None else (lambda d, n: update(stage, d, n))
         return simulate_readings(
@@ -227,9 +229,8 @@ def _shown_effects(
     machine: _SimulatedMachine, wanted: Sequence[tuple[Hidden, float]], sigma: NDArray,
     redraw: Draw | None,
 ) -> _Shown:  # fmt: skip
-    """Return all effects; each is scaled to its requested multiple of the noise."""
-    # Effects of fixed strength determine the noise, so they are processed before other
-    # effects are scaled.
+    """Scale each effect to its requested multiple of the noise."""
+    # Effects of fixed strength determine the noise, so they are processed first.
     wanted = sorted(wanted, key=lambda pair: pair[0].name not in _GIVEN_STRENGTH)
     declared = machine.read((), "declared")
     if any(effect.name == "geometric_stiffening" for effect, _ in wanted):
@@ -251,9 +252,9 @@ def _shown_effect(
     machine: _SimulatedMachine, effect: Hidden, multiple: float, sigma: NDArray,
     declared: NDArray, redraw: Draw | None,
 ) -> tuple[Hidden, NDArray, NDArray]:  # fmt: skip
-    """Return the scaled effect; parameters are drawn again if it is hardly visible."""
+    """Scale an effect, redrawing its parameters if it is hardly visible."""
     # An effect may be invisible in one draw.  For example, a force whose line
-    # intersects the axis of a drive does not load the spring of this drive.
+    # intersects the axis of a drive does not load its spring.
     for _ in range(_DRAWS - 1):
         try:
             return _scaled_effect(machine, effect, multiple, sigma, declared)
@@ -279,8 +280,8 @@ def _scaled_effect(
         reached = _rms((exact - declared) / sigma)
         if reached == 0.0:
             raise NotApplicable(
-                f"{effect.name}: found no influence on any reading; choose "
-                "another effect"
+                f"{effect.name}: found no influence on any reading; choose a different "
+                "effect"
             )
         if effect.name in _GIVEN_STRENGTH:
             return tried, exact, sigma * (reached / multiple)
@@ -291,14 +292,14 @@ def _scaled_effect(
             raise NotApplicable(
                 f"{effect.name}: a contribution of {multiple:g} times the noise "
                 f"requires more than {_MOST:g} times the plausible size of the "
-                "effect, because the effect hardly changes the readings of this "
-                "robot under these loads; choose another effect"
+                "effect, because the effect hardly changes the readings of this robot "
+                "under these loads; choose a different effect"
             )
     return tried, exact, sigma
 
 
 def _linear(machine: _SimulatedMachine) -> NDArray:
-    """Return (rows, 6) readings of the machine that are linear in errors and load."""
+    """Return the readings (rows, 6) of the machine, linearised in errors and load."""
     ends = []
     for scale in (_SMALL, -_SMALL):
         small = machine.robot.with_errors(scale * machine.robot.errors)
@@ -310,7 +311,7 @@ def _linear(machine: _SimulatedMachine) -> NDArray:
 def _measured(
     exact: NDArray, sigma: NDArray, noise: Noise, rng: np.random.Generator
 ) -> tuple[NDArray, tuple[int, ...]]:
-    """Return the readings with noise, blunders and gaps, and the rows with blunders."""
+    """Add noise, blunders and gaps; return the readings and the rows with blunders."""
     readings = exact + sigma * rng.normal(size=exact.shape)
     blunders = rng.choice(len(exact), noise.outliers, replace=False)
     columns = rng.integers(6, size=noise.outliers)
@@ -327,10 +328,10 @@ def _rms(values: NDArray) -> float:
 
 
 def write_campaign(campaign: Synthetic, folder: Path | str) -> None:
-    """Write campaign.toml, measurements.csv and robot.toml, either all or none.
+    """Write campaign.toml, measurements.csv and robot.toml; on failure, write no file.
 
     Args:
-        campaign: campaign to be written; its hidden effects are not written.
+        campaign: campaign to write, without its hidden effects.
         folder: new or empty folder.
 
     Raises:

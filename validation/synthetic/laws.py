@@ -1,4 +1,4 @@
-"""Define nonlinear springs of the joints of a simulated machine."""
+"""Define nonlinear joint springs of a simulated machine."""
 
 from dataclasses import dataclass
 
@@ -16,12 +16,12 @@ class PowerLawSpring:
     exponent: float
 
     def secant(self, deflection: float) -> float:
-        """Return the spring's secant stiffness [N m/rad or N/m] at a deflection."""
+        """Return the secant stiffness [N m/rad or N/m] at a deflection."""
         bent = max(abs(deflection), 1e-9)
         return float(self.coefficient * bent ** (self.exponent - 1.0))
 
     def under(self, load: float) -> tuple[float, float]:
-        """Return the deflection [rad or m] and the secant stiffness under a load."""
+        """Return the deflection [rad or m] and secant stiffness under a load."""
         deflection = (abs(load) / self.coefficient) ** (1.0 / self.exponent)
         return deflection, self.secant(deflection)
 
@@ -31,8 +31,8 @@ class TwoStepSpring:
     """A joint spring whose compliance changes above a load.
 
     Attributes:
-        below: [rad/(N m) or m/N] compliance below the knee.
-        above: [rad/(N m) or m/N] compliance for the part of the load above the knee.
+        below: [rad/(N m) or m/N] compliance up to the knee.
+        above: [rad/(N m) or m/N] compliance above the knee.
         knee: [N m or N] load at which the compliance changes, positive.
     """
 
@@ -41,12 +41,12 @@ class TwoStepSpring:
     knee: float
 
     def secant(self, load: float) -> float:
-        """Return the secant stiffness [N m/rad or N/m] of the spring under a load."""
+        """Return the secant stiffness [N m/rad or N/m] under a load."""
         size = max(abs(load), 1e-6 * self.knee)
         more = max(size - self.knee, 0.0)
         return size / (self.below * (size - more) + self.above * more)
 
     def under(self, load: float) -> tuple[float, float]:
-        """Return the deflection [rad or m] and the secant stiffness under a load."""
+        """Return the deflection [rad or m] and secant stiffness under a load."""
         stiffness = self.secant(load)
         return abs(load) / stiffness, stiffness

@@ -1,4 +1,4 @@
-"""Compute readings of a simulated machine with hidden effects in rows of a design."""
+"""Compute the readings of a simulated machine with hidden effects."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -33,7 +33,7 @@ _ALL_COVARIATES = COVARIATES | OUTSIDE_COVARIATES
 
 @dataclass(frozen=True, eq=False)
 class Hidden:
-    """An effect of the machine that the declared model does not contain.
+    """An effect that the declared model of the machine does not contain.
 
     Attributes:
         name: public name of the effect; a leading underscore marks effects outside the
@@ -53,16 +53,16 @@ def simulate_readings(
     program: str = "multibody",
     update: Progress | None = None,
 ) -> NDArray:
-    """Return the deviations of a simulated machine in the rows of a design.
+    """Return the pose deviations of a simulated machine in the rows of a design.
 
-    The deviations do not contain noise.  Rows with equal machines are simulated once.
+    The deviations are free of noise.  Rows with identical machines are simulated once.
 
     Args:
         robot: the declared robot; a joint without declared clearance has no clearance.
         reference_point: (3,) [m] point at which the load acts and the pose is measured,
             platform axes.
         rows: commanded configurations, loads and covariates.
-        effects: effects of the machine that the declared model does not contain.
+        effects: hidden effects of the machine.
         program: ``"multibody"`` for Exudyn, or ``"springs"``, which is much faster.
         update: function called with the number of finished machines and the total
             number.
@@ -104,18 +104,18 @@ def simulate_readings(
 
 
 def acts_on_machine(name: str) -> bool:
-    """Return whether an effect changes the machine and not only the reading."""
+    """Return whether an effect changes the machine rather than only the reading."""
     return name in _ALL_CHANGES
 
 
 def with_point(robot: Robot, reference_point: NDArray) -> Robot:
-    """Return the robot whose platform frame is at the reference point."""
+    """Move the platform frame of a robot to the reference point."""
     point = Frame("platform~point", robot.platform, translation=reference_point)
     return replace(robot, platform=point.name, frames=(*robot.frames, point))
 
 
 def nominal_pose(robot: Robot, row: Row) -> NDArray:
-    """Return the (4, 4) nominal platform pose, computed along the chain of frames."""
+    """Return the nominal platform pose (4, 4), computed along the chain of frames."""
     T, frame = np.eye(4), robot.frame(robot.platform)
     while True:
         own = np.array([0.0, 0.0, row.coordinates.get(frame.name, 0.0)])
@@ -130,7 +130,7 @@ def nominal_pose(robot: Robot, row: Row) -> NDArray:
 
 
 def _machine(robot: Robot, row: Row, changing: Sequence[Hidden]) -> Machine:
-    """Return the machine of a row after applying the effects that change it."""
+    """Apply the effects that change the machine in a row."""
     gravity = np.array([row.covariates.get(f"gravity.{k}", 0.0) for k in "xyz"])
     machine = Machine(robot, row.coordinates, row.load, gravity)
     for effect in changing:
@@ -142,7 +142,7 @@ def _machine(robot: Robot, row: Row, changing: Sequence[Hidden]) -> Machine:
 def _read(
     pose: NDArray, nominal: NDArray, row: Row, effects: Sequence[Hidden]
 ) -> NDArray:
-    """Return the (6,) [rad, m] reading of the measuring device for a true pose."""
+    """Return the reading (6,) [rad, m] of the measuring device for a true pose."""
     for effect in effects:
         if effect.name in POSES:
             pose = POSES[effect.name](pose, row, effect.parameters)

@@ -1,7 +1,7 @@
-"""Model effects outside the library, which test whether a diagnosis reports them.
+"""Model effects outside the library, which a diagnosis should report as such.
 
-Each effect occurs in real machines but is not described by any public effect.  The
-names of these effects begin with an underscore.
+Each of these effects occurs in real machines, but no public effect describes it.  Their
+names begin with an underscore.
 """
 
 import math
@@ -75,7 +75,7 @@ def _thread(row: Row, given: Parameters, name: str) -> float:
 
 
 def _friction(row: Row, given: Parameters, name: str) -> float:
-    """Return the displacement by friction in proportion to the load: c f/100 N."""
+    """Return the displacement caused by load-proportional friction, c f/100 N."""
     pressed = float(np.linalg.norm(row.load[3:])) / 100 * row.covariates["approach"]
     return -given[name] * pressed
 

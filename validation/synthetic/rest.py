@@ -1,16 +1,17 @@
-"""Compute equilibria of a simulated machine with nonlinear laws of its joints.
+"""Compute equilibria of a simulated machine with nonlinear joints.
 
-The laws are solved by fixed-point iteration.  The machine is simulated with a linear
-spring or an offset in the joint.  The resulting load on the joint determines the next
-spring or offset.  The iteration ends when the change is below a tolerance.
+The nonlinear laws are solved by fixed-point iteration.  In each step, the machine is
+simulated with a linear spring or an offset in the joint, and the resulting load on the
+joint determines the next spring or offset.  The iteration ends when the change falls
+below a tolerance.
 
 - A stiffening contact is replaced by a spring of its secant stiffness.  The deflection
   is smaller than the last stiffness predicts.  Each step therefore multiplies the error
   by at most 1 - 1/n, where n is the exponent of the contact law.
 - The load displaces a joint with clearance up to the bounds of the clearance.  On an
   open chain, the load does not depend on the clearance.  A weak spring (grease, seals)
-  centres the joint under small loads.  Without the spring, rounding errors would
-  determine the position of the joint.
+  centres the joint under small loads.  Without it, round-off would determine the
+  position of the joint.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -33,8 +34,8 @@ from forcefit.validation.synthetic.springs import rest_on_springs
 _ELEMENTS = 2
 _STEPS = 60
 _SETTLED = 1e-11  # [rad, m] change of power-law springs at convergence
-# [rad, m] Change of a joint's position in its clearance at convergence.  At small
-# loads, rounding in the force sensor prevents a smaller value.
+# [rad, m] Change of a joint's position within its clearance at convergence.  At small
+# loads, round-off in the force sensor prevents a smaller value.
 _SETTLED_CLEARANCE = 5e-9
 # [N/m, N m/rad] Springs that centre joints in their clearances.
 _CENTRING = {"radial": 3e3, "axial": 3e3, "tilt": 3e2, "spin": 3e2}
@@ -45,10 +46,10 @@ _ROWS = {"tilt": [0, 1], "spin": [2], "radial": [3, 4], "axial": [5]}
 def rest_poses(
     machines: Sequence[Machine], program: str, update: Progress | None = None
 ) -> NDArray:
-    """Return the equilibria of machines with equal structure under their loads.
+    """Return the equilibria of machines of equal structure under their loads.
 
     Args:
-        machines: machines with all their effects.
+        machines: machines including all their effects.
         program: one of :data:`PROGRAMS`.
         update: function called with the number of finished machines and the total
             number.
@@ -79,7 +80,7 @@ def rest_poses(
 
 
 def _updated(machine: Machine, equilibrium: Rest) -> tuple[Machine, float]:
-    """Return a machine with laws evaluated at its loads, and the change / tolerance."""
+    """Evaluate the joint laws at the computed loads; also return change / tolerance."""
     largest, robot = 0.0, machine.robot
     for name, law in machine.laws.items():
         i, frame = robot.index(name), robot.frame(name)
@@ -100,7 +101,7 @@ def _updated(machine: Machine, equilibrium: Rest) -> tuple[Machine, float]:
 
 
 def _clearance_position(clearance: Clearance, wrench: NDArray) -> NDArray:
-    """Return the (6,) [rad, m] position of a joint in its clearance under a load."""
+    """Return the position (6,) [rad, m] of a loaded joint within its clearance."""
     position = np.zeros(6)
     for name, rows in _ROWS.items():
         bound = getattr(clearance, name) or 0.0
@@ -112,7 +113,7 @@ def _clearance_position(clearance: Clearance, wrench: NDArray) -> NDArray:
 
 @dataclass(frozen=True, eq=False)
 class _Placed:
-    """Robot and joint coordinates in the form that the simulation requires."""
+    """Robot and joint coordinates, as the simulation requires them."""
 
     robot: Robot
     coordinates: NDArray

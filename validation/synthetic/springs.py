@@ -1,20 +1,20 @@
-"""Compute equilibria of machines whose links are springs, for all rows together.
+"""Compute equilibria of machines whose links are springs.
 
-This program is faster than the multibody simulation.  Motions are finite, and the
-equilibrium is that of the deformed machine, as in the multibody simulation.  A beam is
-represented by its compliance at the tip instead of finite elements.  Both
-representations differ under large deflections.  Clearances in closed loops require the
-multibody simulation.
+All rows are solved together, which is faster than the multibody simulation.  As there,
+motions are finite and equilibrium is imposed on the deformed machine.  A beam is
+represented by its tip compliance instead of finite elements, which makes a difference
+only for large deflections.  Clearances in closed loops require the multibody
+simulation.
 
 The unknowns are the motions q of the passive joints and the wrench l of each closure.
-They determine the deformation of the springs and the poses of the frames.  The
+They determine the deformations of the springs and the poses of the frames.  The
 residuals are
 
     r = errors of the closures,        t = moments about passive joints' axes.
 
-Newton's method uses the Jacobian of the nominal posture, because springs deform little.
-a_j is the axis of joint j. s_kj is +1 or -1 if joint j is on the first or second chain
-of closure k:
+Newton's method uses the Jacobian of the nominal posture, because deformations are
+small. a_j is the axis of joint j. s_kj is +1 or -1 if joint j is on the first or second
+chain of closure k:
 
     [ -S       -(s a) ] [ dl ]     [ r ]
     [ (s a)^T    0    ] [ dq ] = - [ t ]
@@ -73,7 +73,7 @@ class _SpringModel:
 
 
 def rest_on_springs(machines: Sequence[Machine]) -> list[Rest]:
-    """Return the equilibria of machines whose links are springs.
+    """Return the equilibria of machines whose links are modelled as springs.
 
     Args:
         machines: machines of equal structure, without clearances.
@@ -97,8 +97,8 @@ def rest_on_springs(machines: Sequence[Machine]) -> list[Rest]:
     ends = _forward(parts, q, screws)
     for _ in range(_STEPS):
         carried = _carried(machines, parts, ends, wrenches)
-        # Wrenches are evaluated half-way along the deformation.  Wrenches at an end
-        # would not be the gradient of an energy.
+        # Wrenches are evaluated half-way along the deformation, because wrenches at
+        # either end are not the gradient of an energy.
         halfway = ends @ np.linalg.inv(_deflections(screws / 2))
         read = _at_frames(halfway, carried)
         new = np.einsum("skaij,skaj->skai", parts.compliances, read)
@@ -137,7 +137,7 @@ def _spring_model(machines: Sequence[Machine], q: NDArray) -> _SpringModel:
     first, second = np.array(pairs, dtype=int).reshape(-1, 2).T
     closed = np.linalg.inv(nominal[:, first]) @ nominal[:, second]
     passive = [i for i, f in enumerate(robot.frames) if f.passive and not f.compliant]
-    # machines share frames, which are computed once
+    # Frames shared by several machines are computed once.
     known: dict[int, tuple[NDArray, NDArray]] = {}
     for frame in (f for m in machines for f in m.robot.frames):
         if id(frame) not in known:
@@ -156,7 +156,7 @@ def _spring_model(machines: Sequence[Machine], q: NDArray) -> _SpringModel:
 
 
 def _compliances(frame: Frame) -> tuple[NDArray, NDArray]:
-    """Return the (6, 6) compliances of a frame's link and of its joint."""
+    """Return the compliances (6, 6) of a frame's link and joint."""
     joint = np.zeros((6, 6))
     K = frame.springs
     if K is not None:
@@ -187,7 +187,7 @@ def _deflections(screws: NDArray) -> NDArray:
 
 
 def _chain(robot: Robot, steps: NDArray, ends: NDArray, q: NDArray) -> NDArray:
-    """Return the (k, n, 4, 4) frames as products along the chains.
+    """Return the frames (k, n, 4, 4) as products along the chains.
 
     Args:
         robot: robot with the tree of frames.
@@ -237,7 +237,7 @@ def _axes(parts: _SpringModel, T: NDArray) -> NDArray:
 
 
 def _newton(parts: _SpringModel, q: NDArray) -> tuple[NDArray, float]:
-    """Return the inverse Newton matrices, and the compliance that scales wrenches."""
+    """Return the inverse Newton matrices and the compliance that scales wrenches."""
     # Rows of one configuration with equal springs have equal matrices.
     distinct = np.hstack([
         q,
@@ -254,7 +254,7 @@ def _newton(parts: _SpringModel, q: NDArray) -> tuple[NDArray, float]:
     S = np.einsum("an,bn,knij->kaibj", s, s, at_base, optimize=True)
     S = S.reshape(machines, size, size)
     axes = _axes(parts, nominal)
-    # The wrench of a closure acts only on joints that are on one of its two chains.
+    # A closure wrench acts only on joints that belong to one of its two chains.
     A = np.einsum("an,kni->kain", s[:, parts.passive], axes)
     A = A.reshape(machines, size, passive)
     diagonal = np.diagonal(S, axis1=1, axis2=2)
@@ -291,7 +291,7 @@ def _carried(
 def _add_weights(
     machines: Sequence[Machine], gravity: NDArray, bodies: NDArray, carried: NDArray
 ) -> None:
-    """Add the weights of bodies; a beam's weight acts at its ends, with moments."""
+    """Add the weights of bodies; a beam's weight acts at its ends, with end moments."""
     parents = machines[0].robot.parents
     for i, frame in enumerate(machines[0].robot.frames):
         R, tip = bodies[:, i, :3, :3], bodies[:, i, :3, 3]

@@ -1,4 +1,4 @@
-"""Convert the hidden effects of a campaign to the practice campaigns' format."""
+"""Convert hidden effects to the truth format of the practice campaigns."""
 
 from typing import Any
 
@@ -46,16 +46,16 @@ def truth_of(
     verdict: str | None = None,
     accept: list[list[str]] | None = None,
 ) -> dict[str, Any]:
-    """Return the hidden effects of a campaign and the correct verdict (the truth).
+    """Return the truth of a campaign: its hidden effects and the correct verdict.
 
     Args:
         campaign: campaign with its hidden effects.
-        verdict: verdict of a correct diagnosis.  The default applies to a design that
-            distinguishes the effects.
-        accept: other sets of effects that explain the data equally well.
+        verdict: verdict that a correct diagnosis reaches.  The default applies to a
+            design that distinguishes the effects.
+        accept: alternative sets of effects that explain the data equally well.
 
     Returns:
-        Plain values with the keys of the practice campaigns' truth.
+        Plain values with the keys of the truth format.
     """
     names = [effect.name for effect in campaign.effects]
     outside = [OUTSIDE[name] for name in names if name in OUTSIDE]
@@ -122,6 +122,6 @@ def _unit(campaign: Synthetic, effect: str, key: str, frame: str) -> str:
 
 
 def _rms(values: np.ndarray) -> float:
-    """Return the root mean square of the measured values; 1 if there are none."""
+    """Return the root mean square of the measured values, or 1 if there are none."""
     known = values[np.isfinite(values)]
     return float(np.sqrt(np.mean(known**2))) if known.size else 1.0

@@ -1,4 +1,4 @@
-"""Coarse meshes of links' solids, for quick tests."""
+"""Use coarse meshes of solid links, for quick tests."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Page of the errors due to the model's assumptions."""
+"""Report page of the errors caused by modelling assumptions."""
 
 import pytest
 
@@ -13,7 +13,7 @@ POSES = ({"tx": 0.0}, {"tx": 0.1})
 
 
 def shown(*errors):
-    """Page of two poses with an error of one assumption each, the other unknown."""
+    """Return the page of two poses, each with one known and one unknown error."""
     costs = tuple(
         {"linear closures": e, "one spring a beam": "no beam"} for e in errors
     )
@@ -28,10 +28,10 @@ def shown(*errors):
     (Cost(1e-3, 21e-6, 0.0), "mixed"),
     (Cost(1e-3, 1e-6, 0.011), "mixed"),
 ])  # fmt: skip
-def test_error_above_20_um_or_1_per_cent_makes_the_verdict_amber(second, kind):
+def test_error_above_20_um_or_1_per_cent_turns_the_verdict_amber(second, kind):
     text = shown(Cost(2e-3, 1e-6, 0.0), second)
     assert f"<p class='verdict {kind}'>" in text
-    assert "(1 further errors are not known)" in text
+    assert "(1 more errors are unknown)" in text
 
 
 def test_report_page_shows_the_largest_error_over_the_poses():

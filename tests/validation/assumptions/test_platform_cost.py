@@ -1,4 +1,4 @@
-"""Platform compliance by virtual joints against the finite elements of the links."""
+"""Platform compliance by virtual joints compared with finite-element links."""
 
 import json
 
@@ -25,7 +25,8 @@ SPRINGS = np.diag([3e5, 2e5, 1e5, 1e8, 2e8, 3e8])
 
 
 def triangle():
-    """Two short round bars from a wall to one platform, on springs, one thicker."""
+    """Two short round bars of different thickness between a wall and a sprung
+    platform."""
     short = BeamLink({"radius": 0.08}, 70e9, 0.3)
     frames = (
         Frame("slim", translation=[0.3, 0.1, 0.0], link=ROUND),
@@ -48,8 +49,8 @@ def posture():
     return posture
 
 
-def test_solid_link_has_nearly_the_stiffness_of_a_beam_and_is_free_in_rigid_motions():
-    """Square section 1 x 2, length 6: held ends add a few per cent to K_E."""
+def test_solid_link_has_nearly_beam_stiffness_and_resists_no_rigid_motion():
+    """For a 1 x 2 section and length 6, clamped ends add a few per cent to K_E."""
     link = BeamLink({"width": 0.05, "height": 0.1}, 70e9, 0.3, up=(0, 1, 1))
     frame = Frame("tip", translation=[0.1, 0.2, -0.2], link=link)
     solid = solid_link(frame)
@@ -63,8 +64,8 @@ def test_solid_link_has_nearly_the_stiffness_of_a_beam_and_is_free_in_rigid_moti
 
 
 @pytest.mark.slow
-def test_virtual_joints_reproduce_solids_loaded_at_their_ends(posture):
-    """Condensed K_E agrees with the displacement method over all bodies to rounding."""
+def test_virtual_joints_reproduce_solids_that_are_loaded_at_their_ends(posture):
+    """Condensed K_E matches the displacement method over all bodies to round-off."""
     costs = platform_costs([posture])
     assert costs.meshed[0] < 1e-9
     assert 1e-3 < costs.beams[0] < 0.1
@@ -87,7 +88,7 @@ def test_error_from_a_single_link_model_equals_the_error_of_the_platform():
     assert costs.by_link == {"tip": pytest.approx(costs.beams)}
 
 
-def test_robots_without_solids_or_stiffness_are_refused():
+def test_robots_without_solids_or_stiffness_are_rejected():
     rigid = Robot("rigid", "tip", (Frame("tip", translation=[0.3, 0, 0]),))
     with pytest.raises(NoSolids, match="no link has a shape"):
         platform_costs([home_posture(rigid)])
@@ -113,8 +114,8 @@ def test_validity_command_names_the_link_with_the_largest_error(run, tmp_path):
 
 
 def test_validity_over_poses_reports_the_median_and_the_largest_error(run, tmp_path):
-    """One of three poses is out of reach;
-    a list of the same poses has the same result."""
+    """One of three poses is unreachable; a list of the same poses gives the same
+    result."""
     listed = tmp_path / "poses.csv"
     listed.write_text("id,pose.tx,pose.tz\na,0,-0.5\nb,0.2,-0.5\nc,3,-0.5\n")
     words = ["validation", "validity", "irsbot2", "--solids", "--json", "-"]
@@ -142,7 +143,7 @@ def test_validity_over_poses_reports_the_median_and_the_largest_error(run, tmp_p
     (["--figure", "a.png"], "--figure: found without --solids"),
     (["--grid", "qx=0"], "unknown pose component"),
 ])  # fmt: skip
-def test_options_that_exclude_each_other_are_refused(run, words, message):
+def test_mutually_exclusive_options_are_rejected(run, words, message):
     status, _, err = run("validation", "validity", "irsbot2", *words)
     assert status == 2
     assert message in err

@@ -1,4 +1,4 @@
-"""Cost of the model's assumptions, against closed forms and the simulation."""
+"""Errors caused by modelling assumptions, compared with closed forms and simulation."""
 
 import json
 from dataclasses import replace
@@ -40,7 +40,7 @@ def cantilever(link=FLAT, length=0.5):
 
 
 def pin(error):
-    """A pin with clearance between two rigid parts that miss each other by an error."""
+    """A pin with clearance between two rigid parts that are misaligned by an error."""
     frames = (
         Frame("pin", clearance=LOOSE, geometric_error=error),
         Frame("end", "pin"),
@@ -51,24 +51,24 @@ def pin(error):
 
 @pytest.fixture(scope="module")
 def posture():
-    """The paper's robot with errors of the paper's size."""
+    """The robot of the paper with errors of the size stated there."""
     return place_robot(irsbot2_with(NUMBERS["cases"][0]), {"tx": 0.1, "tz": -0.45})
 
 
 @pytest.mark.parametrize(
     ("shift", "tilt"), [((2e-5, 0), (0, 3e-4)), ((0, 1e-5), (-6e-4, 0))]
 )
-def test_margin_of_two_bushes_is_the_sum_of_the_shares_of_disc_and_cone(shift, tilt):
-    """Margins by hand: disc and cone max(r / c, theta / t), bushes r / c + theta / t.
-    Whether shift and tilt lie in one plane or not: the worse bush has the sum."""
+def test_margin_of_two_bushes_is_the_sum_of_the_disc_and_cone_ratios(shift, tilt):
+    """By hand, the margin is max(r / c, theta / t) for disc and cone, and r / c + theta
+    / t for bushes, whether or not shift and tilt are coplanar."""
     at = pin([*tilt, 0, *shift, 0])
     r, theta = np.hypot(*shift) / 3e-5, np.hypot(*tilt) / 7.5e-4
     assert zone_margin(at).margin == pytest.approx(max(r, theta), rel=1e-9)
     assert bush_margin(at) == pytest.approx(r + theta, rel=1e-9)
 
 
-def test_margin_of_two_bushes_is_between_those_of_full_and_half_disc_and_cone(posture):
-    """Both in energy and in margin."""
+def test_two_bushes_lie_between_disc_and_cone_of_full_and_half_size(posture):
+    """This holds for both energy and margin."""
     frames = tuple(
         replace(f, clearance=replace(
             f.clearance, radial=f.clearance.radial / 2, tilt=f.clearance.tilt / 2
@@ -93,9 +93,9 @@ def test_bushes_do_not_change_joints_without_tilt_clearance():
 @pytest.mark.exudyn
 @pytest.mark.slow
 def test_simulation_with_two_bushes_has_the_same_energy_ratio(posture):
-    """Energy of bushes over that of disc and cone, in the limit of small errors. At a
-    sixteenth both models of contact differ from finite rotations by 0.2 per cent, their
-    ratio by what separates linear from finite, some 1e-4."""
+    """Compare the energy ratio of bushes to disc and cone in the limit of small errors.
+    At a sixteenth of the errors, both contact models differ from finite rotations by
+    0.2 per cent, but their ratio only by about 1e-4."""
     expected = solve_bushes(posture).energy / solve_assembly(posture).energy
     scale = 1 / 16
     disc, bushes = (
@@ -109,8 +109,8 @@ def test_simulation_with_two_bushes_has_the_same_energy_ratio(posture):
 
 
 def test_half_weights_overestimate_the_sag_of_a_cantilever_by_a_third():
-    """q L^4 / 6 EI instead of q L^4 / 8 EI, with equal shear;
-    slopes q L^3 / 4 EI instead of q L^3 / 6 EI."""
+    """The deflection is q L^4 / 6 EI instead of q L^4 / 8 EI, with equal shear, and the
+    slope q L^3 / 4 EI instead of q L^3 / 6 EI."""
     L, g = 0.5, 9.81
     link = replace(FLAT, theory="euler")
     cost = halves_cost(cantilever(link), [0, 0, -g])
@@ -124,8 +124,8 @@ def test_half_weights_overestimate_the_sag_of_a_cantilever_by_a_third():
 
 
 def test_energy_of_a_heavy_cantilever_is_that_of_end_loads_plus_the_inner_load():
-    """The sum is q^2 L^5 / 40 EI,
-    of which q^2 L^5 / 1440 EI is stored between the ends."""
+    """The total is q^2 L^5 / 40 EI, of which q^2 L^5 / 1440 EI is stored between the
+    ends."""
     L, g = 0.5, 9.81
     at = cantilever(replace(FLAT, theory="euler"))
     second, q = 0.02**3 * 0.05 / 12, RHO * 1e-3 * g
@@ -141,8 +141,8 @@ def test_energy_of_a_heavy_cantilever_is_that_of_end_loads_plus_the_inner_load()
 def test_energy_of_simulated_elements_is_that_of_end_loads_plus_the_inner_load(
     elements,
 ):
-    """In all directions, with shear. Exudyn has no energy within an element. The weight
-    is scaled down to 1e-3 m/s^2, where bending is linear to 1e-8."""
+    """This holds in all directions, with shear.  Exudyn neglects the energy within an
+    element. Gravity is scaled down to 1e-3 m/s^2, where bending is linear to 1e-8."""
     at, g = cantilever(), 1e-3 * np.array([3.0, -5.0, 8.0])
     model = SimulationModel(elements=elements)
     energy = simulate_assembly(at, model=model, gravity=g).energy
@@ -153,8 +153,7 @@ def test_energy_of_simulated_elements_is_that_of_end_loads_plus_the_inner_load(
 
 
 def test_error_of_a_link_model_is_zero_for_equal_stiffness(posture):
-    """The beam's K_E given as a matrix costs nothing;
-    half of that stiffness costs much."""
+    """Giving the beam's K_E as a matrix causes no error, halving it a large one."""
     beams = {
         f.name: np.linalg.inv(link_compliance(f))
         for f in posture.robot.frames
@@ -170,7 +169,7 @@ def test_error_of_a_link_model_is_zero_for_equal_stiffness(posture):
 def test_error_from_linear_closures_grows_with_the_square_of_the_geometric_errors(
     posture,
 ):
-    """The position error falls to a quarter as errors and clearances are halved."""
+    """Halving errors and clearances reduces the position error to a quarter."""
     full, half = closure_cost(posture), closure_cost(scaled(posture, 0.5))
     assert full.position / half.position == pytest.approx(4, rel=0.1)
     assert full.matters
@@ -178,8 +177,9 @@ def test_error_from_linear_closures_grows_with_the_square_of_the_geometric_error
 
 @pytest.mark.usefixtures("coarse_solids")
 def test_thick_bar_with_held_ends_is_stiffer_than_its_beam_in_bending_only(posture):
-    """Bending by 1 + c r / L, c about 0.2 (an end held flat cannot warp); torsion not.
-    At L / r = 5 that is 4 per cent; a mesh good to 1 per cent lets it be seen."""
+    """Bending stiffness grows by 1 + c r / L with c about 0.2, because a clamped end
+    cannot warp; torsional stiffness does not.  At L / r = 5 this is 4 per cent, which a
+    mesh accurate to 1 per cent resolves."""
     thick = with_bars(posture.robot, 5.0).frame("leg1.link_a")
     assert isinstance(thick.link, BeamLink)
     thick = replace(thick, link=replace(thick.link, theory="timoshenko"))
@@ -197,7 +197,7 @@ def test_thick_bar_with_held_ends_is_stiffer_than_its_beam_in_bending_only(postu
 
 
 def test_errors_of_assumptions_are_unknown_without_errors_and_load(run, tmp_path):
-    """Both models then store energies of rounding, whose ratio is not a cost."""
+    """Both models then store only round-off, whose ratio is meaningless."""
     target = tmp_path / "costs.json"
     words = ["validity", "irsbot2", "--pose", "tx=0,tz=-0.5", "--json", target]
     status, out, _ = run("validation", *words)
@@ -210,8 +210,8 @@ def test_errors_of_assumptions_are_unknown_without_errors_and_load(run, tmp_path
 
 
 def test_position_error_of_an_assumption_is_known_without_stored_energy():
-    """A serial bar turned by t at its base:
-    the tip's position has an error of l t^2 / 2."""
+    """If a serial bar is rotated by t at its base, the tip position is off by l t^2 /
+    2."""
     frames = (
         Frame("a", geometric_error=[0, 0, 0.01, 0, 0, 0]),
         Frame("b", "a", translation=[0.5, 0, 0]),
@@ -224,8 +224,7 @@ def test_position_error_of_an_assumption_is_known_without_stored_energy():
 
 
 def test_validity_command_marks_assumptions_with_errors_above_the_limits(run, tmp_path):
-    """Disc and cone matter for the paper's robot;
-    costs that are unknown have a reason."""
+    """Disc and cone matter for the robot of the paper; unknown errors have a reason."""
     target, file = tmp_path / "costs.json", tmp_path / "robot.toml"
     write_robot(irsbot2_with(NUMBERS["cases"][0]), file)
     words = ["validity", file, "--pose", "tx=0.1,tz=-0.45", "--load", "fz=-100"]
@@ -239,9 +238,9 @@ def test_validity_command_marks_assumptions_with_errors_above_the_limits(run, tm
 
 
 def test_suggested_pieces_of_a_beam_leave_an_error_below_20_um():
-    """A moment M rolls a beam up to a circle: what one spring is off is known. Its tip
-    at L (sin a / a - 1, (1 - cos a) / a), a = M L / EI; one spring turns by a too, but
-    lies on its chord. Pieces asked for leave less, half of them more."""
+    """A moment M bends a beam to an arc with its tip at L (sin a / a - 1, (1 - cos a) /
+    a), a = M L / EI, so the error of a single spring is known.  The suggested number of
+    pieces leaves a smaller error than the limit, and half as many a larger one."""
     length, stiffness, angle = 1.0, 1e3, 0.2
     link = BeamLink({"width": 0.1, "height": 0.1}, 1.2e5 * stiffness, 0.0,
                     theory="euler")  # fmt: skip

@@ -1,4 +1,4 @@
-"""Campaign folders: correct ones are read, wrong ones are refused in one line."""
+"""Reading of valid campaign folders and one-line errors for invalid ones."""
 
 import math
 import re
@@ -14,7 +14,7 @@ from tests.campaigns_for_tests import ARM, HEAD, NOISE, ROWS, write_campaign
 
 
 def test_campaign_has_the_values_of_its_files(tmp_path):
-    """Two arms by hand: x = cos q1 + 0.8 cos(q1 + q2), y likewise."""
+    """For two arms, x = cos q1 + 0.8 cos(q1 + q2), and y likewise."""
     campaign = read_campaign(write_campaign(tmp_path / "first"))
     assert campaign.name == "first"
     assert campaign.ids == ("m1", "m2", "m3", "m4")
@@ -65,7 +65,7 @@ def test_selected_rows_keep_the_requested_order_and_their_configuration_numbers(
 
 
 def test_commanded_poses_are_converted_to_the_commanded_joint_coordinates(tmp_path):
-    """The rows command the tool's poses that follow from the same joint values."""
+    """The rows command the tool poses that result from the same joint values."""
     joints = read_campaign(write_campaign(tmp_path / "joints"))
     tool = joints.transforms[:, joints.robot.index("tool")]
     rows = [
@@ -90,13 +90,13 @@ def test_campaign_of_a_machine_without_drives_has_one_configuration(tmp_path):
 
 
 def test_labels_with_spaces_and_letters_of_any_script_are_read(tmp_path):
-    """Only control characters are refused."""
+    """Only control characters are rejected."""
     rows = [r.replace(f"m{k}", f"Übung\u00a0{k} é٣") for k, r in enumerate(ROWS, 1)]
     assert read_campaign(write_campaign(tmp_path, rows=rows)).ids[0].startswith("Ü")
 
 
 def test_declared_semicolons_decimal_commas_and_units_are_read(tmp_path):
-    """The same numbers in another notation are the same campaign."""
+    """The same numbers in a different notation define the same campaign."""
     plain = read_campaign(write_campaign(tmp_path / "plain"))
     in_mm = [
         "m1;5,729577951308232;11,459155902616464;0;0;0,01;0,02;0,03;1,5;0;1",
@@ -239,7 +239,7 @@ BAD_TABLES = {
 
 
 @pytest.mark.parametrize("case", BAD_TABLES)
-def test_invalid_table_is_refused_in_one_line(case, tmp_path):
+def test_invalid_table_is_rejected_in_one_line(case, tmp_path):
     head, rows, message = BAD_TABLES[case]
     folder = write_campaign(tmp_path, head=head, rows=rows)
     with pytest.raises(BadInput, match=message) as caught:
@@ -272,7 +272,7 @@ BAD_TOML = {
 
 
 @pytest.mark.parametrize("case", BAD_TOML)
-def test_wrong_campaign_file_is_refused_in_one_line(case, tmp_path):
+def test_invalid_campaign_file_is_rejected_in_one_line(case, tmp_path):
     toml, rest, message = BAD_TOML[case]
     folder = write_campaign(tmp_path, toml=toml, noise=rest)
     with pytest.raises(BadInput, match=message) as caught:
@@ -289,20 +289,20 @@ def test_message_about_a_file_of_another_kind_does_not_print_its_content(tmp_pat
     assert "secret" not in str(caught.value)
 
 
-def test_missing_folder_is_refused(tmp_path):
+def test_missing_folder_is_rejected(tmp_path):
     with pytest.raises(BadInput, match=r"gone/campaign.toml: cannot be read: No such"):
         read_campaign(tmp_path / "gone")
 
 
-def test_wrong_robot_file_of_a_campaign_is_refused_by_name(tmp_path):
+def test_invalid_robot_file_of_a_campaign_is_rejected_by_name(tmp_path):
     folder = write_campaign(tmp_path, robot=ARM.replace("one", "base", 1))
     with pytest.raises(BadInput, match=r"robot.toml: frame"):
         read_campaign(folder)
 
 
 def test_campaign_files_of_the_docs_are_read(tmp_path):
-    """All blocks of the page together:
-    irsbot2 at 100 mm, with 10 N written as 0,01 kN."""
+    """Combine all blocks of the page: irsbot2 at 100 mm, with 10 N written as 0,01
+    kN."""
     docs = Path(__file__).parents[3] / "docs" / "campaigns.md"
     blocks = re.findall(r"```toml\n(.*?)```", docs.read_text("utf-8"), flags=re.S)
     assert len(blocks) == 3
@@ -326,8 +326,7 @@ POINTS = "[points]\nA = [0.1, 0, 0]\nB = [0, 0.2, 0]\n"
 
 
 def test_row_of_several_points_becomes_a_row_for_each_point(tmp_path):
-    """A point of the tool moves with it:
-    its nominal place equals that of the pose by hand."""
+    """A point on the tool moves with it, so its nominal position follows by hand."""
     head = "id,q.one,q.two,session,meas.A.tx,meas.A.ty,meas.B.tx,meas.tz"
     rows = ["m1,0.1,0.2,a,1e-5,2e-5,3e-5,4e-5", "m2,0.1,0.2,b,,,5e-5,"]
     campaign = read_campaign(write_campaign(tmp_path, head, rows, extra=POINTS))
@@ -371,7 +370,9 @@ def test_each_of_several_tables_becomes_a_session(tmp_path):
     ("id,q.one,q.two,meas.tx", "m1,0,0,1e-5", "[points]\ntx = [0, 0, 0]\n",
      'points: found "tx"'),
 ])  # fmt: skip
-def test_invalid_sessions_and_points_are_refused(head, cells, extra, message, tmp_path):
+def test_invalid_sessions_and_points_are_rejected(
+    head, cells, extra, message, tmp_path
+):
     with pytest.raises(BadInput) as error:
         read_campaign(write_campaign(tmp_path, head, [cells], extra=extra))
     assert message in str(error.value)

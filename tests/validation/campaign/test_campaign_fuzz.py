@@ -1,6 +1,7 @@
-"""Damaged campaign files are read, or refused in one line.
+"""Damaged campaign files are either read or rejected in one line.
 
-The same hundred cases of each kind in every run; thousands: ``benchmarks/fuzz.py``.
+Every run uses the same hundred cases of each kind; see ``benchmarks/fuzz.py`` for
+thousands.
 """
 
 import numpy as np
@@ -74,7 +75,7 @@ def assert_read_or_says_why(folder):
     ),
     registration=st.sampled_from(["known", "unknown"]),
 )
-def test_table_with_unusual_cells_is_read_or_refused_in_one_line(
+def test_table_with_unusual_cells_is_read_or_rejected_in_one_line(
     changes, registration, tmp_path
 ):
     table = [line.split(",") for line in TEXT.splitlines()]
@@ -89,7 +90,7 @@ def test_table_with_unusual_cells_is_read_or_refused_in_one_line(
 
 @st.composite
 def garbled(draw, text):
-    """The bytes of a file, some of them removed, repeated or replaced."""
+    """Return the bytes of a file with some of them removed, repeated or replaced."""
     content = text.encode()
     for _ in range(draw(st.integers(1, 4))):
         start = draw(st.integers(0, max(0, len(content) - 1)))
@@ -109,7 +110,7 @@ def garbled(draw, text):
     file=st.sampled_from([("measurements.csv", TEXT), ("campaign.toml", TOML)]),
     data=st.data(),
 )
-def test_garbled_bytes_of_a_campaign_are_read_or_refused_in_one_line(
+def test_garbled_bytes_of_a_campaign_are_read_or_rejected_in_one_line(
     file, data, tmp_path
 ):
     name, text = file
@@ -119,7 +120,7 @@ def test_garbled_bytes_of_a_campaign_are_read_or_refused_in_one_line(
 
 
 def test_undamaged_campaign_is_read(tmp_path):
-    """It ensures that the damaged files have no other fault."""
+    """This ensures that the damaged files have no other defect."""
     folder = write_campaign(tmp_path)
     (folder / "campaign.toml").write_text(TOML)
     assert len(read_campaign(folder)) == 4

@@ -1,4 +1,4 @@
-"""Carrying a saved robot to a new session."""
+"""Fitting of a saved robot to a new session."""
 
 import json
 from dataclasses import replace
@@ -23,7 +23,7 @@ DEVICE = np.array([0.3, -0.2, 0.5, 1.2, -0.4, 0.7])
 
 @pytest.fixture(name="machine")
 def a_machine(tmp_path):
-    """An arm with errors that its saved file knows and its declared one does not."""
+    """Return an arm whose saved file contains errors that the declared one lacks."""
     declared = load_robot("arm6")
     rng = np.random.default_rng(5)
     errors = rng.normal(size=(len(declared.frames), 6)) * 3e-4
@@ -33,9 +33,9 @@ def a_machine(tmp_path):
 
 
 def measured(folder, rows, reach, sessions=None, zero=0.0, wave=None):
-    """Measure the machine, with noise, by a device in another place. The device's place
-    is a rigid motion of the points, independent of the effect; so is a wave (sine,
-    cosine) [m] with a period of an hour. The clock is recorded with it."""
+    """Measure the machine, with noise, by a relocated device.  The relocation is a
+    rigid motion of the points.  A wave (sine, cosine) [m] has a period of one hour, for
+    which the time is recorded."""
     rng = np.random.default_rng(rows)
     saved = load_robot(folder / "saved.toml")
     names = [f.name for f in saved.frames if f.actuated]
@@ -71,7 +71,7 @@ def measured(folder, rows, reach, sessions=None, zero=0.0, wave=None):
 
 
 def with_a_wave(machine, sine, cosine):
-    """Add to the saved file a slow wave that was learned on another day."""
+    """Add to the saved file a slow wave that was learned on a different day."""
     numbers = {"sine": sine, "cosine": cosine, "period": HOUR}
     wave = Function("reading", ("tx",), ("time",), "slow_wave", numbers)
     saved = load_robot(machine / "saved.toml")
@@ -93,7 +93,7 @@ def test_robot_is_fitted_to_a_new_session_with_few_rows(machine, run):
     assert code == 0
     assert day["suffices"]
     assert (day["setup_rows"], day["other_rows"]) == (12, 48)
-    # noise, and the frame's own uncertainty from 36 readings
+    # Noise, plus the uncertainty of the frame from 36 readings.
     assert 0.9 < day["error"]["normalised"] < 1.3
     assert day["declared"]["normalised"] > 5
     found = {p["name"]: (p["value"], p["std"]) for p in day["parameters"]}
@@ -101,13 +101,14 @@ def test_robot_is_fitted_to_a_new_session_with_few_rows(machine, run):
     for k, axis in enumerate("xyz"):
         value, std = found[f"base.r{axis}"]
         assert abs(value - turn[k]) < 5 * std
-    # what was written predicts the day by itself
+    # The written file predicts the session without further input.
     again = predict(read_commands(folder, load_robot(out)))
     assert again.error.position < 1.3 * SIGMA
 
 
 def test_set_up_rows_at_a_single_position_are_not_sufficient(machine, run):
-    """Forty rows within a milliradian determine a place, not the device's rotation."""
+    """Forty rows within a milliradian determine a position, but not the device
+    rotation."""
     wide = measured(machine, 60, 0.8)
     text = (wide / "measurements.csv").read_text().splitlines()
     folder = measured(machine, 40, 1e-3)
@@ -123,7 +124,7 @@ def test_set_up_rows_at_a_single_position_are_not_sufficient(machine, run):
 
 
 def test_saved_robot_predicts_its_own_sessions(machine, run):
-    """The device has another place in each session; the residual is noise."""
+    """The device is relocated in each session; the residual is noise."""
     tight = load_robot(machine / "declared.toml")
     tight = replace(
         tight, frames=tuple(replace(f, clearance=None) for f in tight.frames)
@@ -148,7 +149,7 @@ def test_robot_is_fitted_to_each_session_separately(machine, run):
 
 
 def test_drift_of_an_earlier_session_is_not_used_without_a_common_clock(machine, run):
-    """The drift of another day, 15 sigma, is not written to the carried file."""
+    """A 15-sigma drift of a different day is not written to the new file."""
     folder = measured(machine, 60, 0.8)
     with_a_wave(machine, 3e-4, 1e-4)
     code, said, (day,), out = carried(run, machine, folder, "--setup", "12")
@@ -160,7 +161,8 @@ def test_drift_of_an_earlier_session_is_not_used_without_a_common_clock(machine,
 
 
 def test_drift_is_fitted_again_to_set_up_rows(machine, run):
-    """Every fourth row determines the drift of the new session to a third of sigma."""
+    """Every fourth row suffices to determine the drift of the new session to a third of
+    sigma."""
     folder = measured(machine, 80, 0.8, wave=(-2e-4, 1e-4))
     with_a_wave(machine, 3e-4, 1e-4)
     rows = ",".join(map(str, range(1, 81, 4)))
@@ -177,7 +179,7 @@ def test_drift_is_fitted_again_to_set_up_rows(machine, run):
 
 
 def test_set_up_rows_of_the_first_minutes_do_not_determine_a_drift(machine, run):
-    """The prior is 2e-4 m; half an hour later the drift is unknown."""
+    """The prior is 2e-4 m, so the drift is unknown half an hour later."""
     folder = measured(machine, 60, 0.8, wave=(0.0, 0.0))
     with_a_wave(machine, 2e-4, 2e-4)
     code, said, (day,), _ = carried(run, machine, folder, "--setup", "10")
@@ -194,7 +196,7 @@ def test_set_up_rows_of_the_first_minutes_do_not_determine_a_drift(machine, run)
     (["--setup", "6"], "nothing but set-up"),
     (["--setup", "3", "--fit", "zero"], '--fit: found "zero"; did you mean "zeros"'),
 ])  # fmt: skip
-def test_wrong_set_up_rows_are_refused(words, message, machine, run):
+def test_invalid_set_up_rows_are_rejected(words, message, machine, run):
     folder = measured(machine, 6, 0.8)
     code, _, error = run("validation", "carry", str(machine / "saved.toml"),
                          str(folder), *words)  # fmt: skip

@@ -1,4 +1,4 @@
-"""Corrected commands, by hand and on simulated machines."""
+"""Corrected commands, compared with hand calculations and simulated machines."""
 
 import csv
 import json
@@ -34,7 +34,7 @@ def written(tmp_path, robot, rows, head="id,q.one,q.two"):
 
 
 def test_compensation_table_equals_the_arrays_of_the_result(tmp_path):
-    """An offset of 2 mrad of a zero needs the opposite offset of its command."""
+    """A zero offset of 2 mrad requires the opposite offset of its command."""
     pytest.importorskip("xarray")
     robot, targets = written(tmp_path, ARM + ZERO, ["a,0.3,0.9", "b,-0.2,1.2"])
     found = compensate(read_commands(Path(targets), load_robot(robot)))
@@ -53,7 +53,8 @@ def rows_of(path):
 
 
 def two_links(x, y, length):
-    """Angles of a planar arm of 1 m and a second link: the law of cosines."""
+    """Return the angles of a planar arm with links of 1 m and ``length`` (law of
+    cosines)."""
     second = acos((x**2 + y**2 - 1 - length**2) / (2 * length))
     first = atan2(y, x) - atan2(length * sin(second), 1 + length * cos(second))
     return first, second
@@ -80,7 +81,7 @@ def test_compensation_of_a_longer_link_and_an_offset_equals_hand_calculation(
         assert float(row["q.one"]) == pytest.approx(first - 2e-3, abs=1e-8)
         assert float(row["q.two"]) == pytest.approx(second, abs=1e-8)
     assert float(rows_of(offsets)[0]["after.position"]) < 1e-9
-    # what was written can be commanded again
+    # The written file can be commanded again.
     again = read_commands(out, load_robot(robot))
     assert again.ids == ("a", "b")
     found = json.loads((tmp_path / "j.json").read_text())["error"]
@@ -89,13 +90,13 @@ def test_compensation_of_a_longer_link_and_an_offset_equals_hand_calculation(
 
 
 def test_compensation_keeps_joints_within_their_limits(tmp_path, run):
-    """The second joint is at its limit: the first angle minimises the distance."""
+    """With the second joint at its limit, the first angle minimises the distance."""
     text = LONGER.replace("position = 0.5", "position = 0.5\nlimits = [0.0, 0.9]")
     robot, table = written(tmp_path, text, ["a,0.3,0.9"])
     found = compensate(read_commands(table, load_robot(robot)))
     assert found.commands[0, 1] == 0.9
     assert found.limited[0]
-    # least distance to the point wanted over the first angle alone
+    # Minimum distance to the target over the first angle alone.
     x, y = cos(0.3) + 0.8 * cos(1.2), sin(0.3) + 0.8 * sin(1.2)
     reach = np.hypot(1 + 0.81 * cos(0.9), 0.81 * sin(0.9))
     assert np.linalg.norm(found.after[0, 3:]) == pytest.approx(
@@ -114,7 +115,8 @@ def test_registration_is_compensated_only_on_request(tmp_path):
 
 
 def test_compensation_spread_includes_tolerances_and_fitted_parameters(tmp_path):
-    """A zero uncertain by 1e-4 rad moves the tip by that angle times its distance."""
+    """A zero that is uncertain by 1e-4 rad moves the tip by this angle times its
+    distance."""
     text = ARM.replace(
         'name = "one"', 'name = "one"\ntolerance = [0, 0, 1e-4, 0, 0, 0]'
     )
@@ -136,8 +138,8 @@ std = { "1.sine" = 2e-4 }
 
 @pytest.mark.parametrize("name", ["arm6", "delta", "hexapod"])
 def test_compensation_brings_a_simulated_machine_to_its_target(name, tmp_path):
-    """Another program simulates the machine. The residual is of second order: the
-    square of the errors over the size of the robot, some nanometres here."""
+    """The machine is simulated by an independent program.  The residual is of second
+    order, the squared errors over the robot size, which is a few nanometres here."""
     robot = load_robot(name)
     frames = tuple(replace(f, clearance=None) for f in robot.frames)
     robot = replace(robot, frames=frames)
@@ -194,10 +196,10 @@ parameters = { "0" = OFF }
 
 
 @pytest.mark.parametrize("off", [2e11, -5.0, 1e-3])
-def test_command_is_not_changed_if_its_correction_exceeds_the_size_of_the_robot(
+def test_command_stays_unchanged_if_its_correction_exceeds_the_robot_size(
     off, tmp_path, run
 ):
-    """The function shifts a slide by metres."""
+    """The function displaces a slide by metres."""
     robot, table = written(
         tmp_path, SLIDE.replace("OFF", repr(off)), ["a,0.3"], "id,q.carriage"
     )

@@ -1,4 +1,4 @@
-"""Functions as curves: values by hand, uncertainty bands, units."""
+"""Curves of functions: values, uncertainty bands and units."""
 
 import json
 from math import sin
@@ -44,7 +44,7 @@ def test_explained_curves_equal_their_functions_and_deviations(tmp_path, run):
     assert "gear of the drive: screw rz at drive" in text
 
 
-def test_explain_takes_a_range_and_writes_a_figure(tmp_path, run):
+def test_explain_accepts_a_range_and_writes_a_figure(tmp_path, run):
     figure = tmp_path / "curves.svg"
     _, (wave, *_) = explained(
         tmp_path, run, "--over", "q.drive=0:1", "--figure", str(figure)
@@ -53,7 +53,7 @@ def test_explain_takes_a_range_and_writes_a_figure(tmp_path, run):
     assert figure.read_text().count("gear of the drive") >= 1
 
 
-def test_function_of_two_variables_is_shown_by_three_curves(tmp_path, run):
+def test_function_of_two_variables_yields_three_curves(tmp_path, run):
     both = (
         LAG
         .replace('"lag"', '"powers"')
@@ -70,7 +70,7 @@ def test_function_of_two_variables_is_shown_by_three_curves(tmp_path, run):
     (("--over", "q.driv=0:1"), (PUBLIC,), 'did you mean "q.drive"'),
     (("--over", "q.drive=1:0"), (PUBLIC,), "expected MINIMUM:MAXIMUM"),
 ])  # fmt: skip
-def test_explain_refuses_wrong_functions_and_ranges(
+def test_explain_rejects_invalid_functions_and_ranges(
     words, effects, message, tmp_path, run
 ):
     code, _, error = run(

@@ -1,4 +1,4 @@
-"""The learned range of a robot, and rows beyond it."""
+"""The identified range of a robot and rows outside it."""
 
 import json
 from dataclasses import replace
@@ -74,7 +74,7 @@ def test_unrecorded_covariate_is_not_outside_the_learned_range(tmp_path):
     assert beyond(robot, read_commands(folder, robot)) == ()
 
 
-def test_robot_file_keeps_the_learned_range(tmp_path):
+def test_robot_file_preserves_the_learned_range(tmp_path):
     robot = read_robot(robot_file(tmp_path))
     write_robot(robot, tmp_path / "again.toml")
     again = read_robot(tmp_path / "again.toml")
@@ -97,7 +97,7 @@ def test_commands_warn_of_rows_beyond_the_learned_range(tmp_path, run, command):
     assert (one["variable"], one["learned"], one["rows"]) == ("cov.tilt", [0, 0.4], 1)
 
 
-def test_reversed_learned_range_is_refused(tmp_path, run):
+def test_reversed_learned_range_is_rejected(tmp_path, run):
     path = tmp_path / "wrong.toml"
     path.write_text('learned_range = { "cov.tilt" = [1.0, 0.4] }\n' + ARM)
     code, _, error = run("validation", "explain", str(path))

@@ -1,4 +1,4 @@
-"""A robot's parameters in a new session: prior and readings, weighted by hand."""
+"""Robot parameters in a new session: prior and readings weighted by hand."""
 
 from dataclasses import replace
 
@@ -34,7 +34,8 @@ SIGMA = 1e-5
 
 
 def wet_post(readings, wet, covariance, folder, numbers=("0", "1")):
-    """A post that shifts along x with ``wet``; its file declares no shift."""
+    """Return a post that shifts along x with ``wet``, of which its file declares
+    nothing."""
     measured = np.full((len(readings), 6), np.nan)
     measured[:, 3] = readings
     campaign = campaign_of(measured, SIGMA, wet=np.array(wet, dtype=float))
@@ -50,7 +51,7 @@ def wet_post(readings, wet, covariance, folder, numbers=("0", "1")):
 
 
 def test_refitted_parameter_is_the_weighted_mean_of_prior_and_readings(tmp_path):
-    """Prior 0 +- s, n readings of y +- sigma: conjugate normal distributions."""
+    """The prior is 0 +- s and the n readings are y +- sigma (conjugate normals)."""
     y, s, n = 4e-5, 3e-5, 8
     saved, declared = wet_post([y] * 12, [1] * 12, [[s**2]], tmp_path, ("1",))
     carried = carry(saved, declared, np.arange(12) < n, ())
@@ -64,8 +65,8 @@ def test_refitted_parameter_is_the_weighted_mean_of_prior_and_readings(tmp_path)
     assert known.covariance[0, 0] == pytest.approx(1 / (told + prior), rel=1e-6)
 
 
-def test_known_sum_of_two_parameters_is_kept(tmp_path):
-    """Only a + b was known; the new rows determine a, and b follows."""
+def test_known_sum_of_two_parameters_is_preserved(tmp_path):
+    """Only a + b was known; the new rows determine a, and b adapts."""
     s, little, a = 1e-4, 1e-9, 5e-5
     C = s**2 * np.array([[1, -1], [-1, 1]]) + little**2 * np.eye(2)
     wet = [0] * 8 + [1] * 8
@@ -82,7 +83,7 @@ def test_known_sum_of_two_parameters_is_kept(tmp_path):
 def test_prior_is_widened_if_a_parameter_changes_by_twenty_standard_deviations(
     tmp_path,
 ):
-    """The carried parameter then follows the readings."""
+    """The refitted parameter then follows the readings."""
     s, y = 2e-6, 4e-5
     saved, declared = wet_post([y] * 40, [1] * 40, [[s**2]], tmp_path, ("1",))
     carried = carry(saved, declared, np.arange(40) < 20, ())
@@ -116,7 +117,8 @@ def test_machine_parameters_exclude_those_of_a_session(tmp_path):
 
 
 def test_refitted_compliance_stays_positive():
-    """At least a thousandth of the compliance remains; a rigid joint stays rigid."""
+    """At least one thousandth of the compliance remains, and a rigid joint stays
+    rigid."""
     robot = campaign_of(np.zeros((1, 6))).robot
     K = np.diag([np.inf, np.inf, np.inf, 1e6, np.inf, np.inf])
     soft = replace(robot, frames=(replace(robot.frames[0], joint_stiffness=K),))
@@ -133,7 +135,7 @@ def test_refitted_compliance_stays_positive():
     ("j2", "rz", "screw"), ("j2", "rz", "compliance"),
 ])  # fmt: skip
 def test_slopes_of_functions_equal_finite_differences(where, component, kind, tmp_path):
-    """Differences of the prediction, under load, with a registered device."""
+    """The differences are those of predictions under load with a registered device."""
     robot, rng = with_errors(arm()), np.random.default_rng(2)
     lines = ["id,q.j1,q.j2,q.j3,load.fx,load.fz,load.mz"]
     for i, q in enumerate(rng.uniform(-1, 1, (5, 6))):
@@ -157,13 +159,13 @@ def test_slopes_of_functions_equal_finite_differences(where, component, kind, tm
         for by in (step, -step)
     ]
     expected = (ends[0] - ends[1]) / (2 * step)
-    # the device's turn of a reading's rotation vector is of second order here
+    # The rotation of a reading's rotation vector by the device is of second order here.
     assert J[:, :, 0] == pytest.approx(expected, abs=1e-3 * np.abs(expected).max())
 
 
 @pytest.mark.slow
 def test_softer_spring_is_identified_in_a_new_session_from_twenty_rows(tmp_path):
-    """The machine is diagnosed on Monday; on Tuesday its drive is a quarter softer."""
+    """After the diagnosis, a drive of the machine becomes a quarter softer."""
     springs = {"monday": 5e4, "tuesday": 4e4}
     days = {}
     for day, stiffness in springs.items():

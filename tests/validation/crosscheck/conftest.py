@@ -1,4 +1,4 @@
-"""The paper's robot with errors, and terms of the model broken for one test."""
+"""Fixtures: the robot of the paper with errors, and deliberately broken model terms."""
 
 import sys
 from functools import lru_cache, partial
@@ -24,9 +24,8 @@ def posture(irsbot2):
 
 @pytest.fixture
 def broken(monkeypatch):
-    """Break a term of the numpy model, and clear all that was computed with it. Robots
-    of equal data share what is cached. The compiled model has each term a second
-    time."""
+    """Break a term of the numpy model and clear everything computed with it, because
+    robots with equal data share caches.  The compiled model duplicates each term."""
     from forcefit.assembly.linear.energy import solve_assembly
     from forcefit.validation.crosscheck import crosscheck
 

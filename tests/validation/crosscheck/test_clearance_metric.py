@@ -1,4 +1,4 @@
-"""Clearances as contacts: closed forms, agreement with the linear model's cones."""
+"""Clearances modelled as contacts, compared with closed forms and linear cones."""
 
 import math
 import time
@@ -34,7 +34,7 @@ DISC = ClearanceCone((3, 4), 3e-5, 1e12)
 
 
 def coaxial(error, clearance, length=0.4):
-    """Two beams that miss each other by an error, one with clearance at its end."""
+    """Two beams that are misaligned by an error, one with clearance at its end."""
     frames = (
         Frame("a", translation=[length, 0, 0], rotation=[0, math.pi / 2, 0],
               link=ROUND, geometric_error=error, clearance=clearance),
@@ -55,8 +55,9 @@ def push(cone, screw, width):
 
 @pytest.mark.parametrize("arm", [0.0, 0.04, -0.04])
 def test_contact_force_is_the_gradient_of_its_energy(arm):
-    """Central differences of half a nanometre inside, at and outside the bound. With an
-    arm of 40 mm, a pin tilted by r / arm touches like one shifted by r."""
+    """Compare with central differences of half a nanometre inside, at and outside the
+    bound. With an arm of 40 mm, a pin tilted by r / arm touches like a pin shifted by
+    r."""
     disc = replace(DISC, arm=arm)
     unit = np.array([0.04, 0.04, 1, 1, 1, 1])  # [m] for a rad
     for r in (0.0, 1e-5, 2.999e-5, 3.001e-5, 3.3e-5):
@@ -73,8 +74,8 @@ def test_contact_force_is_the_gradient_of_its_energy(arm):
 
 
 def test_pin_in_two_bushes_touches_where_its_axis_reaches_the_radius():
-    """A tilt by c / h, or a shift by c, just touches; both together press. At z = h the
-    axis is at (TX + h RY, TY - h RX)."""
+    """A tilt of c / h or a shift of c just touches, and both together press.  At z = h,
+    the axis is at (TX + h RY, TY - h RX)."""
     clearance = Clearance(radial=3e-5, tilt=7.5e-4, axial=1e-5)
     bushes = joint_clearance(Frame("f", clearance=clearance), bushes=True)
     assert [(c.rows, c.size, c.arm) for c in bushes.cones] == [
@@ -92,9 +93,9 @@ def test_pin_in_two_bushes_touches_where_its_axis_reaches_the_radius():
 
 @pytest.mark.parametrize("misfit", [5e-5, 1e-4])
 def test_axial_clearance_reduces_the_misfit(misfit):
-    """E = (g - c)^2 EA / 2(2L), c = 30 um; clearance is along the joint's z. A contact
-    of 1e12 N/m in series with 3.8e8 N/m takes 4e-4 of the energy, which the correction
-    for its yield gives back; the smoothing 3e-4 of c, 9 nm, is left."""
+    """E = (g - c)^2 EA / 2(2L) with c = 30 um along the joint's z axis.  A contact of
+    1e12 N/m in series with 3.8e8 N/m stores 4e-4 of the energy, which is corrected for;
+    the smoothing width of 3e-4 c, 9 nm, remains."""
     stiffness = E * AREA / 0.8
     check = simulate_assembly(
         coaxial([0, 0, 0, 0, 0, misfit], Clearance(axial=3e-5)),
@@ -107,8 +108,8 @@ def test_axial_clearance_reduces_the_misfit(misfit):
 
 @pytest.mark.parametrize("pause", [0.0, 0.05])
 def test_time_limit_of_a_simulation_does_not_end_other_simulations(pause, monkeypatch):
-    """Also where the processor sleeps; Exudyn's timer is one for all models. Without a
-    limit 0.05 s at each of some 3000 calls of the contact are minutes."""
+    """This includes idle time, because all models share Exudyn's timer.  Without a
+    limit, 0.05 s at each of about 3000 contact calls would take minutes."""
     contacts = SimulationModel(clearances=True)
     posture = coaxial([0, 0, 0, 0, 0, 1e-4], Clearance(axial=3e-5))
     with monkeypatch.context() as patch:
@@ -123,7 +124,7 @@ def test_time_limit_of_a_simulation_does_not_end_other_simulations(pause, monkey
 
 
 def test_interruption_inside_the_solver_is_raised(monkeypatch):
-    """Exudyn turns Ctrl-C into an error of its own."""
+    """Exudyn converts Ctrl-C to an error of its own."""
 
     def interrupted(*_):
         raise KeyboardInterrupt
@@ -135,7 +136,7 @@ def test_interruption_inside_the_solver_is_raised(monkeypatch):
 
 
 def test_a_ball_reduces_an_oblique_misfit_as_in_the_exact_model():
-    """As for an axial clearance, the smoothing is left."""
+    """As for an axial clearance, only the smoothing error remains."""
     posture = coaxial([0, 0, 0, 6e-5, -9e-5, 3e-5], Clearance(ball=3e-5))
     exact = solve_exact(posture)
     found = simulate_assembly(posture, model=SimulationModel(clearances=True))
@@ -153,21 +154,22 @@ def test_crosscheck_of_a_joint_with_a_ball_passes():
 
 @pytest.mark.slow
 def test_crosscheck_of_the_papers_robot_with_clearances_passes(irsbot2):
-    """The models agree within 2 % as errors vanish;
-    the optimality gap falls with the square."""
+    """The models agree within 2 % as errors vanish, and the optimality gap decreases
+    quadratically."""
     check = crosscheck(
         place_robot(irsbot2, {"tx": 0.0, "tz": -0.5}), (1.0, 0.5, 0.25), clearances=True
     )
     assert check.passed, check.checks
-    # contacts of 1e9 N m/rad yield 4e-4 of what links of 1e6 N m/rad do
+    # Contacts of 1e9 N m/rad deform 4e-4 as much as links of 1e6 N m/rad.
     assert check.metric.limits["spring deformation"].value < 5e-3
     assert check.metric.gaps[0] > check.metric.gaps[1] > check.metric.gaps[2] > 0
 
 
 @pytest.mark.slow
 def test_energy_with_clearances_agrees_with_the_exact_model(irsbot2):
-    """Contacts against cones, springs as links, at the paper's full errors. Contacts
-    differ by at most 0.3 %; the linear energy differs by more than 1 %."""
+    """Contacts are compared with cones, with springs as links, at the full errors of
+    the paper. They differ by at most 0.3 %, whereas the linear energy differs by more
+    than 1 %."""
     posture = place_robot(irsbot2, {"tx": 0.1, "tz": -0.15})
     check = crosscheck(posture, (1.0, 0.5), links="spring", clearances=True)
     assert check.passed, check.checks
@@ -176,7 +178,8 @@ def test_energy_with_clearances_agrees_with_the_exact_model(irsbot2):
 
 
 def heavy(length=0.4):
-    """Two beams of 4 kg and 6 kg bodies, 60 um off, one end with clearance of 20 um."""
+    """Two beams with bodies of 4 kg and 6 kg, 60 um apart, one end with 20 um
+    clearance."""
     frames = coaxial(
         [0, 0, 0, 6e-5, 2e-5, 5e-5], Clearance(radial=2e-5, axial=2e-5), length
     ).robot.frames
@@ -192,9 +195,9 @@ def heavy(length=0.4):
 
 @pytest.mark.parametrize("links", ["beam", "spring"])
 def test_crosscheck_passes_for_weight_together_with_clearance(links):
-    """A hundredfold weight exceeds the clearance: checks of energy, springs and gap
-    pass. With beams the simulation also stores q^2 L^5 / 1440 EI each between their
-    ends."""
+    """Deflections by a hundredfold weight exceed the clearance, and the checks of
+    energy, springs and gap pass.  Each simulated beam also stores q^2 L^5 / 1440 EI
+    between its ends."""
     check = crosscheck(
         heavy(), (1.0, 0.5), links=links, gravity=[0, 300.0, -900.0], clearances=True
     )
@@ -217,7 +220,7 @@ def test_crosscheck_with_clearances_fails_for_a_wrong_weight(monkeypatch):
 
 
 def drawn(name, size, pose=None):
-    """A built-in robot with random errors of a millirad and a tenth of a millimetre."""
+    """A built-in robot with random errors of 1 mrad and 0.1 mm."""
     robot = load_robot(name)
     sources = tolerance_sources(robot, size * np.array([1e-3] * 3 + [1e-4] * 3))
     errors = sources.errors(sources.draw(0, 1, seed=7))[0]
@@ -235,8 +238,8 @@ def drawn(name, size, pose=None):
                   marks=pytest.mark.slow)],
 )  # fmt: skip
 def test_errors_within_the_clearance_store_no_energy(name, size, pose, said):
-    """There is no load. This is a check of overconstrained robots only: the others
-    close without energy whatever their clearance."""
+    """There is no load.  Only overconstrained robots are checked, because the others
+    close without energy for any clearance."""
     check = crosscheck(drawn(name, size, pose), (1.0, 0.5), clearances=True)
     assert check.pairs[0].linear.energy == pytest.approx(0.0, abs=1e-20)
     assert check.pairs[0].simulated.energy < 1e-8
@@ -250,8 +253,8 @@ def test_errors_within_the_clearance_store_no_energy(name, size, pose, said):
      ("five_bar", [0, 0, 0, 0, -20, 0])],
 )  # fmt: skip
 def test_optimality_gap_under_a_load_is_relative_to_the_stored_energy(name, load):
-    """Without errors closing needs no energy: the reference is the load's energy. Parts
-    of the five-bar stay free under its load."""
+    """Without errors, closing requires no energy, so the reference is the energy under
+    load. Parts of the five-bar stay free under its load."""
     check = crosscheck(
         home_posture(load_robot(name)), (1.0, 0.5), load=load, clearances=True
     )

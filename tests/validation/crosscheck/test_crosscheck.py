@@ -1,4 +1,4 @@
-"""Cross-check: the two models agree to first order, and a broken model fails."""
+"""Cross-checks: both models agree to first order, and broken models fail."""
 
 import math
 from dataclasses import replace
@@ -22,7 +22,7 @@ STEEL = BeamLink({"radius": 0.01}, 200e9, 0.3)
 
 
 def triangle(error):
-    """Two steel bars from a wall to one tip, overconstrained three times."""
+    """Two steel bars from a wall to one tip, with three overconstraints."""
     pin = Clearance(radial=1e-5, tilt=1e-4)
     K = np.diag([1e4, 1e4, 3e2, 1e8, 1e8, 1e8])
     frames = (
@@ -40,13 +40,13 @@ def triangle(error):
 def test_pose_difference_of_the_papers_robot_falls_with_the_square_of_the_scale(
     posture,
 ):
-    """Slope 2.0 within 0.1, and every limit within a thousandth."""
+    """The slope is 2.0 within 0.1, and every limit agrees within a thousandth."""
     result = crosscheck(posture)
     assert result.passed
     for slope in result.metric.slopes.values():
         assert slope == pytest.approx(2.0, abs=0.1)
-    # what is left of the limits is of the order of the product of the scales, 1/64,
-    # of a fourth-order term: far below the bound
+    # The limits retain a fourth-order term times the product of the scales, 1/64, which
+    # is far below the bound.
     assert max(check.value for check in result.metric.limits.values()) < 2e-5
 
 
@@ -65,8 +65,8 @@ def test_crosscheck_passes_over_poses_and_draws(signed):
 def test_exact_model_explains_the_difference_between_linear_model_and_simulation(
     posture,
 ):
-    """With springs as links, the exact model and the simulation agree to 1e-4 of the
-    difference. With beams, their own finite bending is the residual."""
+    """With springs as links, exact model and simulation agree to 1e-4 of the
+    difference. With beams, the finite bending of the beams remains."""
     springs = crosscheck(posture, links="spring")
     assert springs.passed
     assert max(springs.metric.unexplained.values()) < 1e-3
@@ -77,8 +77,8 @@ def test_exact_model_explains_the_difference_between_linear_model_and_simulation
 def test_crosscheck_fails_for_a_difference_that_finite_rotations_do_not_explain(
     posture, monkeypatch
 ):
-    """The exact model gets errors that are one per cent too large;
-    the two others agree."""
+    """The errors of the exact model are one per cent too large; the other two models
+    agree."""
 
     def wrong(place, *_, **__):
         robot = place.robot.with_errors(1.01 * place.robot.errors)
@@ -95,8 +95,8 @@ def test_crosscheck_fails_for_a_difference_that_finite_rotations_do_not_explain(
 
 @pytest.mark.parametrize("links", ["beam", "spring"])
 def test_crosscheck_with_weight_passes(links):
-    """A slender, heavy pair of bars,
-    and a body whose centre is off its frame's origin."""
+    """The robot is a slender, heavy pair of bars with a body whose centre of mass is
+    not at the frame origin."""
     posture = triangle([1e-3, -2e-3, 1e-3, 1e-4, 2e-4, -1e-4])
     heavy = replace(STEEL, density=7800.0)
     frames = tuple(
@@ -113,12 +113,12 @@ def test_crosscheck_with_weight_passes(links):
     assert np.abs(moved[3:]).max() > 1e-5
     assert (check.pairs[0].between > 0) == (links == "beam")
     if links == "spring":
-        # two codes with finite rotations; measured 2e-4, as without weight
+        # Both programs use finite rotations; measured 2e-4, as without weight.
         assert max(check.metric.unexplained.values()) < 1e-3
 
 
 def erring(name, density):
-    """A built-in robot whose links are heavy and up to 2 mrad and 0.2 mm off."""
+    """A built-in robot with heavy links and errors of up to 2 mrad and 0.2 mm."""
     robot, rng = load_robot(name), np.random.default_rng(0)
     errors = np.zeros((len(robot.frames), 6))
     links = [f for f in robot.frames if isinstance(f.link, BeamLink)]
@@ -131,10 +131,10 @@ def erring(name, density):
 
 @pytest.mark.parametrize("name", ["3rrr", "arm6"])
 def test_exact_model_and_simulation_agree_under_weight_and_moment(name):
-    """Weight on beams with errors, and a couple of dead forces together with a force.
-    The bound is relative to the difference from the linear model. A weight that starts
-    at its nominal place would leave 7e-3, a moment of constant direction 58 per
-    cent."""
+    """Beams with errors carry weight, and a couple of dead forces together with a
+    force. The bound is relative to the difference from the linear model.  A weight
+    acting at its nominal position would leave 7e-3, and a moment of constant direction
+    58 per cent."""
     posture = erring(name, 2700.0)
     load = [1, 2, 3, 50, 20, -30]
     check = crosscheck(posture, links="spring", load=load, gravity=[2, -3, -9.81])
@@ -143,7 +143,7 @@ def test_exact_model_and_simulation_agree_under_weight_and_moment(name):
 
 
 def test_crosscheck_fails_for_a_wrong_weight_in_the_exact_model(monkeypatch):
-    """The weight is 5 % too large in the model with finite motions only."""
+    """Only the finite-motion model has a weight that is 5 % too large."""
     right = exact.dead_loads
     monkeypatch.setattr(
         exact, "dead_loads",
@@ -157,8 +157,9 @@ def test_crosscheck_fails_for_a_wrong_weight_in_the_exact_model(monkeypatch):
 
 @pytest.mark.slow
 def test_rods_that_roll_under_a_load_are_held_and_reported():
-    """The delta's rods roll by radians under a load, and without a load need no
-    holding. Both virtual-joint models then have the same springs, and all agree."""
+    """The delta's rods roll by radians under a load and must be held, but not without
+    load. Both virtual-joint models then contain the same springs, and all models
+    agree."""
     still = crosscheck(erring("delta", 1600.0), (1.0, 0.5))
     assert still.passed, still.text()
     assert not still.pairs[0].simulated.held
@@ -178,7 +179,7 @@ def test_rods_that_roll_under_a_load_are_held_and_reported():
 @pytest.mark.parametrize("seed", [1, 2, 3])
 @pytest.mark.parametrize("load", [None, [0, 0, 0, 0, 0, -100.0]])
 def test_crosscheck_of_a_delta_with_errors_of_3_mrad_passes(seed, load):
-    """Rods that roll are held alike in all models."""
+    """Rolling rods are held in the same way in all models."""
     robot = load_robot("delta")
     sources = tolerance_sources(
         robot, [3e-3] * 3 + [0] * 3, [f.name for f in robot.frames]
@@ -189,7 +190,7 @@ def test_crosscheck_of_a_delta_with_errors_of_3_mrad_passes(seed, load):
 
 
 def test_smaller_scales_are_added_until_the_limit_at_scale_zero_is_determined(irsbot2):
-    """From the two requested scales limits are uncertain by over a thousandth."""
+    """With only the two requested scales, limits are uncertain by over a thousandth."""
     at = place_robot(
         with_papers_errors(load_robot("irsbot2"), 0, signed=True), {"tx": 0, "tz": -0.5}
     )
@@ -215,7 +216,7 @@ def test_crosscheck_on_two_scales_fails_for_a_broken_term(irsbot2, name, broken)
 
 
 def test_crosscheck_without_clearances_removes_them_from_both_models():
-    """With its clearance of 10 um, the error of 8 um would store no energy."""
+    """Within the clearance of 10 um, the error of 8 um would store no energy."""
     check = crosscheck(triangle([0, 0, 0, 8e-6, 0, 0]))
     assert check.posture.robot.frame("a").clearance is None
     assert check.passed
@@ -241,11 +242,11 @@ def test_crosscheck_without_errors_and_load_has_no_signal():
     assert result.table()["verdict"] == "no signal"
     assert "\nNOT CHECKED: no difference exceeds" in result.text()
     assert math.isnan(result.slope)
-    assert result.metric.differences["translation"].max() < 1e-15  # rounding of 0.4 m
+    assert result.metric.differences["translation"].max() < 1e-15  # round-off of 0.4 m
 
 
 def test_checks_without_signal_are_counted_separately():
-    """No spring is loaded: only the platform's pose is compared."""
+    """No spring is loaded, so only the platform pose is compared."""
     error = [0.01, 0.02, 0.03, 1e-3, 0, 0]
     frame = Frame("a", translation=[0.5, 0, 0], link=STEEL, geometric_error=error)
     result = crosscheck(home_posture(Robot("bar", "b", (frame, Frame("b", "a")))))
@@ -274,7 +275,7 @@ def test_crosscheck_reports_a_failed_simulation_as_a_row():
 LOAD = [5.0, -8.0, 3.0, 100.0, 300.0, -200.0]
 
 
-# the smallest faults, and one of each kind
+# The smallest faults, and one fault of each kind.
 BY_DEFAULT = (
     "lever arm one per cent short", "links half a per cent stiff", "joints rigid",
     "axes of the frames forgotten", "second chain counted twice",
@@ -290,7 +291,7 @@ BY_DEFAULT = (
 def test_crosscheck_fails_for_a_broken_term_of_the_linear_model(
     irsbot2, mutation, broken
 ):
-    """The simulation shares none of these terms, so each breaks the agreement."""
+    """The simulation shares none of these terms, so each fault breaks the agreement."""
     broken(mutation)
     posture = place_robot(irsbot2, {"tx": 0.1, "tz": -0.45})
     check, _ = attempt("irsbot2", lambda: crosscheck(posture, load=LOAD))
@@ -301,7 +302,7 @@ BENT = [1e-3, -2e-3, 1e-3, 1e-4, 2e-4, -1e-4]
 
 
 def test_crosscheck_of_two_crossed_bars_passes():
-    """The bars bend in both planes; the paper's links carry no shear."""
+    """The bars bend in both planes, whereas the paper's links carry no shear."""
     assert crosscheck(triangle(BENT), load=LOAD).passed
 
 
@@ -328,7 +329,7 @@ def test_slope_figure_shows_the_measured_differences(posture):
      *(pytest.param(name, marks=pytest.mark.slow) for name in ("delta", "hexapod"))],
 )  # fmt: skip
 def test_crosscheck_of_every_built_in_robot_passes_under_a_load(name):
-    """Their drives are springs about one axis and rigid in the other five."""
+    """Their drives are springs about one axis and rigid in all other directions."""
     posture = home_posture(load_robot(name))
     check = crosscheck(posture, (1.0, 0.5, 0.25), load=[0, 0, 0, 10.0, 20.0, -50.0])
     assert check.passed, check.text()

@@ -1,4 +1,4 @@
-"""The command ``validation crosscheck``: keys, exit statuses, refusals."""
+"""The command ``validation crosscheck``: keys, exit statuses and error messages."""
 
 import json
 from functools import partial
@@ -22,7 +22,8 @@ def check(run):
 
 
 def test_readme_example_compares_a_draw_of_errors(check):
-    """The errors of the file replace the robot's; the seed selects the draw."""
+    """The errors in the file replace those of the robot, and the seed selects the
+    draw."""
     root = Path(__file__).parents[3]
     example = root / "examples" / "irsbot2_errors.toml"
     words = "validation crosscheck irsbot2 --errors examples/irsbot2_errors.toml"
@@ -58,8 +59,8 @@ def test_crosscheck_writes_the_public_keys(check, tmp_path):
     assert picture.stat().st_size > 1000
 
 
-def test_crosscheck_keeps_clearances_on_request(check, tmp_path):
-    """Springs in series whose misfit is larger than the clearance between them."""
+def test_crosscheck_includes_clearances_on_request(check, tmp_path):
+    """The misfit of springs in series exceeds the clearance between them."""
     file = tmp_path / "robot.toml"
     gap = np.array([0, 0, 0, 2e-4, 1e-4, 5e-5])
     loose = Clearance(radial=2e-5, axial=1e-5)
@@ -83,7 +84,7 @@ def test_failed_crosscheck_has_exit_status_1(check, monkeypatch):
 
 
 @pytest.mark.parametrize("text", ["1", "1,1", "1,0", "1;0.5", "1,nan"])
-def test_crosscheck_refuses_wrong_scales(check, text):
+def test_crosscheck_rejects_invalid_scales(check, text):
     status, _, err = check("irsbot2", "--scale", text)
     assert status == 2
     assert f'--scale: found "{text}", expected at least two' in err

@@ -1,4 +1,4 @@
-"""Pages of cross-checks: numbers of both models, and the colour of the verdict."""
+"""Report pages of cross-checks: values of both models, and the verdict's colour."""
 
 import json
 
@@ -40,7 +40,7 @@ def test_page_shows_the_platform_by_both_models_and_a_slope_of_two(run, tmp_path
 
 
 def test_page_of_a_stiffness_check_shows_equal_compliances(run, tmp_path):
-    """Without errors and loads the exact and the linear model are the same."""
+    """Without errors and loads, the exact and the linear model coincide."""
     status, text, _ = shown(run, tmp_path, "four_bar", "--state", "exact")
     assert status == 0
     assert "<p class='verdict good'>" in text
@@ -67,7 +67,7 @@ def test_page_of_many_poses_is_red_if_one_fails_and_amber_if_undecided(rows, kin
     assert len(parse(text).table("tx [mm]")) == 1 + len(rows)
 
 
-def test_page_of_a_simulation_without_a_result_gives_its_reason():
+def test_page_of_a_failed_simulation_states_the_reason():
     failure = {"robot": "r", "status": "simulation failed", "reason": "no equilibrium"}
     text = failure_page(failure, Provenance())
     assert "<p class='verdict bad'>" in text

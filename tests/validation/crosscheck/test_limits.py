@@ -32,8 +32,8 @@ def test_slope_is_that_of_the_first_two_orders_at_the_smallest_scale(first, expe
 
 
 def test_slope_check_does_not_fail_on_noise_as_large_as_the_first_order():
-    """Noise of 1e-10 on differences of 2e-10 at the smallest scale;
-    with noise of 1e-12 the check decides."""
+    """The noise is 1e-10 for differences of 2e-10 at the smallest scale; with noise of
+    1e-12, the check decides."""
     rng = np.random.default_rng(1)
     right = 2e-10 * (SCALES[:, None] / SCALES[-1]) ** 2 * [1.0, 0.0, 0.0]
     noisy = right + 1e-10 * rng.choice([-1.0, 1.0], size=(4, 3))

@@ -1,4 +1,4 @@
-"""Solids in a floating frame against their condensed stiffness K_E."""
+"""Solids in floating frames compared with their condensed stiffness K_E."""
 
 from pathlib import Path
 
@@ -47,7 +47,8 @@ def block():
 
 
 def test_loaded_solid_in_the_simulation_deforms_by_its_condensed_stiffness(block):
-    """screw = K_E^-1 w and E = w K_E^-1 w / 2; 1e-6 rad is linear to 1e-6."""
+    """Expect screw = K_E^-1 w and E = w K_E^-1 w / 2; at 1e-6 rad, they are linear to
+    1e-6."""
     body, K = block
     frame = Frame("tip", translation=[0.1, 0.2, 0.3], link=MatrixLink(K))
     posture = home_posture(Robot("block", "tip", (frame,)))
@@ -66,8 +67,8 @@ def test_loaded_solid_in_the_simulation_deforms_by_its_condensed_stiffness(block
 
 
 def test_solid_between_two_walls_agrees_with_its_spring_to_first_order(block):
-    """The same loop with the solid and with its K_E:
-    at a tenth of the misfit, the difference is a hundredth."""
+    """Compare a loop that contains the solid with one that contains its K_E: a tenth of
+    the misfit gives a hundredth of the difference."""
     body, K = block
     error = np.array([1e-3, -2e-3, 1e-3, 1e-4, 2e-4, -1e-4])
     frames = (
@@ -89,9 +90,9 @@ def test_solid_between_two_walls_agrees_with_its_spring_to_first_order(block):
 
 @pytest.mark.slow
 def test_crosscheck_of_a_robot_with_meshed_links_passes_with_solids():
-    """From the surface file: K_E in the linear model, the solid in the simulation. Both
-    come from one mesh. They differ by the sparse solver's rounding, and a floating
-    frame bends linearly about its base."""
+    """The linear model uses K_E and the simulation the solid, both from one mesh of the
+    surface file.  They differ by round-off of the sparse solver, and a floating frame
+    bends linearly about its base."""
     link = MeshLink(SURFACE, "z=0", "z=0.452", 60e9, 0.3)
     error = [1e-3, -2e-3, 1e-3, 1e-4, 2e-4, -1e-4]
     frames = (

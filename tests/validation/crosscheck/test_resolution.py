@@ -1,4 +1,4 @@
-"""Smallest changes that a cross-check detects, by hand for two bars on one line."""
+"""Smallest changes that a cross-check detects, calculated by hand for two bars."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -21,7 +21,7 @@ ERROR, CLEARANCE, STIFFNESS = 4e-4, 1e-4, 1e6  # [m], [m], [N/m]
 
 
 def bars(clearance=CLEARANCE):
-    """Two bars that lack 0.4 mm on the x axis, and a disc of 0.1 mm where they meet."""
+    """Two bars on the x axis with a gap of 0.4 mm and a clearance disc of 0.1 mm."""
     loose = Clearance(radial=clearance) if clearance else None
     gap = [0, 0, 0, ERROR, 0, 0]
     return home_posture(coaxial_beams(gap, (STIFFNESS, STIFFNESS), clearance=loose))
@@ -47,7 +47,8 @@ def without(robot, pairs):
 
 
 def test_smallest_detected_clearance_change_follows_from_the_energy():
-    """E = k (e - c)^2 / 4: a share d of c changes it by 2 c d / (e - c)."""
+    """E = k (e - c)^2 / 4, so a relative change d of c changes it by 2 c d / (e -
+    c)."""
     by_name = found(bars(), with_clearances)
     (clearance,) = (r for r in by_name.values() if r.kind == "clearance")
     expected = TOLERANCE * (ERROR - CLEARANCE) / (2 * CLEARANCE)
@@ -57,15 +58,15 @@ def test_smallest_detected_clearance_change_follows_from_the_energy():
 
 
 def test_smallest_detected_error_change_follows_from_the_energy():
-    """A share d of e changes E by 2 e d / (e - c)."""
+    """A relative change d of e changes E by 2 e d / (e - c)."""
     (error,) = (r for r in found(bars(), with_clearances).values() if r.kind == "error")
     expected = TOLERANCE * (ERROR - CLEARANCE) / (2 * ERROR)
     assert error.smallest == pytest.approx(expected, rel=0.02)
 
 
 def test_smallest_detected_stiffness_change_is_twice_the_bound():
-    """Each of two equal springs in series stores half of the energy:
-    2 b for the bound b."""
+    """Each of two equal springs in series stores half of the energy, so a bound b gives
+    2 b."""
     for clearance, metric, bound in (
         (CLEARANCE, with_clearances, TOLERANCE),
         (None, without, LIMIT_TOLERANCE),
@@ -77,7 +78,7 @@ def test_smallest_detected_stiffness_change_is_twice_the_bound():
 
 
 def test_unloaded_clearance_is_reported_as_unproved():
-    """The bars are loaded along x: a clearance of 20 um along z has no effect."""
+    """The bars are loaded along x, so a clearance of 20 um along z has no effect."""
     frames = [
         f if f.clearance is None
         else replace(f, clearance=replace(f.clearance, axial=2e-5))
@@ -96,7 +97,7 @@ def test_unloaded_clearance_is_reported_as_unproved():
 @pytest.mark.exudyn
 @pytest.mark.parametrize(("share", "passed"), [(0.5, True), (2.0, False)])
 def test_wrong_clearance_beyond_the_resolution_fails(monkeypatch, share, passed):
-    """Half of the smallest change passes, twice as much fails."""
+    """Half of the smallest detectable change passes, and twice this change fails."""
     posture = bars()
     right = crosscheck.crosscheck(posture, clearances=True)
     (clearance,) = (r for r in right.resolutions if r.kind == "clearance")

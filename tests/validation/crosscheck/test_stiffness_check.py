@@ -1,4 +1,4 @@
-"""Platform stiffness against Exudyn, also of forced assemblies."""
+"""Platform stiffness compared with Exudyn, including forced assemblies."""
 
 import json
 from dataclasses import replace
@@ -22,7 +22,7 @@ SLOW = ("hexapod", "orthoglide", "arm6")
 )
 @pytest.mark.parametrize("links", ["spring", "beam"])
 def test_stiffness_of_robots_without_errors_agrees_with_the_simulation(name, links):
-    """Beams are straight there, so that their stiffness is K_E."""
+    """Without errors, beams are straight and their stiffness is K_E."""
     answer = check_stiffness(home_posture(load_robot(name)), links=links)
     assert answer.differences["linearised"] < 1e-8
     assert answer.differences["exact"] < 1e-6
@@ -31,8 +31,8 @@ def test_stiffness_of_robots_without_errors_agrees_with_the_simulation(name, lin
 
 @pytest.mark.slow
 def test_stiffness_of_a_forced_assembly_agrees_with_the_simulation():
-    """At the paper's full errors the nominal matrix is off by 5 %. The load has a
-    moment, of dead forces in both models."""
+    """At the full errors of the paper, the nominal matrix is off by 5 %.  The moment of
+    the load is a couple of dead forces in both models."""
     case = NUMBERS["cases"][1]
     posture = place_robot(irsbot2_with(case), {"tx": 0.1, "tz": -0.5})
     answer = check_stiffness(posture, [20, 10, -5, 100, 50, -300])
@@ -54,7 +54,7 @@ def test_stiffness_of_a_loaded_robot_agrees_with_the_simulation(force):
 
 
 def test_pin_pressed_against_its_hole_has_a_stiffness_along_the_rim():
-    """Its stiffness is F / c in series with that of its arm."""
+    """Its stiffness is F / c, in series with that of its arm."""
     force, bound, k = 300.0, 5e-5, 1e6
     link = MatrixLink(np.diag([1e4, 1e4, 1e4, k, k, k]))
     frames = (
@@ -66,7 +66,7 @@ def test_pin_pressed_against_its_hole_has_a_stiffness_along_the_rim():
     answer = check_stiffness(posture, [0, 0, 0, force, 0, 0], clearances=True)
     assert answer.passed
     assert np.isnan(answer.simulated.stepped).all()
-    # what the force adds by turning the arm is below 1e-3 of this
+    # The contribution of the force by rotating the arm is below 1e-3 of this.
     along = 1 / k + bound / force + 0.1**2 / 1e4
     assert answer.simulated.linearised[4, 4] == pytest.approx(along, rel=1e-2)
     assert answer.differences["linearised"] < 1e-3
@@ -81,7 +81,7 @@ def test_stiffness_check_fails_for_a_wrong_stiffness():
 
 
 def test_stiffness_of_links_in_pieces_converges_to_that_of_beams():
-    """The error of n pieces falls as 1/n^2, down to that of Exudyn's elements."""
+    """The error of n pieces decreases as 1/n^2, down to that of Exudyn's elements."""
     robot, off = load_robot("four_bar"), []
     for pieces in (1, 2, 4):
         frames = [
@@ -96,13 +96,13 @@ def test_stiffness_of_links_in_pieces_converges_to_that_of_beams():
     assert np.array(off[:-1]) / off[1:] == pytest.approx(4.0, rel=0.1)
 
 
-def test_stiffness_check_reports_another_equilibrium_at_another_pose():
+def test_stiffness_check_reports_a_different_equilibrium_of_the_simulation():
     answer = check_stiffness(home_posture(load_robot("four_bar")), [0, 0, 0, 0, 50, 0])
     assert answer.moved == pytest.approx(answer.simulated_moved, abs=1e-9)
     there = answer.simulated.platform.copy()
     there[:3, 3] += 0.2 * answer.moved[3:]
     elsewhere = replace(answer.simulated, platform=there, stable=False)
-    # as long as the tangents agree it does not matter
+    # This is irrelevant as long as the tangents agree.
     assert replace(answer, simulated=elsewhere).passed
     stiffer = replace(elsewhere, linearised=0.5 * elsewhere.linearised)
     other = replace(answer, simulated=stiffer)

@@ -1,4 +1,4 @@
-"""Scales are added until the verdict is known."""
+"""Addition of scales until the verdict is decided."""
 
 from dataclasses import dataclass, field
 
@@ -15,7 +15,7 @@ from forcefit.validation.crosscheck.verdict import Check, compare_scales, verdic
 
 @dataclass
 class Scale:
-    """A stand-in for a pair of answers: two numbers at a scale."""
+    """A stand-in for a pair of solutions: two numbers at one scale."""
 
     scale: float
     ours: float
@@ -24,7 +24,7 @@ class Scale:
 
 @dataclass
 class Found:
-    """A stand-in for a comparison: one limit, one slope."""
+    """A stand-in for a comparison, with one limit and one slope."""
 
     pairs: tuple
     asked: int
@@ -50,7 +50,7 @@ def compared(scales, wrong, second=0.05, third=0.03):
 
 
 def test_correct_model_passes_if_only_two_scales_are_requested():
-    """The slope of 1.76 and the limit of 0.015 on two scales alone would not pass."""
+    """With only two scales, the slope of 1.76 and the limit of 0.015 would not pass."""
     s = np.array([1.0, 0.5])
     assert abs(difference_slope(s, 0.05 * s**2 + 0.03 * s**3, 0) - 2) > 0.1
     comparison = compared((1.0, 0.5), wrong=0.0)
@@ -67,12 +67,12 @@ def test_correct_model_passes_if_only_two_scales_are_requested():
 def test_error_of_three_thousandths_in_a_term_is_detected_from_few_scales(
     wrong, scales
 ):
-    """On two scales alone its limit is uncertain by 0.05."""
+    """With only two scales, its limit is uncertain by 0.05."""
     assert verdict(compared(scales, wrong)) == "failed"
 
 
 def test_wrong_term_that_is_cancelled_by_second_order_at_one_scale_is_detected():
-    """At s = 0.5 both cancel: -0.025 s + 0.05 s^2."""
+    """At s = 0.5, both terms cancel: -0.025 s + 0.05 s^2."""
     assert verdict(compared((1.0, 0.5), wrong=-0.025, third=0.0)) == "failed"
 
 
@@ -100,8 +100,8 @@ def test_undecided_check_is_reported_after_six_scales():
 def test_noise_against_zero_has_no_signal_and_a_signal_against_zero_fails(
     theirs, limit, expected
 ):
-    """Simulations resolve a hundredth of the floor;
-    extrapolation multiplies that by 15."""
+    """Simulations resolve a hundredth of the floor, which extrapolation multiplies by
+    15."""
     scales = (1.0, 0.5, 0.25, 0.125)
     comparison = compare_scales(scales, lambda s: Scale(s, 0.0, theirs(s)), Found)
     assert comparison.checks["limit"].verdict == limit

@@ -45,7 +45,8 @@ def test_components_below_their_deviation_are_omitted():
 
 @pytest.mark.parametrize("axis", range(6))
 def test_sensitivity_of_a_component_depends_on_its_place(axis):
-    """A base rotates the tip about its origin; a spring deforms by its wrench."""
+    """A base rotates the tip about its origin, and a spring deforms under its
+    wrench."""
     campaign = bar([0.3, -0.2, 3.0, 1.0, 5.0, -2.0], link=BEAM)
     conditions = conditions_of(campaign)
     response = responses(conditions)
@@ -56,7 +57,7 @@ def test_sensitivity_of_a_component_depends_on_its_place(axis):
     np.testing.assert_allclose(s.sensitivity("base", name, "screw"), unit, atol=1e-8)
     read = s.sensitivity("reading", name, "screw")
     assert read.tolist() == np.tile(np.eye(6)[axis], (8, 1)).tolist()
-    # the drive stands at the base's origin, in its axes
+    # The drive is at the base origin, in base axes.
     np.testing.assert_allclose(s.sensitivity("drive", name, "screw"), unit, atol=1e-8)
     load = np.tile(campaign.loads[0], (8, 1))
     load[:, :3] += np.cross(place, load[:, 3:])
@@ -64,8 +65,8 @@ def test_sensitivity_of_a_component_depends_on_its_place(axis):
     np.testing.assert_allclose(soft, load[:, axis, None] * unit, atol=1e-7)
 
 
-def test_variables_are_varied_and_known_in_every_row():
-    """Constant loads, incomplete temperatures and times of zero are no variables."""
+def test_variables_vary_and_are_known_in_every_row():
+    """Constant loads, incomplete temperatures and zero times are not variables."""
     varying = np.linspace(-1.0, 0.5, 8)
     lacking = np.where(np.arange(8) == 3, np.nan, varying)
     conditions = conditions_of(bar(
@@ -99,8 +100,8 @@ rotation = [0.0, -1.5707963267948966, 0.0]
 """
 
 
-def test_positions_and_loads_that_vary_by_rounding_are_no_variables(tmp_path):
-    """A slide rotated by pi / 2, whose cosine is 6e-17 in floating point."""
+def test_positions_and_loads_that_vary_by_round_off_are_not_variables(tmp_path):
+    """A slide is rotated by pi / 2, whose cosine is 6e-17 in floating point."""
     (tmp_path / "slide.toml").write_text(SLIDE)
     x = np.linspace(0.0, 0.5, 9).round(3)
     lines = [f"m{i},{a},{5 * a},{1e-17 * a}" for i, a in enumerate(x)]

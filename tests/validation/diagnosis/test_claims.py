@@ -1,4 +1,4 @@
-"""Effects that readings support, by closed forms on a bar."""
+"""Effects that the readings support, compared with closed forms for a bar."""
 
 from dataclasses import replace
 
@@ -27,7 +27,9 @@ from tests.bar_for_tests import (
 )
 from tests.planar_arm_for_tests import SIGMA
 
-SURE = norm.isf(0.5e-3)  # standard deviations that chance exceeds once in a thousand
+SURE = norm.isf(
+    0.5e-3
+)  # standard deviations exceeded by chance once in a thousand cases
 
 
 def first(fit):
@@ -47,7 +49,7 @@ def test_length_error_is_reported_at_a_significance_of_one_in_a_thousand(
     assert first(fit) == claimed
 
 
-def test_no_compliance_is_identified_for_a_drive_that_turns_against_its_load():
+def test_drive_that_rotates_against_its_load_has_no_identified_compliance():
     """The compliance is at its lower bound, zero, and no parameter is reported."""
     seen = np.tile([0, 0, -3e-4, 0, 0, 0], (8, 1))
     fit = machine(bar([0, 0, 30.0, 0, 0, 0], seen), SOFTER, start=1e-6)
@@ -59,7 +61,7 @@ def test_no_compliance_is_identified_for_a_drive_that_turns_against_its_load():
 
 
 def test_effect_at_its_bound_is_not_supported():
-    """The bound is 5e-4 per kelvin, which no material has."""
+    """The bound is 5e-4 per kelvin, which no material reaches."""
     heat = {"temperature": np.full(8, 5.0)}
     plain = bar(link=BEAM, **heat)
     most = 5e-4 * LENGTH * 5.0
@@ -86,7 +88,7 @@ def test_exponent_at_its_bound_is_not_supported(value, claimed):
     assert supported(fit, one) == claimed
 
 
-def test_effects_without_parameters_and_device_frames_are_supported():
+def test_parameterless_effects_and_device_frames_are_always_supported():
     fit = machine(bar(link=BEAM), LONGER)
     assert not first(fit)
     finite = Acting(Hypothesis("geometric_stiffening", (), ()), np.zeros(0))
@@ -95,7 +97,7 @@ def test_effects_without_parameters_and_device_frames_are_supported():
 
 
 def softer(robot, x, variance):
-    """A fit of 1 / factor - 1 of the link's modulus."""
+    """Return a fit of 1 / factor - 1 for the link's modulus."""
     one = hypothesis("modulus_scale", "tip", "tip.softer", Unknown("softer", 0.1))
     unknowns = Unknowns(robot, (Acting(one, np.zeros(1)),))
     C, nothing = np.array([[variance]]), np.zeros((0, 1))
@@ -103,14 +105,15 @@ def softer(robot, x, variance):
 
 
 @pytest.mark.parametrize(("declared", "value", "std"), [
-    # a factor 0.8 of which 0.9 is left: 0.72, and 0.8 times as unsure
+    # 0.9 of a factor of 0.8 is 0.72, with 0.8 times the uncertainty.
     (0.8, 0.72, 0.8 * 0.81 * 1e-3),
     (None, 0.9, 0.81 * 1e-3),
 ])  # fmt: skip
 def test_stated_deviation_is_that_of_the_factor_instead_of_the_fitted_unknown(
     declared, value, std
 ):
-    """1 / factor - 1 is fitted: the deviation of factor f is f^2 times its own."""
+    """The fitted unknown is 1 / factor - 1, so the deviation of a factor f is f^2 times
+    that of the unknown."""
     robot = bar(link=BEAM).robot
     if declared is not None:
         robot = replace(robot, effects={"modulus_scale": {"tip": declared}})
@@ -121,7 +124,7 @@ def test_stated_deviation_is_that_of_the_factor_instead_of_the_fitted_unknown(
 
 
 def test_parameter_without_readings_is_not_reported():
-    """Its deviation is that of the prior."""
+    """Its standard deviation is that of the prior."""
     robot = bar(link=BEAM).robot
     prior = softer(robot, 0.0, 1.0).unknowns.std[0] ** 2
     assert numbers(softer(robot, 0.0, prior)) == []
@@ -129,7 +132,7 @@ def test_parameter_without_readings_is_not_reported():
 
 
 def test_negative_compliance_is_bounded_at_zero():
-    """A drive that turns against its moment has zero compliance."""
+    """A drive that rotates against its moment has zero compliance."""
     M = 30.0
     seen = np.tile([0, 0, -M / 1e5, 0, 0, 0], (8, 1))
     campaign = bar(
@@ -145,7 +148,7 @@ def test_negative_compliance_is_bounded_at_zero():
 
 
 def test_nuisance_parameters_equal_ridge_regression():
-    """The mean of eight readings along the bar, shrunk by its prior."""
+    """The estimate is the mean of eight readings along the bar, shrunk by the prior."""
     size, std = 3e-6, 2e-6
     plain = bar(link=BEAM)
     campaign = bar(link=BEAM, measured=fit_of(plain, size))

@@ -1,4 +1,4 @@
-"""The command ``validation diagnose``: its files and its refusals."""
+"""The command ``validation diagnose``: output files and error messages."""
 
 import json
 
@@ -16,7 +16,7 @@ from tests.planar_arm_for_tests import measure
 
 @pytest.fixture(scope="module")
 def small(tmp_path_factory):
-    """A folder with an offset of 5e-5 rad, positions alone measured."""
+    """A folder with an offset of 5e-5 rad, in which only positions were measured."""
     folder = tmp_path_factory.mktemp("small") / "campaign"
     measure(folder, configurations=10, passes=3, offset=(0, 8e-5))
     path = folder / "measurements.csv"
@@ -73,7 +73,7 @@ def test_diagnose_does_not_save_a_robot_if_no_effect_is_identified(tmp_path, run
     assert not (tmp_path / "r.toml").exists()
 
 
-def test_diagnose_refuses_wrong_outputs_before_any_work(tmp_path, small, run):
+def test_diagnose_rejects_invalid_outputs_before_any_computation(tmp_path, small, run):
     folder = tmp_path / "folder.toml"
     folder.mkdir()
     for words, told in (

@@ -50,7 +50,7 @@ def columns():
 
 
 def moved(campaign, sizes, rng):
-    """(R, 6) [m] readings of a random motion of the platform in each measurement."""
+    """Return readings (R, 6) [m] with a random platform motion in each measurement."""
     turn, shift = (
         size * rng.normal(size=(len(campaign), 3))[campaign.measured_at_once]
         for size in sizes
@@ -68,7 +68,7 @@ def found(columns, readings, seed, device=DEVICE):
     return select(columns, z, np.ones(len(z), dtype=bool))
 
 
-# device 0.5 um, machine 5 um, stated 5 um: all of it is what the points have in common
+# Device 0.5 um, machine 5 um, stated 5 um: all of the noise is common to the points.
 @pytest.mark.parametrize(("device", "sizes"), [
     (DEVICE, (2e-4, 2e-5)), (DEVICE, (0.0, 0.0)),
     pytest.param(0.1 * DEVICE, (5e-5, 5e-6), marks=pytest.mark.slow),
@@ -79,14 +79,14 @@ def found(columns, readings, seed, device=DEVICE):
 def test_common_noise_is_identified_with_its_standard_deviations(
     columns, device, sizes
 ):
-    """60 measurements of three components determine a size to 5 %;
-    the tolerance is 25 %."""
+    """60 measurements of three components determine a standard deviation to 5 %; the
+    tolerance is 25 %."""
     rng = np.random.default_rng([7, 1])
     selected = found(columns, moved(CAMPAIGN, sizes, rng), 7, device)
     assert selected.hypotheses == selected.functions == ()
     for seen, true in zip(selected.noise.common, sizes, strict=True):
         assert seen == pytest.approx(true, rel=0.25)
-    # the prior of the stated sigma counts as 20 cells of 540
+    # The prior of the stated sigma counts as 20 of 540 cells.
     assert device / DEVICE - 0.2 < selected.noise.tau < device / DEVICE + 0.25
     told = [s for s in selected.noise.findings if "common to the points" in s]
     assert len(told) == any(sizes)
@@ -95,7 +95,7 @@ def test_common_noise_is_identified_with_its_standard_deviations(
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_length_error_is_identified_in_the_presence_of_common_noise(columns, seed):
-    """Its uncertainty is that of the mean of 60 measurements, not of 180 points."""
+    """Its uncertainty is that of the mean of 60 measurements instead of 180 points."""
     true = 2e-5
     rng = np.random.default_rng([seed, 2])
     readings = moved(CAMPAIGN, (0.0, 2e-5), rng)
@@ -138,7 +138,7 @@ def test_deviation_common_to_all_repeats_is_a_lack_of_fit(repeats):
     assert lack.significant == repeats
 
 
-# whole diagnoses of machines that another program simulated
+# Complete diagnoses of machines simulated by a different program.
 
 
 def diagnosed(robot, wanted, seed, folder):
@@ -155,7 +155,8 @@ def test_poor_repeatability_alone_does_not_lead_to_a_reported_effect(seed, tmp_p
     assert diagnosis.claimed == ()
     assert not diagnosis.fit.unknowns.functions
     sizes = table(diagnosis)["noise_scale"]["common"]
-    # 96 measurements of three components: 4 % each, and four times that
+    # 96 measurements of three components determine each to 4 %; tolerance four times
+    # that.
     assert sizes["rotation"] == pytest.approx(MACHINE[0], rel=0.2)
     assert sizes["translation"] == pytest.approx(MACHINE[3], rel=0.2)
     assert "noise common to the points of a row" in diagnosis.summary()
@@ -164,8 +165,8 @@ def test_poor_repeatability_alone_does_not_lead_to_a_reported_effect(seed, tmp_p
 
 @pytest.mark.slow
 def test_intervals_cover_the_true_values_in_the_presence_of_common_noise(tmp_path):
-    """An encoder's offset in twelve campaigns:
-    at least 8 of the 90 % intervals cover it."""
+    """For an encoder offset in twelve campaigns, at least 8 of the 90 % intervals cover
+    it."""
     covers, hidden = 0, [(Hidden("encoder_offset", {"j2": 1e-4}), 5.0)]
     for seed in range(12):
         made, diagnosis = diagnosed(

@@ -1,4 +1,4 @@
-"""Effects declared with wrong parameters: those of the machine are saved."""
+"""Effects declared with wrong parameters, for which the true ones are saved."""
 
 import json
 from dataclasses import replace
@@ -22,7 +22,7 @@ from tests.planar_arm_for_tests import SIGMA, measured
 
 LOADS = ("mx", "my", "mz", "fx", "fy", "fz")
 ROWS = 12
-# declared, and what the machine has
+# Declared effects, and those of the machine.
 WRONG = {
     "self_weight": ({"g.z": -5.0}, {"g.x": 1.0, "g.y": 0.5, "g.z": -9.81}),
     "thermal_expansion": ({"j2": 2.34e-5}, {"j2": 1.2e-5}),
@@ -79,7 +79,7 @@ WRONG = {
 
 
 def widest(campaign, name, true):
-    """The hypothesis of an effect with most unknowns, at the frames of the truth."""
+    """Return the hypothesis of an effect with the most unknowns, at the true frames."""
     listed = with_declared(hypotheses(conditions_of(campaign), LOADS), campaign.robot)
     bare = campaign.robot.without_effects()
     here = [
@@ -91,10 +91,8 @@ def widest(campaign, name, true):
 
 @pytest.mark.parametrize("name", WRONG)
 def test_fit_recovers_the_machine_in_spite_of_a_wrong_declared_effect(name):
-    """Readings of the machine without noise: its numbers, and its readings.
-
-    Softer or stiffer, longer or shorter than declared.
-    """
+    """From noise-free readings, the fit recovers the parameters and readings of a
+    machine that is softer or stiffer, longer or shorter than declared."""
     declared, true = WRONG[name]
     campaign = commanded(arm(**{name: declared}))
     weight = {"gravity.z": np.full(ROWS, -9.81)} if name == "body_mass" else {}

@@ -1,7 +1,7 @@
-"""Whole diagnoses of data that were not made by the model under test.
+"""Complete diagnoses of data that do not come from the model under test.
 
-Quick ones on a planar arm worked out by hand, slow ones on simulated campaigns: ours
-and, where the data are at hand, those of another program.
+Quick tests use a planar arm calculated by hand, slow ones simulated campaigns of this
+project and, if available, of another program.
 """
 
 import html
@@ -45,7 +45,7 @@ CASES = {
 
 @pytest.fixture(scope="module")
 def diagnosed(tmp_path_factory):
-    """A function that diagnoses a case once."""
+    """Return a function that diagnoses each case once."""
 
     @cache
     def find(name):
@@ -90,7 +90,7 @@ def test_single_effect_is_identified_with_its_value(diagnosed, tmp_path):
 
 @pytest.mark.slow
 def test_wrong_readings_of_held_out_rows_do_not_change_the_selected_model(tmp_path):
-    """The answer says that the fitted rows contain only noise."""
+    """The result states that the fitted rows contain only noise."""
     campaign = measured(tmp_path, seed=1, configurations=60, passes=1, **CASES["one"])
     held = hold_out(campaign).rows
     wrong = np.where(held[:, None], 30.0, 0.0) * SIGMA
@@ -137,12 +137,13 @@ def test_correlated_noise_widens_standard_deviations(diagnosed, tmp_path):
 
 
 def test_noise_above_sigma_is_reported_without_a_cause(diagnosed, tmp_path):
-    """The noise is three times the stated sigma, in which errors are reported."""
+    """The noise is three times the stated sigma, which is the unit of reported
+    errors."""
     exact = measured(tmp_path, noise=0.0, force=0.0, temperature=0.0)
     noise = 3.0 * SIGMA * np.random.default_rng(6).normal(size=(len(exact), 6))
     found = diagnose(replace(exact, measured=exact.measured + noise))
     assert (found.verdict, found.claimed) == ("none_needed", ())
-    # 384 cells: the standard error of an rms of so many
+    # Standard error of the rms of 384 cells.
     assert found.after.normalised == pytest.approx(3.0, rel=4 / np.sqrt(2 * 384))
     assert np.array_equal(found.campaign.sigma, exact.sigma)
     value, std = found.noise_scale
@@ -155,8 +156,8 @@ def test_noise_above_sigma_is_reported_without_a_cause(diagnosed, tmp_path):
 
 @pytest.mark.parametrize("name", ["none", "one", "pair"])
 def test_model_sequence_leads_from_the_declared_to_the_fitted_model(name, diagnosed):
-    """It has only the steps of this machine;
-    its last row is the error after the fit."""
+    """It contains only the steps of this machine, and its last row is the error after
+    the fit."""
     found = diagnosed(name)
     terms = {"none": []}.get(name, ["library effects"])
     assert [step.term for step in found.sequence] == ["declared", *terms]
@@ -190,7 +191,8 @@ def test_two_effects_are_identified_together_with_their_values(diagnosed, tmp_pa
 
 
 def test_constant_temperature_makes_expansion_and_length_ambiguous(diagnosed):
-    """The equivalent effects and the temperature that separates them are named."""
+    """The result names the equivalent effects and the temperature that separates
+    them."""
     found = diagnosed("confounded")
     assert (found.verdict, found.claimed) == ("ambiguous", ())
     best = {names for names, p in found.alternatives if p > 0.3}
@@ -203,7 +205,8 @@ def test_constant_temperature_makes_expansion_and_length_ambiguous(diagnosed):
 
 @pytest.mark.slow
 def test_unknown_registration_with_outliers_and_gaps_is_explained(diagnosed):
-    """The first drive's offset is part of the device frame; the second's is found."""
+    """The offset of the first drive is part of the device frame; that of the second is
+    found."""
     found = diagnosed("device")
     assert (found.verdict, found.claimed) == ("explained", ("encoder_offset",))
     value, std = numbers(found, "encoder_offset")["two"]
@@ -216,7 +219,7 @@ def test_unknown_registration_with_outliers_and_gaps_is_explained(diagnosed):
 
 @pytest.mark.slow
 def test_model_selected_on_a_subset_is_fitted_to_all_rows(tmp_path, monkeypatch):
-    """Parameters are more certain than from the subset; all outliers are found."""
+    """Parameters are more accurate than from the subset, and all outliers are found."""
     campaign = measured(tmp_path / "device", seed=1, **CASES["device"])
     monkeypatch.setattr(trace, "_SEARCHED", 30)
     found = diagnose(campaign)
@@ -235,7 +238,7 @@ ODD = ("$x^{<b>&_\\$", "a$b_ \\frac{<i>")  # a formula and a tag to other progra
 
 
 def test_diagnosis_report_shows_unusual_names_unchanged(diagnosed):
-    """Names of a frame, a covariate and an outlying row look like formulas and tags."""
+    """The names of a frame, a covariate and an outlier look like formulas and tags."""
     found = diagnosed("none")
     first, *others = found.campaign.robot.frames
     named = (
@@ -267,14 +270,14 @@ def test_simulated_campaigns_get_an_accepted_verdict(name):
     truth = TRUTH[name]
     found = diagnose(read_campaign(CAMPAIGNS / name))
     accepted = set(truth["accept_verdicts"])
-    if "outside_library" in accepted:  # what is learned is no effect of the library
+    if "outside_library" in accepted:  # learned functions are not library effects
         accepted.add("learned")
     assert found.verdict in accepted
     sets = [tuple(sorted(names)) for names in truth["accept_effects"]]
     if found.verdict == "explained":
         assert tuple(sorted(found.claimed)) in sets
         kept = 6 * int((found.held.rows & ~found.outliers).sum())
-        # noise alone: three standard deviations of an rms of so many cells
+        # Noise alone: three standard deviations of the rms of that many cells.
         assert found.after.normalised < 1 + 3 / np.sqrt(2 * kept)
     if found.verdict == "ambiguous":
         listed = [names for names, _ in found.alternatives]
@@ -283,11 +286,10 @@ def test_simulated_campaigns_get_an_accepted_verdict(name):
 
 @pytest.mark.slow
 def test_practice_campaigns_of_another_program_score_without_error(tmp_path):
-    """The program that came with them computes the score: parameters within 3 std.
-
-    The error after is at most 1.15 of that of a perfect model, which is 2.6 standard
-    deviations of the rms of 25 rows of noise.
-    """
+    """The program that came with the campaigns computes the score: parameters must be
+    within 3 standard deviations.  The error after the diagnosis is at most 1.15 times
+    that of a perfect model, which is 2.6 standard deviations of the rms of 25 rows of
+    noise."""
     try:
         practice = data_folder("practice")
     except BadInput as error:

@@ -1,4 +1,4 @@
-"""Diagnosis of difficult campaigns against known facts about their machines."""
+"""Diagnosis of difficult campaigns, compared with known facts about their machines."""
 
 from dataclasses import replace
 from functools import cache
@@ -25,7 +25,7 @@ FOLDERS = [CASES / name for name in (
 
 @pytest.fixture(scope="module")
 def diagnosed():
-    """A function that diagnoses a folder once."""
+    """Return a function that diagnoses each folder once."""
 
     @cache
     def find(folder):
@@ -83,7 +83,8 @@ def test_clearance_in_a_leg_is_explained_as_clearance(diagnosed):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["fb_wear", "fb_gear"])
 def test_effects_outside_the_library_are_learned_as_functions(name, diagnosed):
-    """A rod that grows with time and a gear's waves are learned down to the noise."""
+    """A rod that grows with time and the harmonics of a gear are learned down to the
+    noise."""
     found = diagnosed(CASES / name)
     assert (found.verdict, found.claimed) == ("learned", ())
     assert found.after.normalised < 1.2
@@ -91,6 +92,7 @@ def test_effects_outside_the_library_are_learned_as_functions(name, diagnosed):
 
 @pytest.mark.slow
 def test_scatter_of_repeats_is_not_reported_as_drift(diagnosed):
-    """Errors are in units of the stated sigma, and hysteresis is not a drift."""
+    """Errors are in units of the stated sigma, and hysteresis is not reported as
+    drift."""
     found = diagnosed(CASES / "hyst")
     assert not set(found.claimed) & {"drift", "encoder_eccentricity"}

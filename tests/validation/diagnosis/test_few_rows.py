@@ -1,4 +1,4 @@
-"""Too few rows: the diagnosis makes no claim and states the number of rows needed."""
+"""With too few rows, a diagnosis claims nothing and states the number required."""
 
 from dataclasses import replace
 
@@ -30,7 +30,7 @@ def seen(rows, seed, unlike=0.0):
     "seed", [1, *(pytest.param(k, marks=pytest.mark.slow) for k in (2, 3))]
 )
 def test_eight_rows_of_a_target_are_reported_as_too_few(seed):
-    """24 readings against twenty unknowns of geometry."""
+    """There are 24 readings and twenty geometric unknowns."""
     found = diagnose(seen(8, seed))
     assert found.verdict == NOT_ENOUGH_ROWS
     assert found.claimed == ()
@@ -55,7 +55,7 @@ def test_diagnosis_with_the_requested_number_of_rows_finds_the_effect():
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [4, 5])
 def test_random_readings_are_not_explained(seed):
-    """Random readings of a hundred sigma, in 8 or 16 rows."""
+    """8 or 16 rows contain random readings of a hundred sigma."""
     for rows in (8, 16):
         found = diagnose(seen(rows, seed, unlike=100.0))
         assert found.verdict in {NOT_ENOUGH_ROWS, "outside_library"}

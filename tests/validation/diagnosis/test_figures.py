@@ -1,4 +1,4 @@
-"""Drawing of the robot on the page of a diagnosis, against its readings."""
+"""Drawing of the robot on a diagnosis page, compared with its readings."""
 
 from dataclasses import replace
 
@@ -18,7 +18,8 @@ def diagnosed(tmp_path_factory):
 
 
 def test_drawn_robot_is_at_its_measured_pose(diagnosed):
-    """Within five sigma of the reading; the declared model is off by twenty sigma."""
+    """It is within five sigma of the reading, whereas the declared model is off by
+    twenty."""
     row, name = worst_row(diagnosed)
     assert name == "position"
     aside = diagnosed.held.rows & ~diagnosed.outliers

@@ -1,4 +1,4 @@
-"""An arm with errors of frames so large that second-order terms are visible.
+"""An arm with frame errors so large that second-order terms are visible.
 
 Its readings are products of homogeneous transforms, SciPy's; 1e-2 rad and 2 mm squared
 are ten times the noise.

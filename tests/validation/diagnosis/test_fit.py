@@ -1,4 +1,4 @@
-"""Parameters of a robot fitted together, on a bar with closed forms."""
+"""Joint fit of robot parameters, compared with closed forms for a bar."""
 
 import numpy as np
 import pytest
@@ -40,7 +40,8 @@ def test_fitted_length_is_the_mean_of_the_readings_along_the_bar(start):
 
 
 def test_uncertainty_of_a_stiffness_follows_from_that_of_its_compliance():
-    """Rotation M / k and shift M L / k in every row; std k = k^2 std(1 / k)."""
+    """Every row reads the rotation M / k and the shift M L / k; std k = k^2 std(1 /
+    k)."""
     M, k = 30.0, 2e5
     campaign = gives_way(M, k)
     fit = machine(campaign, SOFTER, start=1e-6)
@@ -68,7 +69,7 @@ def test_standard_deviation_follows_from_the_slopes_at_the_fitted_value():
 
 
 def test_intervals_cover_the_true_value_at_the_stated_rate():
-    """One standard deviation in 68 %, of 60 campaigns."""
+    """In 68 % of 60 campaigns, the true value is within one standard deviation."""
     rng = np.random.default_rng(8)
     inside = 0
     shape = fit_of(bar(link=BEAM), 2e-5)
@@ -103,7 +104,7 @@ def test_fitted_offset_is_exact_for_a_large_deflection():
 
 
 def test_finite_model_needs_no_geometric_stiffening():
-    """The arm of the load turns so far that the first order is not sufficient."""
+    """The lever arm of the load rotates so far that first order is insufficient."""
     noise = np.random.default_rng(5).normal(size=(20, 6)) * SIGMA
     campaign = deflected(0.0, noise)
     linear, finite = diagnose(campaign), diagnose(campaign, finite=True)

@@ -1,4 +1,4 @@
-"""Algebra of the Gaussian model, against the density of the normal distribution."""
+"""Algebra of the Gaussian model, compared with the normal density."""
 
 import numpy as np
 import pytest

@@ -1,7 +1,7 @@
-"""Effects of real machines, hidden in simulated ones: found, named and predicted.
+"""Effects of real machines that are hidden in simulated ones and must be identified.
 
-The simulation shares no code with the effects.  Fresh rows are of the same machine at
-other configurations, unknown to the diagnosis.
+The simulation shares no code with the effects. Fresh rows belong to the same machine at
+configurations unknown to the diagnosis.
 """
 
 from dataclasses import replace
@@ -27,7 +27,7 @@ SLIDE = np.diag([np.inf] * 5 + [3e6])
 POINT = (0.02, 0.05, 0.03)
 DESIGN = CampaignDesign(24, 116, load=40.0, reach=0.8, reference_point=POINT)
 LONG = replace(DESIGN, reach=1.0, size=0.1)  # slides of 0.2 m
-NEAR = 3.0  # standard deviations, within which a number is the true one
+NEAR = 3.0  # standard deviations within which a value counts as correct
 
 
 def longer_arm():
@@ -57,7 +57,8 @@ def gantry():
 
 @pytest.fixture
 def hidden(tmp_path):
-    """Diagnosis of a machine with an effect five times the noise, and its truth."""
+    """Return the diagnosis of a machine with an effect five times the noise, and the
+    truth."""
 
     def find(robot, name, parameters, design=DESIGN, units=""):
         robot, effect = with_errors(robot), Hidden(name, parameters)
@@ -105,7 +106,8 @@ LEAD = {"y.amplitude": 1e-5, "y.phase": 0.7, "y.period": 0.012}
 
 
 def test_lead_error_of_a_screw_is_identified_with_its_period(hidden):
-    """The period within 1 %, a sin(2 pi y/p + f) as its sine and its cosine."""
+    """The period is found within 1 %, and a sin(2 pi y/p + f) as a sine and a
+    cosine."""
     found, true = hidden(gantry(), "_lead", LEAD, LONG)
     values, std = only(found, where="y", form="waves", of=["q.y"])
     assert values["period"] == pytest.approx(0.012, rel=0.01)

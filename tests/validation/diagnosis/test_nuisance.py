@@ -23,7 +23,7 @@ def loaded():
 
 
 def of_both_kinds(campaign, conditions, response):
-    """Geometric errors and springs that are no effect of the library."""
+    """Return geometric errors and springs that are not library effects."""
     small = nuisance(
         campaign, conditions, response, np.zeros((campaign.cells.sum(), 0))
     )
@@ -39,7 +39,7 @@ def test_nuisance_parameters_are_the_visible_geometry_and_springs_with_bounds(lo
     # 0.2 rad and a tenth of the longest body
     assert geometry.most == pytest.approx([*[0.2] * 3, *[0.1 * LENGTH] * 3] * 2)
     assert (springs.most == np.inf).all()
-    # of the platform, no spring; the drive carries 4 N m about z
+    # The platform has no spring; the drive carries 4 N m about z.
     assert set(springs.frame.tolist()) == {0}
     assert set(springs.axis.tolist()) == {0, 1, 2, 5}
 
@@ -90,7 +90,7 @@ def test_nuisance_columns_sum_to_the_readings_of_a_changed_robot(loaded):
     assert robot.errors[geometry.frame, geometry.axis].tolist() == x.tolist()
 
 
-def test_springs_of_no_compliance_stay_as_declared():
+def test_rigid_springs_keep_their_declared_stiffness():
     robot = Robot("a", "tip", (Frame("one", joint="revolute"), Frame("tip", "one")))
     first, axes = np.zeros(2, int), np.array([0, 1])
     same = with_compliance(robot, first, axes, np.array([0.0, -1e-6]))

@@ -15,7 +15,7 @@ from forcefit.validation.diagnosis.signatures import conditions_of, whiten
 from tests.campaigns_for_tests import campaign_of
 from tests.planar_arm_for_tests import SIGMA
 
-# is what is left noise?
+# Test whether the residual is noise.
 
 
 def noisy(rng, rows=40, sets=10, size=1.0):
@@ -26,7 +26,7 @@ def noisy(rng, rows=40, sets=10, size=1.0):
 
 
 def test_lack_of_fit_probabilities_of_noise_are_uniform(rng):
-    """The rate of false alarms is the stated one."""
+    """False alarms occur at the stated rate."""
     found = []
     for _ in range(300):
         campaign = noisy(rng)
@@ -87,7 +87,7 @@ def test_same_command_at_another_temperature_is_not_a_repeat(from_zero):
     assert (found.repeats_freedom, found.repeats) == (1, pytest.approx(np.sqrt(2)))
 
 
-def test_noise_above_the_stated_sigma_is_no_lack_of_fit(rng):
+def test_noise_above_the_stated_sigma_is_not_a_lack_of_fit(rng):
     campaign = noisy(rng, 120, 20, size=2.0)
     found = lack_of_fit(campaign, whiten(campaign, campaign.measured), 0)
     assert found.probability < SIGNIFICANT
@@ -114,7 +114,7 @@ def test_large_residuals_are_outliers(rng):
     assert np.flatnonzero(outlying(campaign_of(z), z.ravel())).tolist() == [3, 20]
 
 
-# what is left
+# Trends of the residual.
 
 
 def varied(rng, rows=120):

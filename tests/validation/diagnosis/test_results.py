@@ -1,4 +1,4 @@
-"""The public format of a made-up diagnosis, number by number."""
+"""The public format of a mock diagnosis, value by value."""
 
 from dataclasses import replace
 from types import SimpleNamespace

@@ -113,7 +113,7 @@ def test_held_out_readings_change_only_the_stated_errors(found, change):
         assert not again.claimed
 
 
-def test_saved_robot_keeps_the_measured_point(found, saved):
+def test_saved_robot_preserves_the_measured_point(found, saved):
     """Predictions at another point report the point of identification."""
     point = tuple(found.campaign.reference_point.tolist())
     assert saved.reference_point == pytest.approx(point)
@@ -181,11 +181,11 @@ def test_unmeasured_components_are_reported_as_uncertain(tmp_path):
     fresh = read(commanded(robot, 30, seed=11, reach=1.4), seed=12)
     told = predict(fresh)
     left = fresh.measured - told.prediction.deviation
-    # nothing is predicted surely in directions that were never seen
+    # Predictions in directions that were never measured are uncertain.
     assert np.median(told.spread[:, 3:5]) > 3 * SIGMA[3]
     inside = np.abs(left) < 2.6 * np.hypot(told.spread, told.noise)
     assert np.mean(inside[:, 3:]) > 0.9
-    # what is said of all rows is of the component that was measured
+    # Statements about all rows refer to the measured component.
     std = told.table()["std"]
     assert std["position"] == pytest.approx(np.sqrt(np.mean(told.spread[:, 5] ** 2)))
     assert np.isnan(std["rotation"])

@@ -1,4 +1,4 @@
-"""The search of a diagnosis, on a drive and a bar with closed forms."""
+"""Model search of a diagnosis, for a drive and a bar with closed forms."""
 
 from dataclasses import replace
 
@@ -51,7 +51,7 @@ def test_longer_bar_is_identified_with_its_length_error(columns):
     assert selected.values[0] == pytest.approx(8 * sigma, abs=4 * sigma / 30**0.5)
 
 
-def test_waves_of_a_gear_are_identified_with_their_number_per_turn(columns):
+def test_gear_harmonics_are_identified_with_their_number_per_turn(columns):
     sigma = CAMPAIGN.sigma[0, 3]
     selected = found(columns, turned(12 * sigma * np.sin(5 * TURN + 0.4)))
     assert selected.hypotheses == ()
@@ -80,10 +80,12 @@ def test_model_search_excludes_outliers(columns):
     assert (selected.weights < 0.5).sum() == 3
 
 
-def test_effects_that_are_visible_only_by_rounding_are_excluded():
+def test_effects_that_are_visible_only_through_round_off_are_excluded():
     campaign = bar(link=BEAM, rows=ROWS, spread=0.0, time=TIME)
     measured = np.full((ROWS, 6), np.nan)
-    measured[:, 3] = 0.0  # along the bar: turning the drive moves it by rounding
+    measured[:, 3] = (
+        0.0  # along the bar, which a drive rotation changes only by round-off
+    )
     campaign = replace(campaign, measured=measured)
     known = columns_of(campaign)
     assert (("drive", "rz", "screw"),) not in known.functions.places.names

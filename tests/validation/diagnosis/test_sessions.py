@@ -146,7 +146,7 @@ def test_drift_is_identified_for_each_session(tmp_path):
 
 @pytest.mark.slow
 def test_per_session_effects_are_read_from_the_campaign(tmp_path):
-    """The load cell has another gain in each session, 10 % and -8 %."""
+    """The gain of the load cell differs between sessions, by 10 % and -8 %."""
     gains = {"monday": 1.1, "tuesday": 0.92}
     hidden = {s: [Hidden("load_gain", {"factor": g})] for s, g in gains.items()}
     folder = measured(tmp_path, hidden)
@@ -164,14 +164,15 @@ def test_per_session_effects_are_read_from_the_campaign(tmp_path):
     ('"load_gain"', "per_session: found"),
     ("[3]", "found 3, expected an effect"),
 ])  # fmt: skip
-def test_wrong_per_session_effect_is_refused(given, message, tmp_path):
+def test_invalid_per_session_effect_is_rejected(given, message, tmp_path):
     folder = write_campaign(tmp_path / "days", toml={"per_session": given})
     with pytest.raises(BadInput, match=re.escape(message)):
         read_campaign(folder)
 
 
 def in_two_tables(folder, shift):
-    """An arm on two days: humidity is recorded on one, temperature on the other."""
+    """An arm is measured on two days, with humidity recorded on one and temperature on
+    the other."""
     rng = np.random.default_rng(3)
     days = {"dry": "temperature", "wet": "humidity"}
     tables = '["dry.csv", "wet.csv"]'

@@ -41,7 +41,7 @@ class Machine:
 
     Attributes:
         q: (R, drives) commands; loads: (R, 6).
-        points, turns: what a device sees, in its own axes.
+        points, turns: positions and rotations measured by a device, in its axes.
     """
 
     def __init__(self, rng, name="arm6", spread=0.5, unknown=False, noise=1e-5,
@@ -95,7 +95,7 @@ def found(campaign):
 
 
 def said(campaign):
-    """Kinds and columns of what is found."""
+    """Return the kinds and columns of the reported blunders."""
     return {(one.kind, one.columns) for one in found(campaign)}
 
 
@@ -154,7 +154,7 @@ LOADS = tuple(f"load.{c}" for c in ("mx", "my", "mz", "fx", "fy", "fz"))
      (9.81, "unit", "times 0.1019"), (1e-3, "unit", "times 1000"),
      (1e3, "unit", "times 0.001")],
 )  # fmt: skip
-def test_loads_given_as_reactions_or_in_another_unit_are_reported(
+def test_loads_given_as_reactions_or_in_a_wrong_unit_are_reported(
     rng, factor, kind, words
 ):
     machine = Machine(rng, force=1e3, unknown=True)
@@ -169,7 +169,7 @@ def test_loads_given_as_reactions_or_in_another_unit_are_reported(
     [(25.4, "times 0.03937"), (1 / 25.4, "times 25.4"), (1e3, "times 0.001"),
      (1e-3, "times 1000")],
 )  # fmt: skip
-def test_positions_in_another_unit_are_reported(rng, factor, words):
+def test_positions_in_a_wrong_unit_are_reported(rng, factor, words):
     machine = Machine(rng, unknown=True)
     machine.points = factor * machine.points
     (one,) = found(machine.campaign())
@@ -206,7 +206,7 @@ def test_misread_rotations_are_reported(rng, change, kind, words):
 )  # fmt: skip
 @pytest.mark.parametrize("unknown", [False, True])
 def test_no_set_up_mistake_is_reported_for_an_inaccurate_machine(rng, name, unknown):
-    """Errors of a millimetre, a hundred sigma, are no blunder."""
+    """Errors of a millimetre, a hundred sigma, are not blunders."""
     machine = Machine(rng, name, spread=0.005, unknown=unknown)
     assert said(machine.campaign(rotations=True)) == set()
 
@@ -280,7 +280,7 @@ def test_transposed_commanded_rotations_are_reported(rng):
 
 
 @pytest.mark.slow
-def test_commanded_positions_in_another_unit_are_reported(rng):
+def test_commanded_positions_in_a_wrong_unit_are_reported(rng):
     """Positions are 25.4 times too large; struts have no limits."""
     machine = Machine(rng, "hexapod", spread=0.01)
 

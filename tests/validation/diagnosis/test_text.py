@@ -1,4 +1,4 @@
-"""Terminal text of a made-up diagnosis, line by line."""
+"""Terminal text of a mock diagnosis, line by line."""
 
 from types import SimpleNamespace
 
@@ -70,7 +70,7 @@ def test_diagnosis_text_omits_absent_sections(shown):
         ["before", "after", "noise", "saved"],
         ["position", "[m]", "3e-05", "1e-05", "5e-06", "8e-06"],
         ["rotation", "[rad]", "2e-06", "-", "1e-06", "3e-06"],
-        # more than one sigma where the points of a row have some in common
+        # More than one sigma, because the points of a row share noise.
         ["normalised", "[sigma]", "7", "1.5", "1.2", "1"],
     ]
     assert [line.split() for line in said[at + 10 :]] == [
@@ -81,7 +81,7 @@ def test_diagnosis_text_omits_absent_sections(shown):
 
 
 def test_errors_with_outliers_are_printed_only_for_held_out_outliers(shown):
-    """An outlier among the fitted rows is named all the same."""
+    """An outlier among the fitted rows is still named."""
     fitted = shown(outliers=["m1"])
     assert "left out as outliers: m1" in fitted
     assert not any(line.startswith("with outliers") for line in fitted)

@@ -1,4 +1,4 @@
-"""Trends of a residual, against F tests by another routine."""
+"""Trends of a residual, compared with F tests by a different routine."""
 
 from dataclasses import replace
 
@@ -72,7 +72,8 @@ def functions(campaign):
 
 
 def by_least_squares(X, z):
-    """Share and F test of functions beside a constant, component by component."""
+    """Return fraction and F test of functions in addition to a constant, by
+    component."""
     squares, unknowns = np.zeros(2), np.zeros(2)
     for column in z.T:
         known = np.isfinite(column)
@@ -97,7 +98,7 @@ def test_probability_of_every_trend_equals_an_f_test(varied, monkeypatch):
     monkeypatch.setattr(module, "_MOST", 100)
     found = trends(varied, conditions_of(varied), varied.measured * varied.sigma)
     every = functions(varied)
-    # what stays zero is no function of the rows
+    # Variables that stay zero are not tested.
     moving = {n: X for n, X in every.items() if np.any(np.ptp(X, axis=0) > 1e-12)}
     assert {t.against for t in found} == moving.keys()
     for trend in found:

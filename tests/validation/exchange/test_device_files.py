@@ -1,7 +1,7 @@
-"""Exports of devices' programs, all with the same exact readings.
+"""Exports of device programs, all with the same exact readings.
 
-The readings come from the planar arm's closed form, so a campaign made of any of these
-files has deviations that are rounding.
+The readings come from the closed form of a planar arm, so campaigns imported from any
+of these files have deviations of the order of round-off.
 """
 
 import json
@@ -48,7 +48,7 @@ def refused(lab, run, text):
 
 
 def assert_exact(lab, readings=None):
-    """Check that deviations are rounding, and the number of readings."""
+    """Check the number of readings and that deviations are round-off."""
     campaign = read_campaign(lab.folder / "campaign")
     assert np.nanmax(np.abs(campaign.measured[:, 3:])) < 1e-9
     if readings is not None:
@@ -256,7 +256,9 @@ def test_units_of_commands_must_match_their_quantity(lab, run, column, message):
 
 
 @pytest.mark.parametrize("nothing", ["NaN", "", "-", "#N/A"])
-def test_reading_without_coordinates_is_missing_and_keeps_its_place(lab, run, nothing):
+def test_reading_without_coordinates_is_missing_but_counts_in_the_order(
+    lab, run, nothing
+):
     """Joined by order, later readings belong to later commands."""
     lab.targets("A")
     body = list(points("A", "A;{x!r};{y!r};{z!r}"))
@@ -276,7 +278,7 @@ def test_repeated_reading_is_left_out_and_reported(lab, run):
     assert 'line 40 ("Main::p1::B"): this reading occurs twice' in line
 
 
-def test_surplus_reading_is_refused_with_its_line(lab, run):
+def test_surplus_reading_is_rejected_with_its_line(lab, run):
     """Joined by order, a repeated line shifts all later readings."""
     body = list(points("A", "{name} {x!r} {y!r} {z!r}"))
     lab.targets("A")
@@ -296,7 +298,7 @@ def test_duplicate_commands_are_reported(lab, run):
     assert 'found column "q.one" twice' in refused(lab, run, body)
 
 
-# -- lengths and axes that are not what they are taken for ---------------------------
+# -- lengths and axes with a wrong interpretation -------------------------------------
 
 
 def changed(change):
@@ -310,13 +312,13 @@ def changed(change):
     (1e-3, "if multiplied by 1000, as m taken for mm"),
     (1 / 304.8, "if multiplied by 304.8, as ft taken for mm"),
 ])  # fmt: skip
-def test_lengths_of_another_unit_are_refused_with_the_factor(lab, run, factor, words):
+def test_lengths_in_a_wrong_unit_are_rejected_with_the_factor(lab, run, factor, words):
     line = refused(lab, run, changed(lambda p: factor * p))
     assert f"unit: the readings fit much better {words}" in line
 
 
 @pytest.mark.parametrize("axis", range(3))
-def test_left_handed_coordinates_are_refused(lab, run, axis):
+def test_left_handed_coordinates_are_rejected(lab, run, axis):
     mirror = np.ones(3)
     mirror[axis] = -1
     line = refused(lab, run, changed(lambda p: mirror * p))
@@ -338,7 +340,7 @@ def test_reversed_axis_of_a_known_registration_is_reported(lab, run, change, wor
     assert words in line
 
 
-def test_targets_declared_in_millimetres_are_refused_with_the_factor(lab, run):
+def test_targets_declared_in_millimetres_are_rejected_with_the_factor(lab, run):
     text = (lab.folder / "smr.toml").read_text()
     head = text.split("[targets]")[0]
     places = [f"{n} = {[1e3 * x for x in at]}" for n, at in TARGETS.items()]
@@ -379,7 +381,7 @@ def test_readings_that_do_not_match_targets_or_commands_are_reported(lab, run, c
 
 
 @pytest.mark.parametrize("piece", ["[", "(", " [", "0", "<body>"])
-def test_very_long_cell_is_refused_with_its_line(lab, run, piece):
+def test_very_long_cell_is_rejected_with_its_line(lab, run, piece):
     lines = list(points(line=SPATIAL_ANALYZER))
     lines[1] += piece * 200_000 + "x"
     line = refused(lab, run, "\n".join(lines))
@@ -465,7 +467,7 @@ def test_rotations_relative_to_a_declared_mount_are_unchanged(lab, run, rng):
     ("rx,ry,rz", lambda R: [1, 2, 3], {"orientation": '"zzx"'},
      "orientation: found"),
 ])  # fmt: skip
-def test_ambiguous_orientations_are_refused(lab, run, head, values, keys, message):
+def test_ambiguous_orientations_are_rejected(lab, run, head, values, keys, message):
     lab.targets("A", noise_rotation=1e-4, **keys)
     text = "\n".join(["X,Y,Z," + head, *oriented_rows(values)])
     assert message in refused(lab, run, text)
@@ -497,7 +499,7 @@ def test_orientation_of_one_target_is_that_of_the_platform(lab, run):
 # -- cells and clocks ---------------------------------------------------------------
 
 
-def test_binary_file_is_refused(tmp_path):
+def test_binary_file_is_rejected(tmp_path):
     path = tmp_path / "a.txt"
     path.write_bytes(b"\x89PNG\r\n\x1a\n" + bytes(40) + b"name,x,y,z")
     with pytest.raises(BadInput, match="found the character NUL"):

@@ -1,4 +1,4 @@
-"""A tracker's files to a campaign, with a known device frame."""
+"""Import of tracker files as a campaign, with a known device frame."""
 
 import csv
 import json
@@ -13,7 +13,7 @@ from tests.campaigns_for_tests import ARM
 
 TARGETS = {"A": (0.0, 0.0, 0.1), "B": (0.1, 0.02, 0.0), "C": (0.0, 0.07, 0.03)}
 ANGLES = [(0.1 * k, 0.3 + 0.17 * k) for k in range(-6, 7)]
-TURN = Rotation.from_rotvec([0.4, -1.1, 2.0])  # where the device stands
+TURN = Rotation.from_rotvec([0.4, -1.1, 2.0])  # pose of the device
 SHIFT = np.array([2.0, -3.0, 0.7])
 
 
@@ -89,7 +89,7 @@ SPATIAL_ANALYZER = "Main::p{k}::{name}, {x!r}, {y!r}, {z!r}"
 
 
 def test_spatial_analyzer_text_is_joined_to_commands_by_name(lab, run):
-    """With exact readings deviations are rounding, and the device frame is found."""
+    """With exact readings, deviations are round-off and the device frame is found."""
     lab.export("// a comment\n" + "\n".join(points(line=SPATIAL_ANALYZER)))
     status, out, err = run(*lab.words(), "--json", "-")
     assert status == 0, err
@@ -191,7 +191,7 @@ def test_exchanged_targets_and_outliers_are_left_out_and_reported(lab, run, rng)
     assert columns["meas.C.tx"][row] != ""
 
 
-def test_targets_exchanged_in_every_row_are_refused(lab, run):
+def test_targets_exchanged_in_every_row_are_rejected(lab, run):
     lines = [line.translate(str.maketrans("AB", "BA"))
              for line in points(line=SPATIAL_ANALYZER)]  # fmt: skip
     lab.export("\n".join(lines))
@@ -255,7 +255,7 @@ def test_names_with_any_separator_are_assigned_to_targets_and_commands(line, lab
     ("A 1 2 3", {"robot": None}, "robot: missing"),
     ("A 1 2 3", {"windw": 3}, 'unknown key "windw"; did you mean "window"?'),
 ])  # fmt: skip
-def test_wrong_device_file_is_refused_in_one_line(lab, run, text, targets, message):
+def test_invalid_device_file_is_rejected_in_one_line(lab, run, text, targets, message):
     lab.targets(**targets)
     lab.export(text)
     status, out, err = run(*lab.words())
@@ -270,7 +270,7 @@ def test_wrong_device_file_is_refused_in_one_line(lab, run, text, targets, messa
     ("id,q.one,q.two [grad]", 'found the unit "grad"'),
     ("ids,q.one,q.two", 'unknown column "ids"'),
 ])  # fmt: skip
-def test_wrong_table_of_commands_is_refused_in_one_line(lab, run, head, message):
+def test_invalid_table_of_commands_is_rejected_in_one_line(lab, run, head, message):
     lab.commands(head=head)
     lab.export("\n".join(points(line=SPATIAL_ANALYZER)))
     status, _, err = run(*lab.words())

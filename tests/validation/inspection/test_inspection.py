@@ -27,7 +27,7 @@ HEAD = ",".join([
 
 
 def elastic_campaign(folder, rng, temperature=None, heat=0.0, device=None, **more):
-    """Twelve configurations of an elastic arm under two loads, each twice, with noise.
+    """Twelve configurations of an elastic arm, each measured twice under two loads.
     ``heat`` [1/K] lengthens both arms; ``device`` is where the measuring device
     stands."""
     q = rng.uniform(-1, 1, (12, 2)) + [0.0, 1.2]
@@ -63,7 +63,7 @@ def test_table_of_an_inspection_has_a_row_for_each_effect(tmp_path):
 
 
 def texts(campaign):
-    """All sentences on a campaign's design, by subject and weight."""
+    """Return all remarks on a campaign's design, with subject and level."""
     repeats = revisits(campaign, campaign.repeat)
     visits = revisits(campaign, campaign.configuration)
     noise = repeat_noise(campaign)
@@ -72,7 +72,7 @@ def texts(campaign):
 
 
 def sound(rng, **changes):
-    """A design without weakness, with changes by name."""
+    """Return a design without weaknesses, except for the given changes."""
     rows = 60
     kinds = np.concatenate([rng.permutation(20) for _ in range(3)])
     loads = np.zeros((rows, 6))
@@ -111,7 +111,7 @@ SAYINGS = {
     "stuck": ({"measured": STILL}, "readings careful: rx reads the same in every row"),
     "nothing twice": ({"repeat": np.arange(60)}, "repeats lost: Nothing was measured"),
     "in a row": ({"repeat": np.repeat(np.arange(20), 3)},
-        "repeats careful: Repeats were measured in a row"),
+        "repeats careful: Repeats were measured consecutively"),
     "in one go": ({"repeat": np.repeat(np.arange(20), 3)},
         "configurations lost: Every configuration was measured without a break"),
     "one configuration": ({"repeat": np.zeros(60, dtype=int)},
@@ -139,13 +139,12 @@ def test_design_without_weaknesses_has_one_remark(rng):
     """The only remark is that each configuration has one load."""
     found = [t for t in texts(sound(rng)) if " fine: " not in t]
     assert found == [
-        "load careful: No configuration was measured under two loads: effects of "
-        "the load and effects of the configuration are distinguished by the model "
-        "alone."
+        "load careful: No configuration was measured under two loads: only the model "
+        "separates effects of the load from effects of the configuration."
     ]
 
 
-def test_consecutive_outliers_are_remarked(rng):
+def test_consecutive_outliers_cause_a_remark(rng):
     """Six readings 30 sigma off at once, or spread over the session."""
     for rows, sentence in (
         (range(10, 16), "suspects careful: Readings far from their repeats follow"),
@@ -176,7 +175,7 @@ def test_constant_temperature_does_not_separate_expansion_from_length(tmp_path, 
 
 
 def test_unknown_registration_absorbs_the_first_encoder_offset(tmp_path, rng):
-    """Rotating the first joint about the base's z axis is equivalent to base.rz."""
+    """Rotating the first joint about the base z axis is equivalent to base.rz."""
     known = inspect_campaign(elastic_campaign(tmp_path / "a", rng)).separability
     i = known.names.index("encoder_offset")
     assert known.rank[i] == 2
@@ -259,7 +258,7 @@ def test_inspect_writes_every_section(tmp_path, rng, run):
     assert "This campaign cannot determine:" in out
 
 
-def test_dh_table_without_alpha_is_remarked(tmp_path):
+def test_dh_table_without_alpha_causes_a_remark(tmp_path):
     flat = ARM.replace("translation = [1.0, 0, 0]\n", "dh = { a = 1.0 }\n")
     assert flat != ARM
     campaign = read_campaign(write_campaign(tmp_path / "campaign", robot=flat))

@@ -1,4 +1,4 @@
-"""Planned campaigns: the criterion in closed form, and the file."""
+"""Planned campaigns: closed form of the criterion, and the written file."""
 
 import csv
 import json
@@ -22,7 +22,7 @@ def blocks(seed=0):
     return [rng.normal(size=(2 * ROWS, k)) for k in (1, 2, 1)]
 
 
-def test_criterion_of_two_unknowns_is_the_schur_complement():
+def test_identifiability_criterion_for_two_unknowns_equals_the_schur_complement():
     """a'a - (a'b)^2 / (b'b + 1)."""
     a, _, b = blocks()
     apart = _Criterion(blocks(), ROWS).apart(np.arange(ROWS))
@@ -57,7 +57,7 @@ def test_plan_writes_a_campaign_with_empty_readings(tmp_path, run):
     ("--position", "0", "--position: found 0, expected a finite number > 0 [m]"),
     ("--temperature", "hot", 'temperature: found "hot", expected swing'),
 ])  # fmt: skip
-def test_plan_refuses_wrong_options(tmp_path, run, option, value, says):
+def test_plan_rejects_invalid_options(tmp_path, run, option, value, says):
     robot = tmp_path / "arm.toml"
     robot.write_text(ARM)
     code, _, error = run("validation", "plan", str(robot), option, value,
@@ -67,7 +67,7 @@ def test_plan_refuses_wrong_options(tmp_path, run, option, value, says):
     assert not (tmp_path / "plan").exists()
 
 
-def test_plan_refuses_a_rigid_robot_that_closes_in_its_clearances_only(tmp_path, run):
+def test_plan_rejects_a_rigid_robot_that_closes_only_by_its_clearances(tmp_path, run):
     """A planar rigid four-bar whose coupler is twisted out of its plane."""
     robot = load_robot("four_bar")
     frames = tuple(

@@ -124,7 +124,8 @@ def test_time_without_effect_is_reported_at_the_false_alarm_rate(rng):
 
 
 def test_outliers_among_repeats_are_reported_and_left_out(rng):
-    """One in a set of three, and one in a set of two, where it can be either row."""
+    """There is one in a set of three and one in a set of two, where either row may be
+    wrong."""
     repeat = np.r_[np.repeat(np.arange(30), 3), [30, 30]]
     readings = rng.normal(size=(92, 6)) * SIGMA
     readings[4, 5] += 12 * SIGMA[5]

@@ -1,4 +1,5 @@
-"""The simulation against closed forms: misfits, cantilevers, chains, a four-bar."""
+"""The simulation compared with closed forms: misfits, cantilevers, chains, a
+four-bar."""
 
 import math
 from dataclasses import replace

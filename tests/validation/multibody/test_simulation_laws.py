@@ -1,4 +1,4 @@
-"""Properties of the simulation: equilibrium, axes, failures, memory, relaxation."""
+"""Properties of the simulation: equilibrium, objectivity, failures and memory."""
 
 import math
 from dataclasses import replace
@@ -80,7 +80,7 @@ def test_wrench_of_every_spring_balances_the_closures_beyond_it(rng):
             )
 
 
-def test_turning_the_whole_robot_turns_its_results(rng):
+def test_rotating_the_whole_robot_rotates_its_results(rng):
     """Objectivity: results do not depend on the orientation of the ground."""
     errors = rng.uniform(-2e-3, 2e-3, (3, 6))
     posture = overconstrained(rng, errors)
@@ -123,7 +123,7 @@ def test_simulation_fails_with_the_robots_name_if_rigid_parts_do_not_fit():
     assert error.value.robot == "block"
 
 
-def test_simulation_fails_for_a_load_that_nothing_resists():
+def test_simulation_fails_for_an_unresisted_load():
     """A free pin under 10 N m."""
     frames = (Frame("pin", joint="revolute"), Frame("tip", "pin"))
     posture = home_posture(Robot("pendulum", "tip", frames))
@@ -136,7 +136,7 @@ def test_simulation_prints_nothing(capfd, rng):
     assert capfd.readouterr() == ("", "")
 
 
-def test_spring_link_without_matrix_is_refused():
+def test_spring_link_without_matrix_is_rejected():
     with pytest.raises(BadInput, match="link of frame 'a' is simulated as a spring"):
         simulate_assembly(coaxial(np.zeros(6)), model=SimulationModel("spring"))
     with pytest.raises(BadInput, match="links = 'shell', expected one of"):
@@ -167,7 +167,7 @@ def test_closing_sequence_reduces_gaps_evenly(rng):
     ]
     gaps = np.reshape(gaps, (len(robot.closures), -1))
     assert len(sequence) >= 6
-    # what is left after the last pull is the connectors' yield, a per cent
+    # The remaining gap is the deformation of the connectors, one per cent.
     expected = gaps[:, :1] * np.linspace(1, 0, 6)
     np.testing.assert_allclose(gaps[:, :6], expected, atol=0.02 * gaps.max())
     assert gaps[:, -1].max() < 1e-11

@@ -1,4 +1,4 @@
-"""Steps of assembly against a sequence of simulations with finite motions."""
+"""Assembly steps compared with a sequence of simulations with finite motions."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ FEET = {"b": [0.3, 0.0, -0.4], "c": [0.1, 0.3, -0.4]}
 
 
 def three_beams(errors, closed=(), shim=None):
-    """A platform on three beams clamped to the base; closures as asked."""
+    """Return a platform on three beams clamped to the base, with the given closures."""
     frames = [Frame("platform", "base", translation=[0, 0, 0.5], link=BEAM)]
     pairs = {}
     for name, foot in FEET.items():
@@ -50,7 +50,7 @@ def by_simulation(errors, load):
 
 
 def test_small_motions_of_joined_parts_differ_from_finite_ones_by_second_order():
-    """The difference falls by four when errors and loads are halved."""
+    """Halving errors and loads divides the difference by four."""
     errors = {
         "b": np.array([2e-3, -1e-3, 1e-3, 4e-4, -3e-4, 5e-4]),
         "c": np.array([-1e-3, 2e-3, 1e-3, -2e-4, 4e-4, 3e-4]),

@@ -51,7 +51,7 @@ def test_loaded_bar_on_a_torsion_spring_has_stiffness_k_minus_force(share):
     answer = simulated_tangent(posture, SimulationModel("spring"), load)
     expected = 1 / (k - share * k)
     for C in (answer.linearised, answer.stepped):
-        # the other springs give way by 1e-9
+        # The other springs deform by 1e-9.
         assert C[4, 4] == pytest.approx(expected, rel=3e-7)
 
 
@@ -123,7 +123,7 @@ def test_weak_springs_of_free_joints_do_not_change_the_tangent(monkeypatch):
     posture = soft_four_bar()
     expected = exact_tangent(solve_exact(posture)).compliance
     simulated = simulated_tangent(posture, link_models(posture.robot, "spring"))
-    # where they are bent by them: 2e-5 and 1e-4
+    # Without the correction: 2e-5 and 1e-4.
     assert relative(expected, simulated.linearised) < 1e-8
     assert relative(expected, simulated.stepped) < 1e-7
 
@@ -140,7 +140,7 @@ def loaded_orthoglide(share):
     return solve_exact(posture, load * [0, 0, 0, 1, 1, 1], bodies=couples), load
 
 
-def test_a_closure_of_finite_stiffness_keeps_its_wrench():
+def test_closure_of_finite_stiffness_preserves_its_wrench():
     """The closure deforms by a millimetre under 1e5 N."""
     equilibrium, load = loaded_orthoglide(0.5)
     posture = equilibrium.posture

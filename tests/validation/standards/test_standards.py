@@ -1,4 +1,4 @@
-"""ISO 9283 and ISO 230-2 against the standards' formulas, worked by hand."""
+"""ISO 9283 and ISO 230-2 characteristics, compared with hand calculations."""
 
 import json
 
@@ -146,7 +146,7 @@ def test_iso_report_has_a_reservation_for_few_cycles(run, tmp_path, registration
     assert included == (registration == "unknown")
 
 
-def test_iso_command_refuses_a_campaign_without_repeats(run, tmp_path):
+def test_iso_command_rejects_a_campaign_without_repeats(run, tmp_path):
     folder = campaign(tmp_path, ["a,0,0,0,0,0,0,1", "b,0.1,0,0,0,0,1,1"])
     status, _, err = run("validation", "inspect", "--iso", folder)
     assert status == 2

@@ -1,4 +1,4 @@
-"""Studies of robots with tolerances of a drawing: statistics and worst case."""
+"""Studies of robots with drawing tolerances: statistics and worst case."""
 
 import json
 
@@ -43,7 +43,7 @@ def test_worst_case_of_a_drawing_in_a_study_equals_hand_calculation(results):
     assert worst["attained"] <= worst["bound"] <= 1.001 * worst["attained"]
 
 
-def test_shares_of_callouts_in_a_study_equal_hand_calculation(results):
+def test_contributions_of_callouts_in_a_study_equal_hand_calculation(results):
     """Errors add linearly, so a share is c^2 over the sum; intervals hold 95 %."""
     _, _, table = results
     shares = table["statistics"]["importance"]["quantities"]["rotation"]["total_index"]
@@ -73,7 +73,7 @@ def test_numbers_on_the_page_of_a_drawn_study_equal_its_results(results):
     for key in ("rotation", "translation"):
         assert drawn["pose"][key] == worst[key]["bound"]
     text = verdict(found)
-    begin = "For all parts within the tolerances of the drawing and all positions"
+    begin = "For all parts within the drawing tolerances and all positions"
     assert f"{begin} within the clearances its platform is at most" in text
     turn, shift = (1e3 * worst[key]["bound"] for key in ("rotation", "translation"))
     assert f"{turn:.3g} mrad and {shift:.3g} mm from the nominal pose" in text
@@ -82,7 +82,7 @@ def test_numbers_on_the_page_of_a_drawn_study_equal_its_results(results):
 
 
 def test_study_of_fits_states_that_bounds_use_their_mean(tmp_path):
-    """The largest radial clearance of 12 H7/g6 is 1.71 of its mean."""
+    """The largest radial clearance of 12 H7/g6 is 1.71 times its mean."""
     study = study_of(tmp_path, 'fit = "12 H7/g6"', STATISTICS.format(draws=20, base=0))
     found = run_study(study)
     assert (
@@ -136,7 +136,7 @@ def test_bound_of_the_rotation_in_the_map_of_a_study_equals_hand_calculation(tmp
     turn, shift = (1e3 * over[key] for key in ("rotation", "translation"))
     assert f"{turn:.3g} mrad and {shift:.3g} mm over the 4 poses" in verdict(found)
     page = (tmp_path / "out" / "report.html").read_text()
-    assert "largest rotation over all parts within the tolerances" in page
+    assert "largest rotation over all parts within tolerance" in page
     # a four-bar closes one loop; this one has no description
     assert ">four_bar. " in page
     assert " frames, 1 closure; " in page

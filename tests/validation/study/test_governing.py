@@ -32,16 +32,16 @@ def test_governing_rows_are_bounds_without_one_imperfection():
     expected = [
         ("f2", CLEARANCE, 2e-4),  # 3 - 1
         ("f0", ERROR, np.hypot(1e-4, 4e-4)),
-        ("f1", ERROR, np.hypot(3e-4, 4e-4)),  # what it cancelled is back
+        ("f1", ERROR, np.hypot(3e-4, 4e-4)),  # the error it compensated is back
     ]
     assert [one[:2] for one in seen] == [one[:2] for one in expected]
-    # bounds from above, as tight as problem (27) was asked for: 1 um
+    # Upper bounds to the requested accuracy of problem (27), 1 um.
     for (*_, bound), (*_, size) in zip(seen, expected, strict=True):
         assert size * (1 - 1e-9) <= bound <= size + 1e-6
     assert [one["rotation"] for one in rows] == pytest.approx([0.0] * 3, abs=1e-12)
 
 
-def test_governing_rows_exclude_the_own_motion_of_a_joint():
+def test_governing_rows_exclude_the_free_motion_of_a_joint():
     posture = chain((0.0, None), (1e-4, None))
     first, second = posture.robot.frames
     hinge = replace(first, joint="revolute", clearance=Clearance(spin=0.1))
@@ -51,7 +51,7 @@ def test_governing_rows_exclude_the_own_motion_of_a_joint():
 
 
 def test_a_ball_is_one_governing_clearance():
-    """Without it only the error is left, without the error only the ball."""
+    """Without the ball only the error remains, and vice versa."""
     posture = chain((3e-4, None), (0.0, None))
     first, second = posture.robot.frames
     ball = replace(second, clearance=Clearance(ball=1e-4))

@@ -1,4 +1,4 @@
-"""Study of a robot in service: load, stiffness, frequencies, maps over several axes."""
+"""Study of a loaded robot: deflection, stiffness, frequencies and maps."""
 
 import json
 from dataclasses import replace
@@ -49,8 +49,8 @@ def test_deflection_of_parallel_springs_is_the_load_over_their_sum(tmp_path):
     assert table["service"]["load"] == [0, 0, 0, 400, 0, 0]
 
 
-def test_study_with_a_load_that_nothing_carries_does_not_pass(tmp_path):
-    """The platform of a single free pin turns under a moment about it."""
+def test_study_with_an_unresisted_load_does_not_pass(tmp_path):
+    """The platform on a single free pin rotates under a moment about its axis."""
     (tmp_path / "pin.toml").write_text(
         'platform = "tip"\n[[frame]]\nname = "pin"\nparent = "base"\n'
         'joint = "revolute"\n[[frame]]\nname = "tip"\nparent = "pin"\n'
@@ -65,7 +65,7 @@ def test_study_with_a_load_that_nothing_carries_does_not_pass(tmp_path):
 
 @pytest.fixture(scope="module")
 def five_bar(tmp_path_factory):
-    """Without clearances, so that what a load does is linear in it."""
+    """Return a five-bar study without clearances, so that it is linear in the load."""
     folder = tmp_path_factory.mktemp("service")
     robot = ff.load_robot("five_bar")
     tight = tuple(replace(frame, clearance=None) for frame in robot.frames)
@@ -154,7 +154,7 @@ def test_grid_of_three_axes_is_drawn_at_its_largest_error(tmp_path):
     ("frequencies = 3", "service.frequencies: irsbot2: found no moving mass"),
     ("lod = 1", 'service: unknown key "lod"; did you mean "load"?'),
 ])  # fmt: skip
-def test_invalid_service_keys_are_refused_in_one_line(tmp_path, line, message):
+def test_invalid_service_keys_are_rejected_in_one_line(tmp_path, line, message):
     path = tmp_path / "study.toml"
     path.write_text(f'robot = "irsbot2"\n[service]\n{line}\n')
     with pytest.raises(ff.BadInput) as error:
@@ -163,7 +163,7 @@ def test_invalid_service_keys_are_refused_in_one_line(tmp_path, line, message):
     assert str(path) in str(error.value)
 
 
-def test_shares_of_all_parts_in_the_chart_add_up_to_100_per_cent(tmp_path):
+def test_contributions_of_all_charted_parts_add_up_to_100_per_cent(tmp_path):
     """All twelve parts of a hexapod, not only the eight largest."""
     _, page = study_of(tmp_path, 'robot = "hexapod"\n')
     rows = page.table("part", "rx")[1:]

@@ -1,4 +1,4 @@
-"""Study files, the folder that a study writes, and the messages for wrong files."""
+"""Study files, the output folder of a study, and messages for invalid files."""
 
 import json
 from dataclasses import replace
@@ -117,7 +117,7 @@ def test_numbers_on_the_study_page_equal_the_results(results):
     assert solution["energy, eq. (22)"] == table["solution"]["energy"]
     for name, *wrench in seen.table("link")[1:]:
         expected = table["solution"]["frames"][name.text]["wrench"]
-        # what is rounding of the largest is shown as 0
+        # Values at the round-off of the largest are shown as 0.
         shown = [cell.value for cell in wrench]
         assert shown == pytest.approx(expected, rel=0.0, abs=1e-5)
     (scene,) = (one for one in seen.figures if "bodies" in one)
@@ -169,9 +169,9 @@ def test_study_of_a_robot_without_errors_reports_that_nothing_was_checked(
     write_study(results)
     assert results.verdicts == {"reference": "no signal", "crosscheck": "no signal"}
     assert not results.passed
-    assert "No independent check of these numbers could be made" in verdict(results)
+    assert "No independent check of these results was possible" in verdict(results)
     page = (tmp_path / "out" / "report.html").read_text()
-    assert "Checks that could not be made" in page
+    assert "Checks that were not possible" in page
     assert "the robot has no geometric errors" in page
     table = json.loads((tmp_path / "out" / "results.json").read_text())
     assert table["passed"] is False
@@ -219,7 +219,7 @@ def test_study_without_a_reachable_point_in_its_map_does_not_pass(tmp_path):
     assert "No point has a solution" in (tmp_path / "out" / "report.html").read_text()
 
 
-def test_study_whose_reference_has_no_answer_does_not_pass(tmp_path, monkeypatch):
+def test_study_whose_reference_has_no_solution_does_not_pass(tmp_path, monkeypatch):
     def lost(*_):
         raise RuntimeError("cvxpy: the problem is unbounded")
 
@@ -251,11 +251,11 @@ def test_headline_of_a_study_is_the_worst_clearance_over_the_map(tmp_path):
     assert f" and {1e3 * bound:.3g} mm from the nominal pose" in sentences
     assert f" and {1e3 * np.nanmax(upper):.3g} mm over" in sentences
     assert "certified bounds of (27), assumption frozen" in sentences
-    assert "in the least-energy solution it is 0 mrad and 0 mm" in sentences
+    assert "in the minimum-energy solution it is 0 mrad and 0 mm" in sentences
     lost = verdict(replace(results, error={}, maps=None))
-    assert "was found; in the least-energy solution" in lost
+    assert "was found; in the minimum-energy solution" in lost
     page = report_page(results)
-    assert page.count("least energy") >= 6  # a row for each component
+    assert page.count("minimum energy") >= 6  # a row for each component
     assert "any position without a change of deformation" in page
     assert "largest translation, eq. (27), over all clearances" in page
 
@@ -266,7 +266,9 @@ def test_study_reports_a_manipulator_that_cannot_be_assembled(tmp_path):
     results = run_study(read_study(study_file(tmp_path, 'robot = "stuck.toml"\n')))
     assert results.solution["status"] == "cannot assemble"
     assert not results.passed
-    assert verdict(results).startswith("No answer at this pose: cannot assemble, a ri")
+    assert verdict(results).startswith(
+        "No solution at this pose: cannot assemble, a ri"
+    )
 
 
 def test_message_about_a_robot_file_given_as_a_study_states_the_missing_line(tmp_path):
@@ -303,7 +305,7 @@ def test_message_about_a_robot_file_given_as_a_study_states_the_missing_line(tmp
     ("title", "scales = [1, -1]\ntitle", "expected at least two different fact"),
     ("title", "title = 1 #", "title: found 1, expected a string"),
 ])  # fmt: skip
-def test_wrong_study_file_is_refused_in_one_line(tmp_path, old, new, message):
+def test_invalid_study_file_is_rejected_in_one_line(tmp_path, old, new, message):
     path = study_file(tmp_path, SMALL.replace(old, new, 1))
     with pytest.raises(BadInput) as error:
         read_study(path)
@@ -314,14 +316,14 @@ def test_wrong_study_file_is_refused_in_one_line(tmp_path, old, new, message):
     assert [p.name for p in tmp_path.iterdir()] == ["study.toml"]
 
 
-def test_study_output_that_is_a_file_is_refused_before_computation(tmp_path):
+def test_study_output_that_is_a_file_is_rejected_before_computation(tmp_path):
     (tmp_path / "taken").write_text("mine")
     path = study_file(tmp_path, SMALL)
     with pytest.raises(BadInput, match="found a file, expected a folder or nothing"):
         read_study(path, tmp_path / "taken")
 
 
-def test_study_pose_out_of_reach_is_refused_before_computation(tmp_path):
+def test_unreachable_study_pose_is_rejected_before_computation(tmp_path):
     path = study_file(tmp_path, SMALL.replace("tz = -0.5", "tz = -0.9"))
     seen = []
     with pytest.raises(BadInput, match="cannot be reached"):

@@ -1,4 +1,4 @@
-"""Every effect of the library against simulated machines that have it physically.
+"""Every library effect compared with simulated machines that have it physically.
 
 The machines share no effect with the library: an elastic drive is a spring after its
 joint, a longer link is built longer.  Exudyn, and the program of springs.

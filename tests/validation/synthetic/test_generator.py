@@ -1,8 +1,8 @@
-"""Synthetic campaigns: each effect against a closed form worked out beforehand.
+"""Synthetic campaigns: each effect compared with a closed form derived beforehand.
 
 The robot of most tests is one drive that turns a beam about z: L = 0.5 m, tip at
-(L cos q, L sin q, 0).  What is to come out stands in each test, first order in what is
-small unless it says exact.
+(L cos q, L sin q, 0).  Each test states the expected value, to first order in small
+quantities unless marked as exact.
 """
 
 import math
@@ -51,7 +51,7 @@ def row(q=0.0, load=(0, 0, 0, 0, 0, 0), **conditions):
 
 @pytest.fixture(params=["multibody", "springs"])
 def added(request):
-    """What an effect adds to the reading of a row, by either program."""
+    """Return the contribution of an effect to a reading, computed by either program."""
 
     def difference(name, parameters, where, robot=None, program=request.param):
         case = robot or one_link(), np.zeros(3), [where]
@@ -291,7 +291,7 @@ def test_closed_loop_divides_a_misfit_by_stiffness(added):
     (lambda: CampaignDesign(reference_point=(0.0, math.inf, 0.0)),
      "design: reference_point: found inf"),
 ])  # fmt: skip
-def test_impossible_noise_or_design_is_refused(make, message):
+def test_impossible_noise_or_design_is_rejected(make, message):
     with pytest.raises(BadInput) as caught:
         make()
     assert message in str(caught.value)
@@ -307,7 +307,7 @@ def test_impossible_noise_or_design_is_refused(make, message):
     (["--at", "1,2"], "three numbers"),
     (["--truth", "no/t.json"], "no folder no"),
 ])  # fmt: skip
-def test_generate_refuses_wrong_options_and_writes_nothing(
+def test_generate_rejects_invalid_options_and_writes_nothing(
     run, tmp_path, words, message
 ):
     folder, truth = tmp_path / "c", tmp_path / "t.json"

@@ -300,11 +300,13 @@ def test_simulated_effect_has_the_best_score_among_all_effects(name):
     own = min(one.residual for one in readings if one.names[0].startswith(name))
     curved = "drift", "contact_stiffening", "delayed_expansion"
     bound = 60.0 if name in curved else 1.0
-    assert own < bound  # a time constant and contacts beside springs are not linear
+    assert (
+        own < bound
+    )  # time constants, and contacts in addition to springs, are nonlinear
     assert own <= min(one.residual for one in readings) + 1.0
 
 
-def test_effect_that_the_robot_cannot_have_is_refused():
+def test_effect_that_the_robot_cannot_have_is_rejected():
     rng = np.random.default_rng(0)
     with pytest.raises(NotApplicable):
         draw_effect("friction_hysteresis", two_axes(spring=None), 1.0, rng)
@@ -315,7 +317,9 @@ def test_effect_that_the_robot_cannot_have_is_refused():
     with pytest.raises(BadInput, match='found "gravity"') as caught:
         draw_effect("gravity", two_axes(), 1.0, rng)
     assert "self_weight" in str(caught.value)
-    assert " _" not in str(caught.value)  # those outside the library are for proofs
+    assert " _" not in str(
+        caught.value
+    )  # effects outside the library are only for tests
     with pytest.raises(BadInput, match="configurations"):
         CampaignDesign(configurations=5, rows=4)
     with pytest.raises(BadInput, match="temperature"):
