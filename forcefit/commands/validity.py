@@ -83,8 +83,8 @@ def validity(
     given = [bool(pose or joint), grid is not None, poses is not None]
     if sum(given) > 1:
         raise BadInput(
-            "found several options that define poses; expected only one of --pose or "
-            "--joint, --grid, --poses"
+            "found several options that define poses; expected only one of --pose (or "
+            "--joint), --grid and --poses"
         )
     if figure is not None:
         if not solids:

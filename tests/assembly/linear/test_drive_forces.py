@@ -187,7 +187,7 @@ def test_unknown_and_coupled_drives_are_rejected():
     K[0, 2] = K[2, 0] = 10.0
     rocker = replace(robot.frames[3], joint_stiffness=K)
     robot = replace(robot, frames=(*robot.frames[:3], rocker, *robot.frames[4:]))
-    with pytest.raises(BadInput, match=r'"rocker"\.joint_stiffness: found the drive'):
+    with pytest.raises(BadInput, match=r'"rocker"\.joint_stiffness: found coupling'):
         with_drive_forces(robot, {"rocker": 1.0})
     with pytest.raises(BadInput, match=r'"a"\.drive_force: found 3 on a fixed joint'):
         Frame("a", drive_force=3.0)

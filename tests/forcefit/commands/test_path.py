@@ -198,7 +198,7 @@ def test_path_refuses_a_drive_force_and_a_state_that_do_not_exist(run, slide):
 
 
 def test_path_reports_unconstrained_pose_components(run, tmp_path):
-    """A hexapod has six freedoms; two columns leave four of them open."""
+    """A hexapod has six degrees of freedom; two columns leave four of them open."""
     rows = "pose.tx,pose.tz\n0,0.53\n0.01,0.53\n"
     (tmp_path / "way.csv").write_text(rows)
     status, out, _ = run(
@@ -206,7 +206,9 @@ def test_path_reports_unconstrained_pose_components(run, tmp_path):
         "--profile", "quintic", "--duration", 0.5, "--points", 5,
     )  # fmt: skip
     assert status == 0
-    assert "the path states tx, tz alone, and the platform has 6 freedoms" in out
+    assert (
+        "the path states tx, tz alone, and the platform has 6 degrees of freedom" in out
+    )
 
 
 def test_path_applies_effects_under_the_given_conditions(run, slide):

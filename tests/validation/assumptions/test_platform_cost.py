@@ -139,7 +139,7 @@ def test_validity_over_poses_reports_the_median_and_the_largest_error(run, tmp_p
 
 
 @pytest.mark.parametrize(("words", "message"), [
-    (["--grid", "tx=0", "--pose", "tx=0"], "expected one of --pose or --joint"),
+    (["--grid", "tx=0", "--pose", "tx=0"], "expected only one of --pose (or --joint)"),
     (["--figure", "a.png"], "--figure: found without --solids"),
     (["--grid", "qx=0"], "unknown pose component"),
 ])  # fmt: skip
