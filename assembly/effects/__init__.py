@@ -69,7 +69,9 @@ def apply_effects(conditions: Conditions, effects: Mapping[str, Values]) -> Cond
     """
     unknown = set(effects) - set(LIBRARY)
     if unknown:
-        raise KeyError(f"no effect {sorted(unknown)}; there are {sorted(LIBRARY)}")
+        raise KeyError(
+            f"unknown effects {sorted(unknown)}; available: {sorted(LIBRARY)}"
+        )
     for name in LIBRARY:
         if name in effects:
             conditions = LIBRARY[name].apply(conditions, effects[name])

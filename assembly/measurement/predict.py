@@ -138,9 +138,9 @@ def _platform_screws(
 def _nearest_assembly(
     conditions: Conditions, row: int
 ) -> tuple[Assembly | ExactAssembly, bool]:
-    """Return the assembly of one measurement whose pose is nearest to nominal.
+    """Return the assembly at one measurement; among several, the closest to nominal.
 
-    With finite motions, the nearest pose refers to the linear solution from which the
+    With finite motions, closeness is judged on the linear solution from which the
     iteration starts.
 
     Returns:

@@ -233,9 +233,7 @@ def _with_times(table: PathTable, times: PathTimes, where: str) -> PathTable:
     if times.profile is None:
         for option in ("--duration", "--speed", "--acceleration"):
             if limits[option][0] is not None:
-                raise BadInput(
-                    f"{option}: found without --profile, expected together with it"
-                )
+                raise BadInput(f"{option}: found without --profile, which it requires")
     elif times.ends == "moving":
         raise BadInput(
             "--ends moving: found together with --profile, whose motion starts and "

@@ -56,7 +56,7 @@ def perfect_parts(experiment: Experiment) -> dict[str, Any]:
         values = rows[lower if lower in (rows.dtype.names or ()) else key]
         values = values.max(axis=1, initial=0.0) if values.ndim == 2 else values
         value = float(np.median(values))
-        if not np.isnan(value):  # infinite if the platform moves freely
+        if not np.isnan(value):  # NaN: the platform can move freely
             reached[key] = {"reached": value, "unit": UNITS[key]}
     prepared = experiment.energies
     if experiment.clearance == "worst" and prepared.loads is None:

@@ -42,7 +42,8 @@ from forcefit.assembly.steps.left_anywhere import free_positions
 from forcefit.assembly.steps.machine import Machine
 from forcefit.stiffness.screws import skew
 
-_TOLERANCE = 5e-4  # width of an interval relative to the largest support along an axis
+# [-] width of an interval, relative to the largest support function along an axis
+_TOLERANCE = 5e-4
 _ROUNDING = 1e-10  # rows below this fraction of the largest row are round-off
 
 CONVEX = "the largest of all positions of least energy; a convex set, certified"
@@ -220,7 +221,7 @@ def _attained(
     posture: Posture, at: _Positions, corners: list[NDArray], half: int,
     offset: ArrayLike,
 ) -> float:  # fmt: skip
-    """Compute the largest pose error at equilibrium if bolted at given corners."""
+    """Compute the largest pose error with joints bolted at the given corners."""
     moved = (np.array(corners) - at.start) @ at.errors.T
     errors = posture.robot.errors + moved.reshape(len(moved), -1, 6)
     bounds = bound_pose_error(solve_assembly(posture, errors=errors), offset=offset)

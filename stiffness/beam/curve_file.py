@@ -113,8 +113,8 @@ def _tapered(
     if set(tip) != set(section) or "area" in tip:
         raise part.bad(
             "tip_section",
-            "found different lengths at both ends of a tapered piece, "
-            "expected the same names",
+            "found different dimensions at the two ends of a tapered piece, "
+            'expected the keys of "section"',
         )
     declared_section(tip, nu)
 

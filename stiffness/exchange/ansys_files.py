@@ -162,5 +162,5 @@ def read_mapping(path: Path) -> list[int] | list[tuple[int, int]]:
 def _whole(path: Path, word: str) -> int:
     """Parse the number of a row or a node."""
     if not re.fullmatch("[0-9]{1,12}", word):
-        raise BadInput(f"{path}: found {describe(word)}, expected a number of a node")
+        raise BadInput(f"{path}: found {describe(word)}, expected a node number")
     return int(word)

@@ -41,7 +41,7 @@ from forcefit.stiffness.mesh.solid import Solid
 ORDER = 3
 # derivatives of the barycentric coordinates with respect to the reference coordinates
 _COORDINATES = np.vstack([-np.ones(3), np.eye(3)])
-_CHUNK = 3_600_000  # values of the element matrices in a batch, 30 MB
+_CHUNK = 3_600_000  # element-matrix entries per batch, 30 MB
 
 
 @dataclass(frozen=True, eq=False)

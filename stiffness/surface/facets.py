@@ -1,10 +1,10 @@
 """Curved patches of unknown shape, smoothed by Phong tessellation.
 
 A point on a facet is projected onto the tangent planes at the three corners, and the
-facet is lifted there by half of the weighted mean of these projections (Boubekeur &
-Alexa 2008, Phong tessellation). Along each edge, the smaller of the two projections is
-used. For an arc of half-angle a, the error is about a^4 times the radius, compared with
-about a^2 times the radius for flat facets.
+point is displaced by half of the weighted mean of the offsets to these projections
+(Boubekeur & Alexa 2008, Phong tessellation). Along each edge, the smaller of the two
+offsets is used. For an arc of half-angle a, the error is about a^4 times the radius,
+compared with about a^2 times the radius for flat facets.
 """
 
 from dataclasses import dataclass, field

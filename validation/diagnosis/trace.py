@@ -218,7 +218,7 @@ def _searched_rows(campaign: Campaign, fitted: NDArray) -> NDArray:
 
 
 def _without_outlying(traced: Traced, fit: MachineFit) -> tuple[Traced, MachineFit]:
-    """Refit the machine without blunders in rows outside the sample."""
+    """Mark outliers among the rows outside the sample, and refit without them."""
     others = traced.used & ~np.isin(np.arange(len(traced.used)), traced.columns.row)
     if not others.any():
         return traced, fit

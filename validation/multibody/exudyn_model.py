@@ -294,8 +294,8 @@ class Model:
             lacking[:] = far_couple(screw, wrench[3:])
             return wrench
 
-        # Exudyn evaluates connectors before loads.  When it differentiates loads, it
-        # moves only the far end, and the couple must not change.
+        # Exudyn evaluates connectors before loads.  When Exudyn differentiates loads,
+        # it moves only the far end, so the couple must stay constant.
         load = self.item.LoadTorqueVector(
             markerNumber=far, bodyFixed=True,
             loadVectorUserFunction=lambda mbs, t, load: lacking,

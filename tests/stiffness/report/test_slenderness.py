@@ -208,7 +208,7 @@ section = { width = 0.01, height = 0.02, wall = 0.001 }
     (("end = [0, 0, 0.2]", "end = [0, 0]"), "piece[1].end: found"),
     (("up = [0, 1, 0]", "upp = [0, 1, 0]"), 'unknown key "upp"'),
     (("up = [0, 1, 0]", "tip_section = { radius = 0.1 }"),
-     "found different lengths at both ends of a tapered piece"),
+     "found different dimensions at the two ends"),
 ])  # fmt: skip
 def test_wrong_curve_file_is_rejected_by_its_path(tmp_path, change, message):
     path = curve_file(tmp_path, L_BRACKET.replace(*change, 1))
