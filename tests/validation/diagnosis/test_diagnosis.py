@@ -38,6 +38,7 @@ CASES = {
     "none": {},
     "pair": {"offset": (0, 4e-5), "expansion": (2e-5, 2e-5)},
     "confounded": {"expansion": (0, 2e-5), "temperature": 5.0},
+    "outside": {"stand": 6.0},
     "device": {"offset": (0, 6e-5), "device": DEVICE, "missing": 0.1,
                "outliers": (7, 30)},
 }  # fmt: skip
