@@ -19,13 +19,14 @@ from forcefit.stiffness.beam.sections import (
     Section,
     box_section,
     i_section,
+    rectangular_section,
     round_section,
 )
 from forcefit.stiffness.fem.condensation import condense
 from forcefit.stiffness.fem.elements import isoparametric, lame
 from forcefit.stiffness.link import inverted, scaled
-from forcefit.stiffness.screws import screw_map
-from tests.solids_for_tests import bar_solid
+from forcefit.stiffness.screws import rotation_matrix, screw_map
+from tests.solids_for_tests import bar_solid, box_solid, masked_solid
 
 E, NU = 60e9, 0.3
 G = E / (2 * (1 + NU))
@@ -120,7 +121,7 @@ def test_invalid_curve_or_section_is_rejected(call, message):
     assert message in str(caught.value)
 
 
-def measured_section(solid, lengths=(0.15, 0.25)):
+def measured_section(solid, center=(0, 0), lengths=(0.15, 0.25)):
     """Torsion constant and shear area from the difference of finite element results at
     two lengths. The effect of the distributing ends is equal for both lengths and
     cancels.
@@ -129,7 +130,7 @@ def measured_section(solid, lengths=(0.15, 0.25)):
     for length in lengths:
         mesh = isoparametric(solid(length))
         lam, mu = (np.full(len(mesh.cells), v) for v in lame(E, NU))
-        centers = np.array([[0, 0, 0], [0, 0, length]])
+        centers = np.array([[*center, 0], [*center, length]])
         K = condense(mesh, lam, mu, centers, "distributing-both").stiffness
         C.append(np.diag(inverted(K)))
     step, cubes = lengths[1] - lengths[0], lengths[1] ** 3 - lengths[0] ** 3
@@ -150,6 +151,39 @@ def test_shear_energy_of_a_round_bar_agrees_with_hutchinsons_factor():
     assert shear_area / section.area == pytest.approx(factor, rel=1e-4)
     assert J == pytest.approx(section.J, rel=1e-5)
     assert section.shear_y == pytest.approx(0.8864, abs=1e-4)
+
+
+def test_torsion_constant_of_a_square_agrees_with_finite_elements():
+    """The series of Saint-Venant and elements of a quarter of the width."""
+    J, _ = measured_section(
+        lambda L: box_solid((4, 4, round(40 * L)), (0.04, 0.04, L)), (0.02, 0.02)
+    )
+    assert J == pytest.approx(rectangular_section(0.04, 0.04, NU).J, rel=2e-4)
+
+
+def test_torsion_constant_of_a_thin_box_agrees_with_finite_elements():
+    """Bredt's formula neglects the corners: 3.5 % of J at wall / width = 1 / 12."""
+    wall = 0.06 / 12
+
+    def solid(length):
+        return masked_solid(
+            (12, 12, round(20 * length)), (0.06, 0.06, length),
+            lambda c: (np.abs(c[:, :2] - 0.03) > 0.03 - wall).any(axis=1),
+        )  # fmt: skip
+
+    J, _ = measured_section(solid, (0.03, 0.03))
+    section = box_section(0.06, 0.06, wall, NU)
+    assert J / section.J == pytest.approx(1.035, abs=0.002)
+
+
+def test_rotation_of_a_curve_rotates_its_compliance(rng):
+    R = rotation_matrix(rng.normal(size=3))
+    turn = np.array([0.3, -0.4, 0.2])
+    spoke = np.cross(turn, [1, 2, 3.0]) / 5
+    plain = curve_compliance([arc_piece(spoke, [0, 0, 0], turn, CROOKED)], E, NU)
+    rotated = arc_piece(R @ spoke, [0, 0, 0], R @ turn, CROOKED)
+    A = np.kron(np.eye(2), R)
+    assert_same(curve_compliance([rotated], E, NU), A @ plain @ A.T, 1e-12)
 
 
 @pytest.mark.parametrize("away", [(0.0, 0.0, 0.0), (0.7, -0.3, 0.5)])
