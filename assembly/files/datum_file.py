@@ -29,9 +29,10 @@ def frame_datums(table: Table, frames: list[str]) -> tuple[Datum, ...]:
     datums = tuple(_datum(table, value, frames) for value in _datum_list(table))
     for number, datum in enumerate(datums):
         if bool(datum.extent) != bool(datum.hole and number == 0):
-            fault = f"found {quoted(datum.frame)} with" + "out" * (number == 0)
+            given = 'with "extent"' if datum.extent else 'without "extent"'
             expected = '"extent" exactly for a hole at maximum material as datum A'
-            raise table.bad("datums", f'{fault} "extent"; expected {expected}')
+            fault = f"found {quoted(datum.frame)} {given}; expected {expected}"
+            raise table.bad("datums", fault)
     return datums
 
 

@@ -59,10 +59,9 @@ def show(
 
     Raises:
         BadInput: the object has another type or many points; a file cannot be read; an
-            axis or a quantity is
-            unknown; more than two axes of a sweep remain; errors are requested for
-            something else than an assembly, or for one with a free motion; or
-            matplotlib is not installed.
+            axis or a quantity is unknown; more than two axes of a sweep remain; errors
+            are requested for something else than an assembly, or for one with a free
+            motion; or matplotlib is not installed.
         SolverFailed: the cone solver failed for the errors.
     """
     if isinstance(thing, Statistics):

@@ -89,6 +89,8 @@ REFUSED = {
     "frames": (FRAMES, [
         ('feature = "b"', 'feature = "c"', 'found "c", expected the name of a frame'),
         ('datums = ["a"]', 'datums = ["tip"]', 'the datum "tip" on another body'),
+        ('datums = ["a"]', 'datums = [{ frame = "a", extent = "20 mm" }]',
+         'found "a" with "extent"; expected "extent" exactly for a hole at maximum'),
         ('datums = ["a"]', 'datums = [{ frame = "a", shape = "cone" }]',
          "found 'cone', expected \"axis\" | \"plane\""),
         ('datums = ["a"]', 'datums = ["a"]\ndirection = [0, 0, 1]',
