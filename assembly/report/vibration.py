@@ -3,14 +3,17 @@
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from forcefit.assembly.kinematics.posture import Posture
 from forcefit.assembly.linear.energy import CannotAssemble, failure_status
 from forcefit.assembly.linear.load import driven
 from forcefit.assembly.linear.reference.reduction import FreeMotion
 from forcefit.assembly.model.statuses import FREE_MOTION, UNSTABLE
-from forcefit.assembly.platform_stiffness.vibration import natural_modes
+from forcefit.assembly.platform_stiffness.vibration import (
+    discretisation_errors,
+    natural_modes,
+)
 from forcefit.assembly.solvers.conic import SolverFailed
 from forcefit.results.display import listing, numbers
 from forcefit.results.text import lines_of
@@ -19,6 +22,7 @@ _NOMINAL = (
     "these are the frequencies of the nominal robot, without load and gravity; "
     "--state exact includes them and the stiffness due to them"
 )
+_COARSE = 0.01  # [-] estimated error of a frequency above which a remark is printed
 _NAMED = 3  # largest number of parts that are named for a mode
 
 
@@ -55,14 +59,18 @@ def vibration_of(
         results["remarks"] = [_NOMINAL]
     try:
         modes = natural_modes(posture, count, load, gravity, state)
+        errors = discretisation_errors(modes, load, gravity, state)
     except (CannotAssemble, FreeMotion, SolverFailed) as error:
         return results | {"status": failure_status(error), "reason": str(error)}
     if np.isnan(modes.frequencies).any():
         results["status"] = UNSTABLE
     elif (modes.frequencies == 0.0).any():
         results["status"] = FREE_MOTION
+    if np.any(errors > _COARSE):
+        results["remarks"] = [*results["remarks"], _coarse(errors)]
     return results | {
         "frequencies": modes.frequencies,
+        "discretisation_errors": errors,
         "idle_motions": modes.idle,
         "modes": [
             {
@@ -86,6 +94,18 @@ def vibration_text(results: dict[str, Any]) -> str:
         shares = ", ".join(f"{name} {100 * share:.3g} %" for name, share in most)
         lines.append(f"{mode['frequency']:12.6g} Hz  {shares or _free(mode)}")
     return "\n".join(lines)
+
+
+def _coarse(errors: NDArray) -> str:
+    """Return the remark on frequencies that are too high."""
+    large = errors[errors > _COARSE]
+    least, most = (f"{100 * e:.2g}" for e in (large.min(), large.max()))
+    span = most if least == most else f"{least} to {most}"
+    return (
+        f"{len(large)} of {len(errors)} frequencies are about {span} % too high, "
+        'because each beam vibrates in one cubic shape; a larger "pieces" of its link '
+        "in the robot file reduces this error"
+    )
 
 
 def _free(mode: dict[str, Any]) -> str:

@@ -134,6 +134,9 @@ _FREQUENCIES = record(
     "state remarks idle_motions?",
     _POSTURE,
     frequencies_=number("natural frequencies", "Hz", "mode"),
+    discretisation_errors_=number(
+        "estimated relative errors of the frequencies", "", "mode"
+    ),
     modes_=Listed(
         record(
             "platform_screw",

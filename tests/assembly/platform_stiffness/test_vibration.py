@@ -11,7 +11,10 @@ from forcefit.assembly.files.solved_links import solved_link
 from forcefit.assembly.kinematics.posture import home_posture
 from forcefit.assembly.model.mesh_link import mesh_link_mass
 from forcefit.assembly.model.robot import BeamLink, Clearance, Frame, MeshLink, Robot
-from forcefit.assembly.platform_stiffness.vibration import natural_modes
+from forcefit.assembly.platform_stiffness.vibration import (
+    discretisation_errors,
+    natural_modes,
+)
 from forcefit.assembly.robots import load_robot
 from forcefit.inputs.table import BadInput
 from forcefit.stiffness.screws import rotation_matrix
@@ -75,6 +78,16 @@ def test_bending_frequencies_of_a_cantilever_equal_the_textbook(pieces, first, s
     assert (off > 0).all()
     assert off[:2].max() < first
     assert off[2:].max() < second
+
+
+@pytest.mark.parametrize("pieces", [1, 2, 4])
+def test_estimated_frequency_error_equals_the_error_of_the_textbook(pieces):
+    """The estimate for the second mode in one piece, 0.60, lacks higher orders of h."""
+    modes = natural_modes(cantilever(pieces), 4)
+    exact = np.repeat([bending(1.8751041), bending(4.6940911)], 2)
+    errors = modes.frequencies / exact - 1
+    share = 0.5 if pieces == 1 else 0.1
+    np.testing.assert_allclose(discretisation_errors(modes), errors, rtol=share)
 
 
 def test_axial_and_torsional_frequencies_equal_the_textbook():
