@@ -67,6 +67,7 @@ def test_plan_rejects_invalid_options(tmp_path, run, option, value, says):
     assert not (tmp_path / "plan").exists()
 
 
+@pytest.mark.slow
 def test_plan_rejects_a_rigid_robot_that_closes_only_by_its_clearances(tmp_path, run):
     """A planar rigid four-bar whose coupler is twisted out of its plane."""
     robot = load_robot("four_bar")
