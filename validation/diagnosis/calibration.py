@@ -22,10 +22,10 @@ class Calibration:
     Attributes:
         campaigns: number of simulated campaigns of each kind.
         without: number of simulated pure-noise campaigns with each verdict.
-        with_found: number of simulated campaigns with each verdict.  These campaigns
-            contain the identified effects with their fitted parameters.
-        right: fraction of the campaigns with effects in which exactly these effects
-            were identified.
+        with_found: number of simulated campaigns with each verdict, for campaigns that
+            contain the identified effects.
+        right: fraction of the campaigns with effects in which the diagnosis identified
+            exactly these effects.
         false_claims: fraction of all verdicts that claim absent effects.
     """
 
@@ -41,8 +41,8 @@ def calibrate(
 ) -> Calibration:
     """Simulate and diagnose campaigns with the design of a diagnosis.
 
-    The simulated readings are linear in the effects of the identified machine.  Model
-    search and verdict are computed as in the diagnosis, but the final fit is omitted.
+    The simulated readings are linear in the effects of the identified machine. The
+    final fit of the diagnosis is omitted.
 
     Args:
         diagnosis: diagnosis whose design and identified machine are simulated.
@@ -76,7 +76,7 @@ def calibrate(
 
 
 def _decided(selected: Selected, count: int) -> tuple[str, tuple[str, ...]]:
-    """Return the verdict for a simulated campaign."""
+    """Diagnose a simulated campaign and return the verdict."""
     best = selected.states[0]
     names = tuple(sorted(e.name for e in best.elements if e.name))
     freedom = max(1.0, count - selected.unknowns)

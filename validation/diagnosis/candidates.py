@@ -1,7 +1,7 @@
 """Describe candidate functions, which represent effects outside the library.
 
-A candidate function is a small screw or a compliance at a place of the robot.  Its
-value depends on one or two variables.
+A candidate function is a small displacement or a compliance at a frame, at the base or
+in the readings. Its value depends on one or two variables.
 """
 
 from collections.abc import Iterator, Sequence
@@ -25,7 +25,7 @@ _ROUNDING = 1e-12
 
 @dataclass(frozen=True)
 class CandidatePart:
-    """Place at which a candidate function acts, and the variables of the function."""
+    """Location at which a candidate function acts, with the function's variables."""
 
     where: str
     components: tuple[str, ...]
@@ -34,17 +34,17 @@ class CandidatePart:
 
     @property
     def variables(self) -> tuple[str, ...]:
-        """One or two public names."""
+        """Public names of the variables, one or two."""
         second = (self.second_variable,) if self.second_variable else ()
         return (self.variable, *second)
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """A function that may act at one place or at several places of one kind.
+    """A function that may act at one location or at several similar locations.
 
     Attributes:
-        parts: places and variables.
+        parts: locations and variables.
         kind: ``"screw"`` or ``"compliance"``.
         shape: form of the function, the same for all parts.
     """
@@ -54,7 +54,7 @@ class Candidate:
     shape: CandidateShape
 
     def functions(self) -> list[Function]:
-        """Return the functions as in a robot file, without coefficients."""
+        """Return the functions in the format of a robot file, without coefficients."""
         numbers = dict.fromkeys(self.shape.names, 0.0) | dict(self.shape.given)
         return [
             Function(
@@ -70,20 +70,20 @@ class Candidate:
 
 
 def is_turn(component: str) -> bool:
-    """Return whether a component is a rotation or a moment."""
+    """Return whether a screw component is a rotation or a moment."""
     return component[0] in "rm"
 
 
 def own_component(frame: Frame) -> str:
-    """Return the component along which a joint moves; for a screw, its thread."""
+    """Return the screw component along which a joint moves."""
     return THREAD if frame.pitch else AXES[frame.own_axis]
 
 
 def variables_of(conditions: Conditions) -> list[str]:
-    """Return the variables that vary and are known throughout a session.
+    """Return the names of the variables on which a function can depend.
 
-    Variables are drive coordinates, components and magnitudes of loads, positions and
-    covariates.
+    Variables are drive coordinates, loads, positions and covariates. A variable is
+    returned if it varies and if at least one session contains all its values.
     """
     names = [f"q.{name}" for name in drives(conditions.robot)]
     names += [f"load.{axis}" for axis in ("mx", "my", "mz", "fx", "fy", "fz")]
@@ -103,15 +103,16 @@ def variables_of(conditions: Conditions) -> list[str]:
 
 
 def _kind(name: str) -> str:
-    """Return the name of the vector that has a component, or a scalar's name."""
+    """Return the vector to which a component belongs, or the name of a scalar."""
     vectors = "position.", "load.m", "load.f"
     return next((v for v in vectors if name.startswith(v)), name)
 
 
 def is_known(conditions: Conditions, *names: str) -> NDArray:
-    """Return a mask (R,) of the rows of sessions in which all variables are known.
+    """Return a mask (R,) of rows for which all variables are known.
 
-    Without sessions, all rows count as one session.  Wrenches are not checked.
+    If a variable is unknown in one row of a session, the whole session is excluded.
+    Without sessions, all rows are treated as one session.  Wrenches are not checked.
     """
     known = np.ones(len(conditions), dtype=bool)
     for name in names:
@@ -125,12 +126,12 @@ def is_known(conditions: Conditions, *names: str) -> NDArray:
 def places_of(
     robot: Robot, variables: Sequence[str]
 ) -> Iterator[tuple[str, tuple[CandidatePart, ...]]]:
-    """Yield the places of all candidate functions, one variable at a time.
+    """Yield all locations at which candidate functions can act, for each variable.
 
     Yields:
-        The kind of function, and the places with their variable.  Places are single
-        components, groups of three components, all drives with their own coordinates,
-        and all bodies along their axes.
+        The kind of function, and its locations with the variable.  A function may act
+        along a single component, along three components, on all drives, or on all
+        bodies.
     """
     single: list[tuple[str, tuple[str, ...]]]
     single = [(f.name, (axis,)) for f in robot.frames for axis in AXES]
@@ -155,6 +156,6 @@ def places_of(
 
 
 def _along(robot: Robot, name: str) -> tuple[str, ...]:
-    """Return the components along which a body extends."""
+    """Return the translation components along the axis of a body."""
     axis = np.abs(body_axis(robot.frame(name))[1])
     return tuple(a for a, part in zip(SHIFT, axis, strict=True) if part > 1e-9)

@@ -1,8 +1,8 @@
 """Decide which effects of a fitted machine the readings support.
 
-An effect is claimed under three conditions: its change of the readings exceeds the
-uncertainty of this change, a change of this size is improbable without the effect, and
-no parameter that defines the effect is at a bound.
+An effect is claimed if it satisfies three conditions.  Its change of the readings
+exceeds the uncertainty of this change.  Noise alone is unlikely to cause this change.
+No shape parameter is at a bound, and no other parameter is at its upper bound.
 """
 
 from dataclasses import dataclass
@@ -17,16 +17,14 @@ from forcefit.validation.diagnosis.lack_of_fit import UNLIKELY
 from forcefit.validation.diagnosis.separability import orthonormal_basis
 from forcefit.validation.diagnosis.unknowns import STEP, Acting, effects_in
 
-# Relative distance below which an unknown counts as being at its bound.
+# Relative distance from a bound below which an unknown is treated as at the bound.
 _AT_BOUND = 1e-3
 
 
 def supported(fit: MachineFit, one: Acting) -> bool:
     """Return whether the readings support an effect of the fitted machine.
 
-    Returns:
-        True or False; always True for the pose of the measuring frame, because every
-        campaign has one.
+    The pose of the measuring frame is always supported, because every campaign has one.
     """
     slots = one.hypothesis.slots
     if one.device or not slots:
@@ -52,7 +50,7 @@ def supported(fit: MachineFit, one: Acting) -> bool:
 
 
 def _without_devices(fit: MachineFit, slopes: NDArray) -> NDArray:
-    """Project out of slopes (n, k) what the pose of the measuring frame can imitate."""
+    """Project out of derivatives (n, k) the changes that a moved device also causes."""
     own = [fit.own(one)[2] for one in fit.unknowns.effects if one.device]
     if not own:
         return slopes
@@ -61,20 +59,19 @@ def _without_devices(fit: MachineFit, slopes: NDArray) -> NDArray:
 
 
 def _at_bound(bound: float, value: float) -> bool:
-    """Return whether a parameter's value is at a finite bound of the parameter."""
+    """Return whether a value equals a finite bound."""
     return bool(np.isfinite(bound) and abs(value - bound) <= _AT_BOUND * abs(bound))
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """Identified parameter of an effect in its public unit.
+    """Identified parameter of an effect, in the unit of the robot file.
 
     Attributes:
         name: public name.
         value: identified value, which includes the declared value.
         std: standard deviation of the value.
-        declared: value in the robot file; None if the file does not contain the
-            parameter.
+        declared: value in the robot file, None if absent.
         difference: value minus declared value.
     """
 
@@ -86,7 +83,7 @@ class Parameter:
 
 
 def parameters_of(fit: MachineFit, one: Acting) -> list[Parameter]:
-    """Return those parameters of an identified effect on which readings depend."""
+    """Return the parameters of an effect on which the readings depend."""
     h, robot = one.hypothesis, fit.unknowns.robot.without_effects()
     declared = effects_in(fit.unknowns.robot, one.session).get(h.effect, {})
     x, C, _ = fit.own(one)
@@ -111,7 +108,7 @@ def parameters_of(fit: MachineFit, one: Acting) -> list[Parameter]:
         around = np.remainder(change + np.pi, 2 * np.pi) - np.pi
         J[:, i] = np.where(phase, around, change) / (2 * step)
     std = np.sqrt(np.maximum(np.einsum("pi,ij,pj->p", J, C, J), 0.0)).tolist()
-    # Unmeasured components are omitted.
+    # Parameters without influence on the readings are omitted.
     shown = np.any(J[:, fit.seen(one)] != 0, axis=1).tolist()
     return [
         Parameter(name, v, s, declared.get(name), difference[name])

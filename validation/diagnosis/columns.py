@@ -1,4 +1,4 @@
-"""Compute the columns of all candidates from the design of a campaign."""
+"""Compute the regression columns of all candidate effects of a campaign."""
 
 import math
 from collections import Counter
@@ -42,35 +42,36 @@ from forcefit.validation.diagnosis.whitening import (
 )
 
 FUNCTION = "function"
-_CLOCK = 0.999  # correlation with time above which a variable is taken as the time
+_CLOCK = 0.999  # correlation with time above which a variable is treated as time
 # Number of random rows on which functions are scored first.
 _SAMPLE = 500
-# A candidate counts as imitated by the measuring frame if a smaller fraction of its
-# column remains after projecting out the motions of the frame.
+# Smallest fraction of a column that must remain after motions of the measuring frame
+# are projected out. Otherwise the column is dropped.
 _ALIKE = 1e-3
-# Smallest visible change: sum of squares of the whitened readings, two standard
-# deviations.
+# Smallest visible change, as a sum of squares over the whitened readings.
 _VISIBLE = 4.0
 
 
 class Columns:
-    """Columns of the N measured cells of a campaign.
+    """Regression columns of all candidate effects, for N measured cells.
 
     Attributes:
-        campaign, conditions: campaign of R rows and its conditions.
+        campaign: campaign of R rows.
+        conditions: measuring conditions of these rows.
         row: (N,) row of each cell.
         block: (N,) configuration or time span of each cell.
         visit: (N,) file row of each cell; a file row may contain several points.
-        motions: (R, 6, 6) change of the readings by platform motions, see
-            :func:`.platform_motions`; None if every file row contains only one point.
-        device: hypothesis for the unknown pose of the measuring frame; None if it is
+        motions: (R, 6, 6) change of the readings per platform motion, see
+            :func:`.platform_motions`. None if every file row contains a single point.
+        device: hypothesis for the pose of the measuring frame. None if this pose is
             known.
-        flat: (N, f) columns of the measuring frame, separate for each session.
+        flat: (N, f) columns for the pose of the measuring frame in each session.
         library: elements of the library effects.
         nuisance: geometric errors and springs, which every machine has.
-        functions: candidate functions at single places.
+        functions: candidate functions at single locations.
         sampled: (N,) mask of the cells on which functions are scored first.
-        explicit: functions at several places, with their columns in the sampled cells.
+        explicit: functions at several locations, with their columns in the sampled
+            cells.
     """
 
     def __init__(
@@ -78,12 +79,11 @@ class Columns:
         update: Callable[[str, int, int], None] = lambda what, done, total: None,
         odds: Mapping[str, float] = MappingProxyType({}),
     ) -> None:  # fmt: skip
-        """Compute the derivatives of the readings by all candidates.
+        """Compute the derivatives of the readings with respect to all candidates.
 
-        Readings enter only through the pattern of measured cells.  Conditions include
-        the registration and second-order terms.  ``odds`` maps the name of an effect,
-        ``"function"``, ``"geometry"`` or ``"springs"`` to a factor on its prior odds; 0
-        excludes it.
+        The values of the readings are not used. ``odds`` maps the name of an effect,
+        ``"function"``, ``"geometry"`` or ``"springs"`` to a factor on its prior odds. A
+        factor of 0 excludes the effect.
         """
         self.odds = odds
         self.campaign, self.conditions = campaign, derivatives.conditions
@@ -112,7 +112,7 @@ class Columns:
         self.explicit = joint_functions(self.functions, rows) if any_function else []
 
     def _library(self, update: Callable[[str, int, int], None]) -> list[Element]:
-        """Return the hypotheses that change the readings visibly and distinctly."""
+        """Return library effects that visibly change the readings."""
         campaign = self.campaign
         shown: dict[object, Signature] = {}
         listed = hypotheses(self.conditions, loaded_components(campaign))
@@ -137,7 +137,7 @@ class Columns:
         return [e for e in made if e.columns.shape[1] or e.offset is not None]
 
     def without_clocks(self) -> "Columns":
-        """Return the columns without functions and effects of time."""
+        """Return the columns without effects and functions of time."""
         other = copy(self)
         timed = {name for name, effect in LIBRARY.items() if effect.needs == ("time",)}
         other.library = [e for e in self.library if e.name not in timed]
@@ -149,7 +149,7 @@ class Columns:
 
     @property
     def candidates(self) -> bool:
-        """Whether there is any candidate effect or function."""
+        """Whether there is at least one candidate effect or function."""
         return bool(self.library or self.explicit or self.functions.variables)
 
     def loadings(self, cells: NDArray) -> NDArray | None:
@@ -165,9 +165,11 @@ class Columns:
     ) -> Whitening:
         """Return the whitening transformation of selected cells (N,).
 
-        ``root`` (n,) contains the square roots of the relative precisions of the cells.
-        ``common`` [rad, m] contains the standard deviations of the platform's common
-        motion, divided by tau.
+        Args:
+            cells: (N,) mask of the n selected cells.
+            root: (n,) square roots of the relative precisions.
+            common: [rad, m] standard deviations of the common platform motion, divided
+                by tau.
         """
         loadings = self.loadings(cells) if any(common) else None
         if loadings is not None:
@@ -176,12 +178,12 @@ class Columns:
 
     @property
     def has_clocks(self) -> bool:
-        """Whether rows are ordered in time and time is among the variables."""
+        """Whether rows are successive in time and a function can depend on time."""
         successive = blocks_of(self.campaign)[1] == SPANS
         return successive and any(map(self._is_clock, self.functions.variables))
 
     def _is_clock(self, name: str) -> bool:
-        """Return whether a variable is, or is proportional to, the time."""
+        """Return whether a variable is proportional to time."""
         time = self.conditions.time
         if name == "time" or not np.isfinite(time).all() or not np.ptp(time):
             return name == "time"
@@ -189,13 +191,13 @@ class Columns:
         return bool(abs(np.corrcoef(x, time)[0, 1]) > _CLOCK)
 
     def _named(self) -> NDArray:
-        """Return the columns (N, c) of library effects with a single unknown."""
+        """Return the columns (N, c) of library effects that have a single unknown."""
         alone = [e.columns for e in self.library if e.columns.shape[1] == 1]
         return np.hstack([np.zeros((len(self.row), 0)), *alone])
 
     @cached_property
     def flat(self) -> NDArray:
-        """(N, f) columns of the measuring frame, separate for each session."""
+        """Columns (N, f) for the pose of the measuring frame in each session."""
         if self.device is None:
             return np.zeros((len(self.row), 0))
         columns = self.tangents.at_start(self.device).columns
@@ -203,7 +205,7 @@ class Columns:
         return np.hstack([columns * self.tangents.rows_of(s) for s in sessions])
 
     def _told(self, signature: Signature) -> Signature:
-        """Project out of a per-session hypothesis what the device pose can imitate."""
+        """Remove unknowns that are equivalent to a pose of the measuring frame."""
         h = signature.hypothesis
         if not self.flat.shape[1] or sessions_of(h) == (None,):
             return signature
@@ -224,13 +226,13 @@ def _shows(signature: Signature) -> bool:
 
 
 def _print(signature: Signature) -> object:
-    """Return a key that identifies hypotheses of one effect with equal columns."""
+    """Return a key that is equal for hypotheses with the same effect and columns."""
     shown = signature.columns[:, signature.columns.any(axis=0)]
     starts = tuple(s.start for s in signature.hypothesis.slots if s.shape)
     return signature.hypothesis.effect, tuple(sorted(fingerprints(shown))), starts
 
 
 def _moves_base(h: Hypothesis) -> bool:
-    """Return whether a hypothesis moves the measuring frame, as ``flat`` does."""
+    """Return whether a hypothesis moves the measuring frame."""
     device = LIBRARY[h.effect].device
     return any(name in device for slot in h.slots for name in slot.names)

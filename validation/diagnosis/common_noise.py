@@ -1,10 +1,10 @@
 """Estimate noise that is common to the points of one measurement.
 
-A device may measure several points of the platform together.  Their readings then share
-the repeatability error of the machine and the motion of the device frame.  This common
-noise is modelled as a small random platform motion in each measurement, with one
-standard deviation for rotations and one for translations of the points' centre.  Both
-maximise the evidence of a model in which all other unknowns are marginalised.
+A device may measure several points of the platform together. Their readings then share
+the repeatability error of the machine. This common noise is modelled as a small random
+platform motion in each measurement, with one standard deviation for rotations and one
+for translations. Both maximise the evidence of a model in which all other unknowns are
+marginalised.
 """
 
 import math
@@ -19,22 +19,21 @@ from forcefit.validation.diagnosis.weighted_readings import NONE
 
 # First step of the logarithms of both standard deviations, which start at one sigma.
 _STEP = 1.0
-_CLOSE = 0.05  # change of a standard deviation's logarithm at which the search ends
-# [sigma] A standard deviation with a smaller contribution to the readings is set to 0.
+_CLOSE = 0.05  # tolerance on the logarithms of the standard deviations
+# [sigma] Lower bound on the noise that a standard deviation causes in the readings.
 _LEAST = 0.02
-# [sigma] A standard deviation with a larger contribution to the readings is required.
+# [sigma] Common noise above which models without it are not tested.
 _CLEAR = 1.0
-_EVALUATIONS = 40  # largest number of evaluations of the evidence; each fits a model
-_STABLE = 0.1  # smaller changes of a standard deviation's logarithm change no decision
+_EVALUATIONS = 40  # maximum number of evaluations of the evidence
+_STABLE = 0.1  # largest difference between logarithms of equal standard deviations
 
 
 def common_sizes(state: State) -> tuple[float, float]:
-    """Estimate the common noise of points for a model with given elements.
+    """Estimate the noise that is common to points measured together.
 
     Returns:
-        [rad, m] standard deviations of rotation and translation, divided by the scale
-        of the noise.  A standard deviation is zero if it does not increase the evidence
-        by more than its penalty.
+        [rad, m] standard deviations of rotation and translation, divided by the noise
+        scale. A standard deviation is zero if it hardly increases the evidence.
     """
     some = state.readings.sample(NONE)
     loadings = some.columns.loadings(some.cells)
@@ -61,7 +60,7 @@ def common_sizes(state: State) -> tuple[float, float]:
 def _largest(
     state: State, kinds: tuple[int, ...], units: list[float]
 ) -> tuple[tuple[float, float], float]:
-    """Return the standard deviations of maximum evidence, and the evidence."""
+    """Return the standard deviations that maximise the evidence, and this maximum."""
 
     def sizes(logs: NDArray) -> tuple[float, float]:
         own = dict(zip(kinds, np.exp(logs).tolist(), strict=True))
@@ -81,7 +80,7 @@ def _largest(
 
 
 def _evidence(state: State, sizes: tuple[float, float]) -> float:
-    """Return the log posterior of a model's elements with shared noise."""
+    """Return the log posterior of a model for given common noise."""
     some = state.readings.sample(sizes)
     return (
         Models(some).state(state.elements, state.mode, state).score - some.log_det / 2
@@ -89,7 +88,7 @@ def _evidence(state: State, sizes: tuple[float, float]) -> float:
 
 
 def stable(one: tuple[float, float], other: tuple[float, float]) -> bool:
-    """Return whether two estimates of the standard deviations agree."""
+    """Return whether two estimates of the standard deviations are nearly equal."""
     pairs = list(zip(one, other, strict=True))
     if any((a > 0) != (b > 0) for a, b in pairs):
         return False

@@ -1,4 +1,4 @@
-"""Predict the readings of the declared machine, once for all folds."""
+"""Predict the readings of the machine that a robot file describes."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -21,7 +21,7 @@ from forcefit.validation.diagnosis.signatures import conditions_of, whiten
 
 @dataclass(frozen=True, eq=False)
 class Declared:
-    """Predictions of the declared machine, which do not depend on measured readings.
+    """Predictions for the machine in the robot file, before any fit.
 
     Attributes:
         conditions: conditions of all rows, before the pose of the device is fitted.
@@ -33,16 +33,22 @@ class Declared:
 
     @cached_property
     def derivatives(self) -> Derivatives:
-        """Derivatives of the declared readings, with clearances in rest position."""
+        """Derivatives of the declared readings, with joints at their rest positions."""
         return Derivatives(at_rest(self.conditions))
 
     def bent(
         self, campaign: Campaign, conditions: Conditions, errors: NDArray, least: float
     ) -> Conditions | None:
-        """Return conditions with the second-order change by geometric errors (n, 6).
+        """Add the second-order effect of geometric errors to conditions.
 
-        The errors add to the declared ones.  Return None if no reading changes by more
-        than ``least`` [sigma] in second order.
+        Args:
+            campaign: campaign of R rows.
+            conditions: conditions of these rows.
+            errors: (n, 6) [rad, m] geometric errors in addition to the declared ones.
+            least: [sigma] smallest second-order change of a reading.
+
+        Returns:
+            The new conditions, or None if all second-order changes are smaller.
         """
         if not errors.any():
             return None
@@ -58,15 +64,15 @@ class Declared:
 
 
 def declared(campaign: Campaign, *, finite: bool = False) -> Declared:
-    """Return the declared model of a campaign's rows.
+    """Return the declared model of a campaign.
 
     Args:
         campaign: campaign of R rows.
-        finite: whether the declared model computes finite motions, which the robot file
-            may also request.
+        finite: whether the declared model computes finite motions. The robot file may
+            also request finite motions.
 
     Returns:
-        The declared model, which does not depend on the readings of the campaign.
+        The declared model, which does not depend on the readings.
     """
     conditions = conditions_of(campaign)
     finite = finite or conditions.exact
@@ -75,7 +81,7 @@ def declared(campaign: Campaign, *, finite: bool = False) -> Declared:
 
 
 def at_rest(conditions: Conditions) -> Conditions:
-    """Put the clearances of closed chains in rest position (cached)."""
+    """Move the joints of closed chains to rest positions within their clearances."""
     if conditions.robot.closures and virtual_joints(conditions.robot).cones.shape[1]:
         return with_rest_positions(conditions)
     return conditions

@@ -1,7 +1,7 @@
 """Compute the readings of a machine and their derivatives with respect to effects.
 
-The derivatives depend on the design of a campaign but not on its readings, so that
-searches under equal conditions, for example the folds of a diagnosis, share them.
+The derivatives depend on the design of a campaign but not on its readings. All folds of
+a diagnosis therefore share them.
 """
 
 from collections.abc import Mapping
@@ -19,8 +19,7 @@ from forcefit.validation.diagnosis.hypotheses import Slot
 from forcefit.validation.diagnosis.responses import Responses, responses
 from forcefit.validation.diagnosis.sensitivities import Sensitivities
 
-# Step of numerical derivatives, relative to the plausible size of the unknown.  This
-# value balances round-off and truncation errors.
+# Step of numerical derivatives, relative to the plausible size of the unknown.
 STEP = 1e-3
 
 
@@ -28,35 +27,40 @@ class Derivatives:
     """Readings of R rows near the declared model, and their derivatives.
 
     Attributes:
-        conditions: declared conditions, including the registration if it was fitted.
+        conditions: declared conditions, including a fitted pose of the measuring
+            device.
     """
 
     def __init__(self, conditions: Conditions) -> None:
-        """Store the conditions; derivatives are computed when they are first used."""
+        """Store the conditions. Derivatives are computed when they are first used."""
         self.conditions = conditions
         self._begun: dict[object, NDArray] = {}
 
     @cached_property
     def declared(self) -> NDArray:
-        """(R, 6) [rad, m] readings without effects."""
+        """Readings (R, 6) [rad, m] without effects."""
         return predict(self.conditions).deviation
 
     @cached_property
     def response(self) -> Responses:
-        """Responses of the readings to small screws at frames, see ``Responses``."""
+        """Responses of the readings to small displacements at frames."""
         return responses(self.conditions)
 
     @cached_property
     def sensitivities(self) -> Sensitivities:
-        """Response of the readings to functions at all possible places."""
+        """Responses of the readings to functions at all possible locations."""
         return Sensitivities(self.conditions, self.response)
 
     def model(self, effects: Mapping[str, Values], *, finite: bool = False) -> NDArray:
-        """Return the readings (R, 6) [rad, m] with effects, linear in clearances.
+        """Return the readings (R, 6) [rad, m] of a machine with given effects.
 
-        ``effects`` maps the name of each effect to its parameters by public name.
-        Readings of rows without a solution are NaN. Finite motions are computed for the
-        changed machine if ``finite`` is true, otherwise for the declared machine.
+        Args:
+            effects: mapping from the name of each effect to its parameters by public
+                name.
+            finite: whether to compute finite motions with these effects.
+
+        Returns:
+            The readings, NaN in rows without a solution.
         """
         changed = apply_effects(self.conditions, effects)
         if any(LIBRARY[name].clearance for name in effects):
@@ -67,9 +71,12 @@ class Derivatives:
         return predict(changed).deviation
 
     def begun(self, effect: str, slot: Slot, shapes: Mapping[str, float]) -> NDArray:
-        """Return the readings (R, 6) [rad, m] after a step of one unknown of an effect.
+        """Return the readings (R, 6) [rad, m] after a small step of one unknown.
 
-        ``shapes`` contains the values of the effect's shape parameters.
+        Args:
+            effect: name of the effect.
+            slot: the unknown.
+            shapes: values of the shape parameters of the effect.
         """
         key = (effect, slot.names, tuple(sorted(set(shapes.values()))))
         if key not in self._begun:

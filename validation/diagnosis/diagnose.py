@@ -1,15 +1,14 @@
-"""Diagnose a campaign, that is, find effects missing from its declared model.
+"""Diagnose a campaign, that is, find effects that its robot file does not contain.
 
 Steps:
 
-1. choose the held-out rows (:mod:`.holdout`); their readings are first used in step 5;
-2. search the other rows for set-up blunders (:mod:`.setup_blunders`), then for effects
-and functions (:mod:`.trace`);
-3. fit all unknown parameters of the machine together, by the function that predicts
-with the saved file (:mod:`.fit`); drop effects that the readings do not support
-(:mod:`.claims`);
-4. with folds, repeat steps 2 and 3 for each fold and for all rows;
-5. compute the errors of the fitted robots on the held-out rows, and the verdict.
+1. Choose the held-out rows (:mod:`.holdout`), which are first used in step 5.
+2. Search the other rows for set-up blunders (:mod:`.setup_blunders`), then for effects
+   and functions (:mod:`.trace`).
+3. Fit all unknown parameters of the machine together (:mod:`.fit`). Drop effects that
+   the readings do not support (:mod:`.claims`).
+4. With cross-validation, repeat steps 2 and 3 for each fold.
+5. Compute the errors of the fitted robots on the held-out rows, and the verdict.
 """
 
 from collections.abc import Callable, Mapping
@@ -42,16 +41,15 @@ def diagnose(
     odds: Mapping[str, float] = MappingProxyType({}),
     update: Update = lambda what, done, total: None,
 ) -> Diagnosis:
-    """Find the effects that explain a campaign's residual from the declared model.
+    """Find the effects that explain the deviations of a machine from its model.
 
     Args:
         campaign: measured deviations.
-        finite: whether the declared model computes finite motions in the search.
-            Finite motions are always computed if the robot file contains the effect
-            ``geometric_stiffening``.
+        finite: whether the search computes finite motions of the declared model.  It
+            always does if the robot file contains ``geometric_stiffening``.
         odds: mapping from the name of an effect, ``"function"`` (any function),
-            ``"geometry"`` or ``"springs"`` to a factor on its prior odds; 0 excludes
-            it.
+            ``"geometry"`` or ``"springs"`` to a factor on its prior odds.  A factor of
+            0 excludes the effect.
         update: function called with the name of the step, the finished count and the
             total.
 
@@ -66,11 +64,16 @@ def diagnose(
     design = declared(campaign, finite=finite)  # common to all folds
 
     def found(rows: NDArray) -> tuple[Traced, MachineFit, tuple[SetupBlunder, ...]]:
-        """Search and fit selected rows; return search, fitted machine and blunders."""
+        """Search and fit selected rows.
+
+        Returns:
+            The result of the search, the fitted machine, and the set-up blunders.
+        """
         part = hidden(campaign, ~rows)
         seen = part.cells.any(axis=1)
         setup = setup_blunders(part.take(seen), conditions_of(part).take(seen))
-        # Set-up blunders rule out a search for effects, which would imitate them.
+        # If there are set-up blunders, no effects are searched for, because effects
+        # could imitate a blunder.
         nothing = dict.fromkeys((*LIBRARY, FUNCTION, GEOMETRY, SPRINGS), 0.0)
         own = nothing if setup else odds
         return *trace(part, rows, design, update, odds=own), setup
@@ -93,5 +96,9 @@ def diagnose(
 
 
 def _fitted_rows(held: HeldOut, rows: NDArray) -> NDArray:
-    """Return a mask (R,) of rows that are not held out, or all if none can be."""
+    """Return a mask (R,) of the fitted rows.
+
+    These are the rows that are not held out.  If all rows are held out in folds, all
+    rows are fitted.
+    """
     return np.ones(len(rows), dtype=bool) if held.how == "none" else ~rows

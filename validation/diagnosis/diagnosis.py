@@ -1,8 +1,4 @@
-"""Define the result of a diagnosis, its verdict and the evidence.
-
-Other modules convert the result to text, figures and files.  The attribute ``wording``
-stores the function that creates the text, so that this module need not import it.
-"""
+"""Define the result of a diagnosis."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -44,39 +40,35 @@ class Diagnosis:
         traced: result of the search.
         claimed: names of the claimed effects.
         effects: names of all effects of the identified machine, claimed or not.
-        probability: probability of each library effect that the design can detect.
+        probability: probability of each detectable library effect.
         alternatives: sets of effect names with their probabilities, most probable
             first.
         lack: lack-of-fit test of the fitted rows.
         before: errors of the declared model on the held-out rows, without outliers.
-        after: errors on the same rows of machines fitted without them.
-        saved: errors of the saved robot on all rows without outliers, which it was
-            fitted to.
-        noise: expected errors due to sigma and to common noise of points.
-        with_outliers: the errors ``before`` and ``after`` on all held-out rows,
-            including outliers.
-        uncertainty: [-] standard error of ``after.normalised``, estimated from the
-            scatter between blocks.
-        noise_scale: ratio of true to stated sigma, and its standard deviation.
-        noise_in_time: correlation of the noise in time, which increases the uncertainty
-            of the effects; None if there is no correlation.
+        after: errors of fitted machines on the same rows, which were not used in the
+            fits.
+        saved: errors of the saved robot on all rows to which it was fitted.
+        noise: errors expected from noise alone.
+        with_outliers: ``before`` and ``after`` including the held-out outliers.
+        uncertainty: [-] standard error of ``after.normalised``.
+        noise_scale: ratio of true to declared sigma, and its standard deviation.
+        noise_in_time: correlation of the noise in time.  None if there is no
+            correlation.
         sequence: models from the declared to the identified machine, with their errors.
         held: the held-out rows and how they were chosen.
         outliers: (R,) bool, True for rows excluded from all computations.
-        conditions: declared conditions of the campaign, including the registration.
-        open: (R,) bool, True for rows in which clearances leave the pose undetermined,
-            in the declared model or with the identified effects; see
-            :class:`forcefit.assembly.measurement.predict.Prediction`.
-        residual_before: (R, 6) [rad, m] reading minus prediction of the declared model;
+        conditions: declared conditions, including the pose of the measuring device.
+        open: (R,) bool, True for rows in which the pose is undetermined because of
+            clearances, in the declared model or with the identified effects.
+        residual_before: (R, 6) [rad, m] reading minus prediction of the declared model,
             NaN if not measured.
         residual_after: (R, 6) [rad, m] reading minus prediction of the saved robot.
-        trends: variables on which a residual above the noise depends.
-        next: the measurement that would resolve an ambiguous verdict.
-        needed: additional rows that a verdict requires, if there are too few.
-        remarks: implausible parameters of the machine, and impossible readings.
-        setup: blunders in the set-up of the campaign, which rule out a search for
-            effects.
-        wording: function that returns a diagnosis as text.
+        trends: variables on which the residual depends.
+        next: the best additional measurement if the verdict is ambiguous.
+        needed: description of the additional rows that a verdict requires.
+        remarks: sentences about implausible parameters and impossible readings.
+        setup: blunders in the set-up of the campaign.
+        wording: function that converts a diagnosis to text.
     """
 
     campaign: Campaign
@@ -114,27 +106,27 @@ class Diagnosis:
 
     @property
     def robot(self) -> Robot:
-        """The robot with all fitted parameters, which is saved."""
+        """The robot with all fitted parameters."""
         return self.fit.robot
 
     @property
     def fitted(self) -> NDArray:
-        """(R,) bool, True for rows to which the saved machine was fitted."""
+        """Mask (R,), True for rows to which the saved machine was fitted."""
         return np.asarray(self.traced.used | (self.held.rows & ~self.outliers))
 
     @property
     def better(self) -> bool:
-        """Whether held-out errors are smaller than for the declared machine."""
+        """Whether held-out errors are smaller than those of the declared machine."""
         found = bool(len(self.fit.unknowns)) or bool(self.effects)
         return found and self.after.normalised < self.before.normalised
 
     @property
     def findings(self) -> tuple[str, ...]:
-        """Sentences about the scale, repeatability and memory of the noise."""
+        """Sentences about the noise."""
         return self.traced.selected.noise.findings
 
     def to_xarray(self) -> "xarray.Dataset":
-        """Convert to a data set over ``row``: residuals, held-out rows and outliers."""
+        """Convert residuals and row masks to a data set with dimension ``row``."""
         return row_dataset(
             self.campaign,
             {
@@ -171,7 +163,7 @@ class Diagnosis:
         return self.wording(self)
 
     def _figures(self) -> Figures:
-        """Return the verdict and its main figures for display."""
+        """Return the verdict and the main results for display."""
         likely = sorted(self.probability.items(), key=lambda one: -one[1])[:3]
         return {
             "campaign": f"{self.campaign.name}, {len(self.campaign)} rows",

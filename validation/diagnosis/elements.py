@@ -1,8 +1,8 @@
 """Describe library effects and functions as elements of a linear model.
 
 An element adds ``offset + columns d`` to the whitened readings.  Unknowns d of the same
-unit share a prior standard deviation and are scaled so that the root mean square norm
-of their columns is one.
+unit share a prior standard deviation.  They are scaled so that their columns have an
+rms norm of one.
 """
 
 from collections.abc import Iterable
@@ -19,29 +19,28 @@ from forcefit.validation.diagnosis.hypotheses import Hypothesis
 from forcefit.validation.diagnosis.signatures import Signature
 from forcefit.validation.diagnosis.whitening import Whitening
 
-_PLAUSIBLE = 1e3  # largest ratio of an unknown to its plausible size
-_NO_OFFSET = 1e-9  # [sigma] smaller offsets are round-off
+_PLAUSIBLE = 1e3  # largest prior standard deviation, relative to a plausible value
+_NO_OFFSET = 1e-9  # [sigma] smallest offset above round-off
 
 
 @dataclass(frozen=True, eq=False)
 class Element:
-    """A library effect at certain frames, or a function.
+    """Linear model of a library effect at certain frames, or of a function.
 
     Attributes:
-        name: name of the effect; ``""`` for a function.
+        name: name of the effect, ``""`` for a function.
         columns: (N, m) whitened change of the readings per scaled unknown.
         scale: (m,) factor from a scaled unknown to its value.
-        offset: (N,) whitened contribution at d = 0; None if it is zero.
+        offset: (N,) whitened contribution at d = 0. None if it is zero.
         lower, upper: (m,) bounds of the scaled unknowns.
-        given: (m,) fixed prior standard deviation; NaN if it is optimised.
+        given: (m,) fixed prior standard deviation, NaN if it is optimised.
         most: largest plausible prior standard deviation.
         log_prior: logarithm of the prior probability.
         what: the hypothesis of a library effect, or the candidate function.
-        slots: (m,) indices of the slots of the hypothesis, or of the unknowns of the
-            candidate.
-        begin: values of all slots at d = 0.
-        first: the element linearised at its start values; None if this element itself
-            is linearised there.
+        slots: (m,) index of each unknown in the parameters of ``what``.
+        begin: values of these parameters at d = 0.
+        first: the element linearised at its start values.  None if this element is
+            linearised at its start values.
     """
 
     name: str
@@ -65,23 +64,23 @@ class Element:
 
     @property
     def hypothesis(self) -> Hypothesis:
-        """Hypothesis of an effect of the library."""
+        """Hypothesis, if the element is a library effect."""
         assert isinstance(self.what, Hypothesis)
         return self.what
 
     @property
     def candidate(self) -> Candidate:
-        """The candidate, if the element is a function."""
+        """Candidate, if the element is a function."""
         assert isinstance(self.what, Candidate)
         return self.what
 
     @property
     def bounded(self) -> NDArray:
-        """(m,) bool, True for an unknown that starts at its lower bound."""
+        """Mask (m,), True for an unknown that starts at its lower bound."""
         return np.abs(self.lower) < 1e-12
 
     def values(self, d: NDArray) -> NDArray:
-        """Return the values of all slots or function unknowns, within bounds."""
+        """Return the parameters of the element for scaled unknowns d, within bounds."""
         x = self.begin.copy()
         x[self.slots] += np.clip(d, self.lower, self.upper) * self.scale
         return x
@@ -92,9 +91,15 @@ def effect_element(
 ) -> Element:
     """Return the element of a library effect.
 
-    The element is linearised at the shape parameters ``shapes`` (k,), or at their start
-    values if ``shapes`` is None.  Unknowns without influence on the readings keep their
-    start values.
+    Args:
+        signature: derivatives of the effect.
+        robot: robot on which the effect acts.
+        log_prior: logarithm of the prior probability.
+        shapes: (k,) shape parameters at which the effect is linearised.  None for their
+            start values.
+
+    Returns:
+        The element, without unknowns that do not affect the readings.
     """
     h = signature.hypothesis
     shape = np.array([slot.shape for slot in h.slots], dtype=bool)
@@ -103,7 +108,7 @@ def effect_element(
     used = shown if shapes is not None else shown & ~shape
     slots = np.flatnonzero(used)
     plausible = np.array([h.slots[k].unknown.scale for k in slots])
-    # The prior standard deviation of a nonlinear (shape) parameter is half its value.
+    # The prior standard deviation of a shape parameter is half its value.
     plausible = np.where(shape[slots], 0.5 * np.abs(begin[slots]), plausible)
     columns = signature.columns[:, slots] * plausible
     kinds = [_kind(robot, h, k) for k in slots.tolist()]
@@ -133,7 +138,7 @@ def effect_element(
 
 
 def _kind(robot: Robot, h: Hypothesis, slot: int) -> tuple[object, ...]:
-    """Return a key that is equal for unknowns of the same unit."""
+    """Return a key that is equal for unknowns of the same kind and unit."""
     name, unknown = h.slots[slot].names[0], h.slots[slot].unknown
     last = name.rpartition(".")[2]
     joints = [f.joint for f in robot.frames if name.startswith(f"{f.name}.")]
@@ -141,7 +146,7 @@ def _kind(robot: Robot, h: Hypothesis, slot: int) -> tuple[object, ...]:
 
 
 def _norms(columns: NDArray, kinds: Iterable[object]) -> NDArray:
-    """Return for each of m columns the rms norm over all columns of its kind."""
+    """Return for each of m columns the rms norm of all columns of the same kind."""
     names = list(kinds)
     squares = (columns**2).sum(axis=0)
     own = [[k for k, other in enumerate(names) if other == kind] for kind in names]
@@ -152,11 +157,15 @@ def function_element(
     candidate: Candidate, columns: NDArray, axes: NDArray, falling: NDArray,
     most: float, log_prior: float,
 ) -> Element | None:  # fmt: skip
-    """Return the element of a function of m unknowns, or None if it is invisible.
+    """Return the element of a function, or None if it does not affect the readings.
 
-    ``columns`` (N, m) are the whitened changes of the readings per unknown.  ``axes``
-    (m,) is the screw component of each unknown.  ``falling`` (m,) are the relative
-    prior standard deviations.  ``most`` is the largest plausible value.
+    Args:
+        candidate: the function.
+        columns: (N, m) whitened change of the readings per unknown.
+        axes: (m,) screw component of each unknown.
+        falling: (m,) relative prior standard deviations.
+        most: largest plausible value of an unknown.
+        log_prior: logarithm of the prior probability.
     """
     scaled = columns * falling
     norm = _norms(scaled, axes // 3)
@@ -171,12 +180,18 @@ def function_element(
 
 
 class Dense:
-    """Elements with stored columns, scored in batches."""
+    """Elements with stored columns, whose scores are computed in batches."""
 
     def __init__(
         self, elements: list[Element], cells: NDArray, whiten: Whitening
     ) -> None:
-        """Group elements by their number of columns; use only the cells (N,) bool."""
+        """Store elements for selected cells, grouped by their number of columns.
+
+        Args:
+            elements: the elements.
+            cells: (N,) mask of the selected cells.
+            whiten: whitening transformation of these cells.
+        """
         self.elements = elements
         self._offsets: list[tuple[int, NDArray]] = []
         self._groups: list[tuple[NDArray, NDArray, NDArray, NDArray, NDArray]] = []

@@ -25,7 +25,7 @@ _COLOURS = {"before": RED, "after": BLUE}
 
 
 def error_chart(diagnosis: Diagnosis) -> str:
-    """Return a bar chart of the noise and of errors before and after diagnosis."""
+    """Return a bar chart of the noise and of the errors before and after diagnosis."""
     charts = []
     for kind, unit in (("rotation", "rad"), ("position", "m")):
         names = ("before", "after", "noise")
@@ -39,7 +39,7 @@ def error_chart(diagnosis: Diagnosis) -> str:
 
 
 def sequence_chart(diagnosis: Diagnosis) -> str:
-    """Return a bar chart of the error [sigma] of each model of the sequence."""
+    """Return a bar chart of the error [sigma] of each model in the model sequence."""
     values: dict[str, float] = {}
     for step in diagnosis.sequence:
         again = step.term in values  # several functions may be learned
@@ -81,7 +81,7 @@ def vector_charts(diagnosis: Diagnosis) -> str:
 
 
 def covariate_charts(diagnosis: Diagnosis) -> str:
-    """Return charts of the residual over each variable, before and after diagnosis."""
+    """Return charts of the residual as a function of each variable."""
     kept, rows = ~diagnosis.outliers, _labels(diagnosis)
     sizes = {
         name: np.sqrt(np.nanmean((left / diagnosis.campaign.sigma) ** 2, axis=1))[kept]
@@ -122,7 +122,7 @@ def _labels(diagnosis: Diagnosis) -> list[str]:
 
 
 def _varied(diagnosis: Diagnosis) -> dict[tuple[str, str], NDArray]:
-    """Return the name and unit of each charted variable."""
+    """Return the names and units of the variables shown in charts."""
     campaign = diagnosis.campaign
     varied = {("load size", "N"): np.linalg.norm(campaign.loads[:, 3:], axis=1)}
     for i, frame in enumerate(campaign.robot.frames):
@@ -136,7 +136,7 @@ def _varied(diagnosis: Diagnosis) -> dict[tuple[str, str], NDArray]:
 
 
 def probability_chart(diagnosis: Diagnosis) -> str:
-    """Return a bar chart of the probabilities of all effects, largest on top."""
+    """Return a bar chart of the probabilities of all effects."""
     ranked = sorted(diagnosis.probability.items(), key=lambda item: -item[1])
     axis = Axis(f"probability (claimed from {CLAIM}, a rival from {RIVAL})",
                 options={"range": [0, 1]})  # fmt: skip
@@ -146,7 +146,7 @@ def probability_chart(diagnosis: Diagnosis) -> str:
 
 
 def confounding_chart(diagnosis: Diagnosis) -> str:
-    """Return a matrix chart of how well effects imitate each other."""
+    """Return a chart of how well each effect can imitate each other effect."""
     columns: dict[str, NDArray] = {}
     for element in diagnosis.traced.columns.library:  # most general first
         if np.any(element.columns):
@@ -156,12 +156,15 @@ def confounding_chart(diagnosis: Diagnosis) -> str:
 
 
 def imitation_chart(shared: NDArray, names: tuple[str, ...]) -> str:
-    """Return an HTML chart of the fraction of each effect that another can imitate.
+    """Return a chart of how well each effect can imitate each other effect.
 
     Args:
-        shared: (m, m) fraction of the row's effect that the column's effect can
-            imitate.
+        shared: (m, m) fraction of effect i that effect j can imitate, in element [i,
+            j].
         names: names of the m effects.
+
+    Returns:
+        The chart as HTML.
     """
     return matrix(
         shared, names, "fraction of the row's effect that the column can imitate",
@@ -173,9 +176,8 @@ def worst_row(diagnosis: Diagnosis) -> tuple[int, str]:
     """Return the held-out row with the largest error of the declared model.
 
     Returns:
-        The index of the row, and the kind of the error: ``"position"``, or
-        ``"rotation"`` if no position was measured.  The result is -1 and an empty text
-        if there is no such row.
+        The index of the row, and the kind of the error, ``"position"`` or
+        ``"rotation"``. If there is no such row, the index is -1 and the text is empty.
     """
     aside = diagnosis.held.rows & ~diagnosis.outliers
     for name, part in (("position", slice(3, 6)), ("rotation", slice(0, 3))):
@@ -188,7 +190,7 @@ def worst_row(diagnosis: Diagnosis) -> tuple[int, str]:
 
 
 def assembled(diagnosis: Diagnosis, row: int) -> Assembly | None:
-    """Assemble the identified machine in a row under its load, or return None."""
+    """Return the pose of the identified machine under the load of a row, or None."""
     campaign = replace(diagnosis.campaign, robot=diagnosis.robot)
     try:
         forced = assemble_row(replace(conditions_of(campaign), exact=False), row)
@@ -198,7 +200,7 @@ def assembled(diagnosis: Diagnosis, row: int) -> Assembly | None:
 
 
 def worst_robot(diagnosis: Diagnosis) -> str:
-    """Return a 3-D scene of the robot at the row of largest error, if there is one."""
+    """Return a 3-D scene of the robot in the row with the largest error."""
     row, name = worst_row(diagnosis)
     forced = assembled(diagnosis, row) if row >= 0 else None
     if forced is None:

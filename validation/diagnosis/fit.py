@@ -1,20 +1,20 @@
-r"""Fit all unknown robot parameters together, as the last step of a diagnosis.
+r"""Fit all unknown robot parameters together in the last step of a diagnosis.
 
 The most probable parameters x minimise
 
     F(x) = |W (y - f(x)) / sigma|^2 + |(x - m) / s|^2    within the bounds of x,
 
-f(x) are the predicted readings of the fitted robot, computed by the function that
-predicts with a saved file (:mod:`forcefit.validation.diagnosis.prediction`).  The
-minimum is computed by Gauss-Newton steps with the derivatives of the linear model at
-the current robot.  Steps that increase F are halved.
+Here f(x) contains the predicted readings of the robot with parameters x
+(:mod:`forcefit.validation.diagnosis.prediction`). The minimum is computed by
+Gauss-Newton steps with the derivatives of the linear model.  Steps that increase F are
+halved.
 
 ======  ==============  =========  ===================================================
 symbol  code            shape      meaning
 ======  ==============  =========  ===================================================
 y       ``measured``    (n,)       readings of the fitted cells
 W       ``whiten``      (n, n)     transformation to independent noise
-A       ``A``           (n, k)     slopes over sigma, whitened
+A       ``A``           (n, k)     df/dx / sigma, whitened
 P       ``precision``   (k,)       1 / s^2
 C       ``covariance``  (k, k)     (A'A + P)^-1
 ======  ==============  =========  ===================================================
@@ -39,12 +39,12 @@ from forcefit.validation.diagnosis.separability import ROUNDING
 from forcefit.validation.diagnosis.unknowns import Acting, Unknowns
 from forcefit.validation.diagnosis.whitening import whitening_of
 
-_STEPS = 20  # largest number of Gauss-Newton steps; usually ten suffice
-_SLOPES = 6  # number of steps in which the derivatives are recomputed
-_SHORTEST = 1 / 64  # smallest fraction of a step that is tried
-# Decrease of F at convergence.  F is a sum of squares in standard deviations.
+_STEPS = 20  # maximum number of Gauss-Newton steps
+_SLOPES = 6  # number of steps after which the derivatives are recomputed
+_SHORTEST = 1 / 64  # smallest fraction of a Gauss-Newton step
+# Decrease of F in one step below which the iteration ends.
 _SETTLED = 1e-3
-# [sigma] Residual assigned to a reading if the robot has no solution there.
+# [sigma] Residual of a reading for which the model has no solution.
 _NO_ANSWER = 1e3
 
 
@@ -55,11 +55,9 @@ class MachineFit:
     Attributes:
         unknowns: the fitted parameters.
         x: (k,) most probable values of the parameters.
-        covariance: (k, k) posterior covariance of x, at fixed prior standard deviations
-            and sigma.
-        slopes: (n, k) whitened derivatives of the fitted readings by the parameters,
-            divided by sigma.
-        residual: (n,) whitened residual of the fitted readings, divided by sigma.
+        covariance: (k, k) posterior covariance of x.
+        slopes: (n, k) derivatives of the whitened fitted readings with respect to x.
+        residual: (n,) whitened residual of the fitted readings.
     """
 
     unknowns: Unknowns
@@ -70,17 +68,17 @@ class MachineFit:
 
     @cached_property
     def robot(self) -> Robot:
-        """The fitted robot, which is saved."""
+        """The fitted robot."""
         return self.unknowns.robot_at(self.x)
 
     @property
     def std(self) -> NDArray:
-        """(k,) standard deviations of the parameters."""
+        """Standard deviations (k,) of the parameters."""
         return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
 
     @property
     def determined(self) -> NDArray:
-        """(k,) fraction of each parameter that the readings determine."""
+        """Fraction (k,) of the prior variance that the readings remove."""
         prior = self.unknowns.std**2
         return 1.0 - np.clip(np.diag(self.covariance) / prior, 0.0, 1.0)
 
@@ -90,12 +88,12 @@ class MachineFit:
         return tuple(one for one in self.unknowns.effects if not one.device)
 
     def own(self, part: Acting) -> tuple[NDArray, NDArray, NDArray]:
-        """Return (k,) values, (k, k) covariance and (n, k) slopes of one effect."""
+        """Return values (k,), covariance (k, k), derivatives (n, k) of one effect."""
         own = self.unknowns.place(part)
         return self.x[own], self.covariance[own, own], self.slopes[:, own]
 
     def seen(self, part: Acting) -> NDArray:
-        """Return a mask (k,) of the unknowns of an effect on which readings depend."""
+        """Return a mask (k,) of the unknowns of an effect that affect the readings."""
         return self.determined[self.unknowns.place(part)] > ROUNDING
 
 
@@ -105,10 +103,10 @@ def fit_machine(
     """Fit the unknown parameters of a robot to selected rows of a campaign.
 
     Args:
-        campaign: campaign of R rows; its sigma and shared noise are used.
+        campaign: campaign of R rows.
         unknowns: unknown parameters of the campaign's robot.
-        rows: (R,) bool, True for rows to fit; other readings are not used.
-        start: (k,) start values; None for the mean of the prior.
+        rows: (R,) mask of the rows to fit.
+        start: (k,) start values.  None for the means of the prior.
 
     Returns:
         The fit.
@@ -134,7 +132,7 @@ def _minimum(
     unknowns: Unknowns, residual: Callable[[NDArray], NDArray],
     slopes: Callable[[NDArray], NDArray], start: NDArray | None,
 ) -> tuple[NDArray, NDArray, NDArray]:  # fmt: skip
-    """Return the most probable x (k,), with its slopes (n, k) and residual (n,)."""
+    """Return the most probable x (k,) with derivatives (n, k) and residual (n,)."""
     mean, std = unknowns.mean, unknowns.std
     lower, upper = unknowns.bounds
     x = np.clip(mean if start is None else start, lower, upper)
@@ -165,7 +163,7 @@ def _minimum(
 
 
 def _step(unknowns: Unknowns, A: NDArray, left: NDArray, x: NDArray) -> NDArray:
-    """Return the Gauss-Newton step (k,) within bounds, in units of the prior."""
+    """Return the Gauss-Newton step (k,) within the bounds of the parameters."""
     std = unknowns.std
     B = A * std
     L = cholesky(_information(B), lower=True, check_finite=False)
@@ -174,7 +172,7 @@ def _step(unknowns: Unknowns, A: NDArray, left: NDArray, x: NDArray) -> NDArray:
     step = solve_triangular(L, y, lower=True, trans=1, check_finite=False)
     low, high = ((bound - x) / std for bound in unknowns.bounds)
     if np.any(step < low) or np.any(step > high):
-        # |L' step - y| has the same minimiser and is a bounded least-squares problem.
+        # |L' step - y| has the same minimiser.
         wide = high - low > 0.0
         step = np.zeros(len(x))
         free = lsq_linear(L.T[:, wide], y, (low[wide], high[wide]), method="bvls")
@@ -183,7 +181,7 @@ def _step(unknowns: Unknowns, A: NDArray, left: NDArray, x: NDArray) -> NDArray:
 
 
 def _information(B: NDArray) -> NDArray:
-    """Return B'B + 1 (k, k), the inverse of C for unknowns scaled by their prior."""
+    """Return B'B + 1, the inverse covariance of x / s."""
     M = B.T @ B
     M[np.diag_indices(len(M))] += 1.0
     return np.asarray(M)

@@ -1,7 +1,7 @@
-"""List the forms of functions of one or two variables with their prior probabilities.
+"""List the forms of functions of one or two variables, with prior probabilities.
 
-All families of forms of a variable have equal prior probability, which is divided among
-the forms of the family.  Higher harmonics receive a smaller part.
+All families of forms have equal prior probability, which is divided among the forms of
+the family.  Higher harmonics have a smaller prior probability.
 """
 
 import math
@@ -15,41 +15,37 @@ from forcefit.assembly.measurement.conditions import Conditions
 from forcefit.assembly.measurement.variables import variable
 from forcefit.assembly.model.robot import Robot
 
-KNOTS = 7  # number of spline knots; powers up to three fit simpler curves
-MANY = 150  # minimum number of rows for a search of high-order harmonics
-# Time constants relative to the duration of the campaign.
+KNOTS = 7  # number of spline knots
+MANY = 150  # smallest number of rows for which high harmonics are tested
+# Tested time constants, relative to the duration of the campaign.
 LAGS = 0.02, 0.03, 0.05, 0.07, 0.1, 0.14, 0.2, 0.3, 0.5
-_CYCLES = 0.5, 1, 1.5, 2, 3, 4, 6  # cycles of a slow harmonic during the campaign
-# Candidate depths of slip (hysteresis), relative to the variable's range.
+_CYCLES = 0.5, 1, 1.5, 2, 3, 4, 6  # tested numbers of cycles during the campaign
+# Tested widths of hysteresis, relative to the range of the variable.
 _DEPTHS = 0.03, 0.1, 0.3, 1.0
-# Depths of slip near the best one, for the refined search.
+# Widths of hysteresis in the refined search, relative to the range of the variable.
 _ALL_DEPTHS = tuple(0.01 * 1.4**k for k in range(15))
-# Search step for the number of screw turns over the travel of a slide; a larger step
-# would miss harmonics.
+# Step of the search for the number of screw turns over the travel of a slide.
 _TURNS = 0.5
-# Largest number of screw turns over the travel of a slide.  With few positions, the
-# limit is two turns per distinct position.
+# Largest tested number of screw turns over the travel of a slide.
 _MOST_TURNS = 200.0
-_FINER = 1.2  # first factor in the refinement of a shape parameter
-# Loads below this fraction of the largest load do not close backlash.
+_FINER = 1.2  # first step factor in the refinement of a shape parameter
+# Loads below this fraction of the largest load are treated as zero.
 _NO_LOAD = 1e-3
-_HIGH = 12  # highest harmonic that is tried separately
+_HIGH = 12  # highest harmonic that is tested without lower ones
 _CLOCKS = "time", "cov.time"
-# Number of points in time at which a step function is tried, in short and in long
-# campaigns.
+# Number of tested times of a jump, first and in the refined search.
 _JUMPS, _MANY_JUMPS = 10, 91
-_INNER = np.linspace(0.1, 0.9, 9)  # quantiles at which other shape parameters are tried
+_INNER = np.linspace(0.1, 0.9, 9)  # quantiles of a variable used as shape parameters
 
 
 @dataclass(frozen=True)
 class CandidateShape:
-    """A form of a function, with the names of its columns.
+    """A form of a function, linear in its coefficients.
 
     Attributes:
         form: a name of :data:`forcefit.assembly.effects.forms.FORMS`.
-        names: names of the columns, which are linear in the coefficients.
-        given: names and values of the shape parameters, on which the form depends
-            nonlinearly.
+        names: names of the coefficients.
+        given: names and values of the nonlinear shape parameters.
     """
 
     form: str
@@ -58,7 +54,7 @@ class CandidateShape:
 
     @property
     def bends(self) -> NDArray:
-        """The shape parameter as an array (1,), or (0,) if none is fitted."""
+        """The shape parameter to fit, as an array (1,) or (0,)."""
         one = len(self.given) == 1 and self.form != "step"
         return np.array([value for _, value in self.given] if one else [])
 
@@ -73,7 +69,7 @@ def _powers(*powers: int) -> CandidateShape:
 
 
 def _waves(*orders: int, form: str = "waves") -> CandidateShape:
-    """Return the harmonics (sines and cosines) of an angle for given orders."""
+    """Return the harmonics of an angle with given orders."""
     names = tuple(f"{k}.{w}" for k in orders for w in ("sine", "cosine"))
     return CandidateShape(form, names)
 
@@ -81,7 +77,7 @@ def _waves(*orders: int, form: str = "waves") -> CandidateShape:
 def _at_each(
     form: str, names: tuple[str, ...], key: str, values: Iterable[float]
 ) -> list[CandidateShape]:
-    """Return one form for each value of its shape parameter."""
+    """Return one form for each given value of the shape parameter."""
     return [CandidateShape(form, names, ((key, float(v)),)) for v in values]
 
 
@@ -97,7 +93,7 @@ def is_angle(robot: Robot, name: str) -> bool:
 
 
 def first(conditions: Conditions, name: str) -> list[CandidateShape]:
-    """Return general forms that test whether a variable affects the readings."""
+    """Return the forms that are tested first for a variable."""
     if name == "approach":
         return [STRAIGHT]
     cubic, memory = _powers(0, 1, 2, 3), _reversals(conditions, name, _DEPTHS)
@@ -109,7 +105,7 @@ def first(conditions: Conditions, name: str) -> list[CandidateShape]:
 
 
 def every(conditions: Conditions, name: str) -> list[CandidateShape]:
-    """Return all forms of one variable."""
+    """Return all forms of functions of one variable."""
     if name == "approach":
         return [STRAIGHT]
     x, time = variable(conditions, name), conditions.time
@@ -138,7 +134,7 @@ def every(conditions: Conditions, name: str) -> list[CandidateShape]:
 
 
 def uneven(conditions: Conditions, name: str) -> list[CandidateShape]:
-    """Return the forms of a compliance that varies over one turn."""
+    """Return the forms of a compliance that depends on an angle."""
     if not is_angle(conditions.robot, name):
         return []
     names = [("0.cosine", f"{k}.sine", f"{k}.cosine") for k in range(1, 5)]
@@ -149,7 +145,7 @@ def screw(
     conditions: Conditions, name: str, form: str = "waves",
     names: tuple[str, ...] = _WAVE,
 ) -> list[CandidateShape]:  # fmt: skip
-    """Return harmonics of a slide's coordinate whose period is its screw lead."""
+    """Return harmonics of a slide's coordinate, one for each possible screw lead."""
     if not name.startswith("q.") or is_angle(conditions.robot, name):
         return []
     x = variable(conditions, name)
@@ -159,12 +155,12 @@ def screw(
 
 
 def is_screw(shape: CandidateShape) -> bool:
-    """Return whether a form is a harmonic of given period, as from :func:`screw`."""
+    """Return whether a form is a harmonic with a given period."""
     return shape.form.endswith("waves") and bool(shape.given)
 
 
 def of_direction(conditions: Conditions, name: str) -> list[CandidateShape]:
-    """Return forms of backlash that varies over one turn of a drive or its screw."""
+    """Return forms of backlash that depends on the angle of a drive or of its screw."""
     if is_angle(conditions.robot, name):
         return [CandidateShape("reversal_waves", _ANGLE)]
     return screw(conditions, name, "reversal_waves", _ANGLE)
@@ -173,9 +169,9 @@ def of_direction(conditions: Conditions, name: str) -> list[CandidateShape]:
 def of_two(
     conditions: Conditions, first: str, second: str
 ) -> tuple[tuple[str, str], list[CandidateShape]] | None:
-    """Return the forms of functions of two variables, and the variables in order.
+    """Return the forms of functions of two variables, and the ordered variables.
 
-    Return None if functions of these two variables are not considered.
+    If no function of these variables is considered, return None.
     """
     angles = [is_angle(conditions.robot, name) for name in (first, second)]
     if {first, second} == set(_CLOCKS):
@@ -198,7 +194,10 @@ def of_two(
 
 
 def knees(load: NDArray, *, jump: bool) -> list[CandidateShape]:
-    """Return spring laws with a knee at some load, also with a jump at zero load."""
+    """Return piecewise linear springs whose stiffness changes at a given load.
+
+    With ``jump``, include a spring with a jump at zero load.
+    """
     least = _NO_LOAD * float(load.max(initial=0.0))
     levels = np.unique(np.quantile(load, _INNER))
     levels = levels[levels > least]
@@ -214,7 +213,7 @@ def near(
     """Return a form with slightly smaller and slightly larger shape parameter.
 
     The change is ``part`` times half the step of the first search.  The result is empty
-    for a step function and for a form without shape parameter.
+    if no shape parameter is fitted.
     """
     if not len(shape.bends):
         return []
@@ -229,7 +228,7 @@ def near(
 
 
 def _steps(conditions: Conditions, name: str, count: int) -> list[CandidateShape]:
-    """Return step functions that jump at quantiles of a variable."""
+    """Return step functions with jumps at quantiles of a variable."""
     levels = np.quantile(variable(conditions, name), np.linspace(0.05, 0.95, count))
     return _at_each("step", ("size",), "at", np.unique(levels))
 
@@ -237,7 +236,7 @@ def _steps(conditions: Conditions, name: str, count: int) -> list[CandidateShape
 def _reversals(
     conditions: Conditions, name: str, depths: Sequence[float]
 ) -> list[CandidateShape]:
-    """Return forms with memory: motion reversal and slip."""
+    """Return forms that depend on the direction of motion and forms of hysteresis."""
     if not name.startswith(("q.", "load.")) or name == "load.force":
         return []
     size = float(np.ptp(variable(conditions, name)))
@@ -246,7 +245,7 @@ def _reversals(
 
 
 def log_priors(shapes: Sequence[CandidateShape]) -> NDArray:
-    """Return each form's log prior probability among all forms of its variables."""
+    """Return the logarithms of the prior probabilities of the forms."""
     weight = np.array([_weight(shape) for shape in shapes])
     families = [shape.form for shape in shapes]
     total = {f: weight[[g == f for g in families]].sum() for f in set(families)}
@@ -270,6 +269,9 @@ def falling(shape: CandidateShape, count: int) -> NDArray:
 
 
 def _orders(shape: CandidateShape) -> list[int]:
-    """Return the order of each harmonic column; of two orders, the larger one."""
+    """Return the order of each harmonic column.
+
+    If a column has two orders, the larger one is returned.
+    """
     parts = [name.split(".")[:-1] for name in shape.names]
     return [max(abs(int(part)) for part in orders) for orders in parts]

@@ -1,13 +1,13 @@
-"""Score candidate functions, that is, all combinations of places and forms.
+"""Score candidate functions for all combinations of locations and forms.
 
-A column of a function is a product B_(rc)q = a_rc P_rq, where a_rc is the response of
+A column of a function is a product B_(rc)q = a_rc P_rq.  Here a_rc is the response of
 reading c in row r to a screw component, and P_rq is column q of the form in row r.
 Inner products of columns therefore factor:
 
 ======  ===============  ===========  ================================================
 symbol  code             shape        meaning
 ======  ===============  ===========  ================================================
-a       ``answers``      (S, R, 6)    whitened change per unit of a component at a place
+a       ``answers``      (S, R, 6)    whitened response to a unit screw component
 W       ``squares``      (S, R)       sum of a^2 over the cells of a row
 P       ``numbers``      (R, q)       columns of all forms of a variable
 T       ``through``      (R, S, p)    sum over the cells of a row of a times U
@@ -41,18 +41,18 @@ from forcefit.validation.diagnosis.places import Places, Weighted, Where
 from forcefit.validation.diagnosis.sensitivities import Sensitivities, in_cells
 
 Variables = tuple[str, ...]
-# A request consists of the variables of a function and the forms to score.
+# A request contains the variables of a function and the forms to score.
 Request = tuple[Variables, tuple[CandidateShape, ...]]
 # Largest number of columns of a function: six for each of six components.
 _WIDEST = 36
-# Number of top-scoring functions that are retained; requests select from these.
+# Number of functions of highest score that are retained.
 _LISTED = 2000
-_BATCH = 2_000_000  # number of values in a batch, 16 MB
+_BATCH = 2_000_000  # number of values computed together, to limit memory
 
 
 @dataclass(frozen=True)
 class ScoredFunction:
-    """A function that may be added to a model, with its score."""
+    """A candidate function with its score and prior probability."""
 
     score: float
     candidate: Candidate
@@ -60,7 +60,7 @@ class ScoredFunction:
 
 
 def _by_kind(turns: NDArray, gram: NDArray) -> NDArray:
-    """Return (f, c, m) rms norms of columns, separately by rotation and translation."""
+    """Return rms norms (f, c, m) of columns, for rotations and for translations."""
     diagonal = np.einsum("...kk->...k", gram)
     squares = np.zeros_like(diagonal)
     for kind in (turns, ~turns):
@@ -70,19 +70,19 @@ def _by_kind(turns: NDArray, gram: NDArray) -> NDArray:
 
 
 class Functions:
-    """Candidate functions of a campaign, each at one place."""
+    """Candidate functions of a campaign, each at a single location."""
 
     def __init__(
         self, campaign: Campaign, sensitivities: Sensitivities, variables: list[str]
     ) -> None:
-        """List the places of a design, without using measured values."""
+        """List the locations at which functions can act."""
         self.campaign, self.sensitivities = campaign, sensitivities
         self.conditions = sensitivities.conditions
         self.places = Places(campaign, sensitivities)
         self._depend_on(variables)
 
     def _depend_on(self, variables: list[str]) -> None:
-        """Set the variables on which functions depend, computing each response once."""
+        """Set the variables of the functions."""
         self.variables = variables
         self.shapes_of = cache(self._shapes_of)
         self.prior = cache(self._prior)
@@ -102,12 +102,12 @@ class Functions:
         return other
 
     def known(self, *names: str) -> Conditions:
-        """Return the conditions of the rows in which all variables are known."""
+        """Return the conditions of rows in which all variables are known."""
         rows = is_known(self.conditions, *names)
         return self.conditions if rows.all() else self.conditions.take(rows)
 
     def _shapes_of(self, variables: Variables) -> dict[CandidateShape, float]:
-        """Return all forms of one or two variables and their log priors."""
+        """Return all forms of functions of given variables with their log priors."""
         known = self.known(*variables)
         if len(variables) == 1:
             shapes = forms.every(known, variables[0])
@@ -126,12 +126,12 @@ class Functions:
         return {s: prior + float(p) for s, p in zip(shapes, logs, strict=True)}
 
     def _prior(self, variables: Variables, shape: CandidateShape) -> float:
-        """Return the log prior of a form at one place."""
+        """Return the log prior of a form at one location."""
         known = self.shapes_of(variables)
         return known.get(shape, min(known.values(), default=-math.inf))
 
     def first_look(self) -> list[Request]:
-        """Return the requests to score first, the general forms of every variable."""
+        """Return the forms to score first for each variable."""
         requests: list[Request] = []
         for name in self.variables:
             shapes = forms.first(self.known(name), name)
@@ -140,7 +140,10 @@ class Functions:
         return requests
 
     def products(self, names: Iterable[str]) -> list[Request]:
-        """Return requests for functions of two variables, one of which is given."""
+        """Return forms to score for functions of two variables.
+
+        One of the variables is among ``names``.
+        """
         requests: dict[Variables, tuple[CandidateShape, ...]] = {}
         for name in names:
             for other in self.variables:
@@ -160,8 +163,11 @@ class Functions:
     ) -> list[ScoredFunction]:  # fmt: skip
         """Return the functions that improve a model most, best first.
 
-        The model was fitted to the cells of ``weighted``.  At most ``most`` functions
-        of each request are returned.
+        Args:
+            marginal: model, which was fitted to the cells of ``weighted``.
+            weighted: weighted responses.
+            requests: variables and forms to score.
+            most: largest number of functions to return for each request.
         """
         if not len(self.places):
             return []
@@ -195,9 +201,10 @@ class Functions:
     def _by_width(
         self, requests: Sequence[Request], size: int
     ) -> Iterator[list[tuple[int, int]]]:
-        """Yield batches of requests and forms of functions with equally many columns.
+        """Yield batches of functions that have equal numbers of columns.
 
-        One column of one function occupies ``size`` values in memory.
+        Each function is given by the indices of its request and its form.  A column
+        occupies ``size`` values in memory.
         """
         by_width: dict[int, list[tuple[int, int]]] = {}
         for number, (variables, shapes) in enumerate(requests):
@@ -212,12 +219,13 @@ class Functions:
         self, own: list[tuple[int, int]], requests: Sequence[Request],
         weighted: Weighted, through: NDArray, on: NDArray,
     ) -> Iterator[tuple[NDArray, NDArray, NDArray, NDArray, NDArray]]:  # fmt: skip
-        """Compute inner products of f forms of m columns at all places.
+        """Compute inner products of columns of f forms at all locations.
 
         Yields:
-            For c functions with equally many columns: (c, 3) indices of the request,
-            the form and the place; (c, m, m) B'C^-1 B, with columns scaled to norm
-            about 1; (c, m) B'C^-1 z; (c,) largest plausible size; (c,) log prior.
+            Arrays for c functions with m columns each: (c, 3) indices of request, form
+            and location; (c, m, m) B'C^-1 B; (c, m) B'C^-1 z; (c,) largest plausible
+            prior standard deviation; (c,) log prior.  Columns B are scaled to a norm of
+            about 1.
         """
         named = [(requests[number][0], requests[number][1][k]) for number, k in own]
         each = [self._numbers(*name)[weighted.rows] for name in named]
@@ -253,12 +261,12 @@ class Functions:
             )  # fmt: skip
 
     def _columns(self, variables: Variables, shape: CandidateShape) -> NDArray:
-        """Return (R, q) columns of a form, scaled by relative prior deviations."""
+        """Return the columns (R, q) of a form times their relative prior deviations."""
         columns = self.sensitivities.basis(variables, shape)[0]
         return columns * forms.falling(shape, columns.shape[1])
 
     def equivalents(self, one: Candidate) -> list[tuple[CandidatePart, ...]]:
-        """Return other places at which a candidate function has equal columns."""
+        """Return other locations at which a candidate function has equal columns."""
         if len(one.parts) > 1:
             return []
         part = one.parts[0]
@@ -268,7 +276,7 @@ class Functions:
         return [_at(p, part.variables, one.shape).parts for p in same]
 
     def element(self, one: Candidate, log_prior: float) -> Element | None:
-        """Return the element of a candidate function, or None if it is invisible."""
+        """Return the element of a candidate, or None if it affects no reading."""
         columns = in_cells(self.sensitivities, one, self.campaign)
         axes = self.sensitivities.axes(one)
         each = columns.shape[1] // sum(len(p.components) for p in one.parts)
@@ -281,6 +289,6 @@ class Functions:
 def _at(
     place: tuple[Where, ...], variables: Variables, shape: CandidateShape
 ) -> Candidate:
-    """Return the candidate function of given variables that acts at a place."""
+    """Return the candidate function of given variables at a location."""
     part = CandidatePart(place[0][0], tuple(w[1] for w in place), *variables)
     return Candidate((part,), place[0][2], shape)

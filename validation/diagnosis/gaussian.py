@@ -27,18 +27,17 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 from scipy.special import log_ndtr
 
-# Degrees of freedom of the prior of tau^2; the prior allows a true sigma between 1/2
-# and 3 times the declared sigma.
+# Degrees of freedom of the prior of tau^2.
 FREEDOM = 20.0
-# [sigma] Prior standard deviations of a candidate's contribution to the readings, over
-# which the evidence is averaged.
+# [sigma] Prior standard deviations of a contribution to the readings.  The evidence is
+# averaged over these values.
 SIZES = 10.0 ** np.arange(-0.5, 4.1, 0.5)
 SPAN = math.log(SIZES[-1] / SIZES[0])
-_SEEN = 1e-8  # smaller eigenvalues of a scaled candidate are round-off
+_SEEN = 1e-8  # smallest eigenvalue of a normalised Gram matrix above round-off
 
 
 def deviance(squares: NDArray | float, count: int) -> NDArray | float:
-    """Return the part of -2 ln p(z) that depends on ``squares``, that is, z' C^-1 z."""
+    """Return the part of -2 ln p(z) that depends on z' C^-1 z."""
     return (FREEDOM + count) * np.log1p(np.asarray(squares) / FREEDOM)
 
 
@@ -51,7 +50,7 @@ def scale(squares: float, count: int) -> tuple[float, float]:
 
 @dataclass(frozen=True, eq=False)
 class Marginal:
-    """A model with marginalised unknowns, to which many candidates can be added."""
+    """A linear model whose unknowns are marginalised."""
 
     factor_columns: NDArray
     held: NDArray
@@ -59,13 +58,13 @@ class Marginal:
 
 
 def marginalise(columns: NDArray, std: NDArray, z: NDArray, flat: NDArray) -> Marginal:
-    """Marginalise the unknowns of the columns (n, k), with prior std (k,).
+    """Return a linear model whose unknowns are marginalised.
 
-    The columns ``flat`` (n, f) are orthonormal, and their unknowns have a flat prior.
-    The readings ``z`` (n,) are orthogonal to ``flat``.
-
-    Returns:
-        The model, to which candidates can be added.
+    Args:
+        z: (n,) readings, orthogonal to ``flat``.
+        columns: (n, k) columns of the unknowns.
+        std: (k,) prior standard deviations of the unknowns.
+        flat: (n, f) orthonormal columns of unknowns with a flat prior.
     """
     X = columns * std
     M = X.T @ X
@@ -91,7 +90,7 @@ def leave_block_out(
         if len(U) <= U.shape[1]:
             left = np.eye(len(U)) - U @ U.T
             errors[own] = np.linalg.lstsq(left, held, rcond=None)[0]
-        else:  # Woodbury identity: one equation for each column
+        else:  # Woodbury identity, with one equation for each column
             left = np.eye(U.shape[1]) - U.T @ U
             errors[own] = held + U @ np.linalg.lstsq(left, U.T @ held, rcond=None)[0]
         size = np.linalg.slogdet(left)[1] - len(U) * math.log(2 * math.pi * tau**2)
@@ -103,18 +102,19 @@ def evidence_gains(
     gram: NDArray, along: NDArray, most: NDArray, bounded: NDArray | bool,
     marginal: Marginal,
 ) -> NDArray:  # fmt: skip
-    """Return the log evidence ratios of candidates, averaged over prior sizes.
+    """Return the log evidence ratios of candidates, averaged over prior deviations.
 
     Args:
         gram: (c, m, m) matrices B'C^-1 B of c candidates, with columns scaled to a norm
             of about 1.
         along: (c, m) vectors B'C^-1 z.
         most: (c,) largest plausible prior standard deviation of the scaled unknowns.
-        bounded: (c,) bool, True if the single unknown cannot be negative.
+        bounded: (c,) bool, True for a single unknown that cannot be negative.
         marginal: model to which the candidates are added.
 
     Returns:
-        (c,) log evidence ratios; -inf if no plausible size is visible.
+        (c,) log evidence ratios, -inf if a candidate cannot change the readings
+        visibly.
     """
     count = len(marginal.held)
     if gram.shape[1] == 1:
@@ -145,10 +145,11 @@ def evidence_gains(
 
 
 def size_penalty(determined: float) -> float:
-    """Return the penalty of an optimised prior standard deviation (Laplace).
+    """Return the evidence penalty for optimising a prior standard deviation.
 
     The penalty is the logarithm of the ratio between the maximum of the evidence and
-    its average over all standard deviations.  ``determined`` is the number of
-    well-determined unknowns with this standard deviation.
+    its average over all standard deviations, by Laplace's approximation.
+    ``determined`` is the number of well-determined unknowns with this standard
+    deviation.
     """
     return math.log(SPAN) + 0.5 * math.log(max(determined, 1.0) / math.pi)

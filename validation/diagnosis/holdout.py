@@ -1,9 +1,8 @@
-"""Choose held-out rows as whole configurations or time spans.
+"""Choose the held-out rows, which are whole configurations or time spans.
 
 A campaign of at least 60 configurations is split once into fitted and held-out rows.  A
-smaller campaign is tested by nested cross-validation, because a quarter of few
-configurations is too small a sample: in each fold, the whole diagnosis is repeated
-without the fold's held-out rows.  No held-out reading is used before the verdict.
+smaller campaign is tested by nested cross-validation.  In each fold, the whole
+diagnosis is repeated without the held-out rows of the fold.
 """
 
 from dataclasses import dataclass, replace
@@ -13,12 +12,12 @@ from numpy.typing import NDArray
 
 from forcefit.validation.campaign.campaign import Campaign
 
-FEWEST = 8  # smallest number of blocks (configurations or time spans) for a test
-# Number of configurations from which a single split is used.
+FEWEST = 8  # smallest number of configurations or time spans for a test
+# Smallest number of configurations for a single split.
 _SPLIT = 60
-# Fraction of held-out blocks for 60 blocks, and for many blocks.
+# Fractions of blocks that are held out from few blocks and from many blocks.
 _SHARES = (1 / 4, 1 / 10)
-_ENOUGH = 60  # number of held-out blocks that suffices for any campaign
+_ENOUGH = 60  # number of held-out blocks that is sufficient
 # Number of folds (Hastie, Tibshirani, Friedman, Elements of Statistical Learning,
 # 7.10).
 _FOLDS = 5
@@ -31,7 +30,7 @@ class HeldOut:
 
     Attributes:
         how: ``"split"``, ``"folds"`` or ``"none"``.
-        folds: (R,) mask of the held-out rows of each fold; a split has a single fold.
+        folds: mask (R,) of the held-out rows of each fold.  A split has one fold.
         words: description of the method.
     """
 
@@ -41,7 +40,7 @@ class HeldOut:
 
     @property
     def rows(self) -> NDArray:
-        """(R,) bool, True for rows held out in any fold."""
+        """Mask (R,), True for rows held out in at least one fold."""
         return np.any(self.folds, axis=0)
 
 
@@ -49,8 +48,8 @@ def hold_out(campaign: Campaign) -> HeldOut:
     """Choose the held-out rows of a diagnosis.
 
     Returns:
-        The held-out rows, chosen reproducibly.  The method is ``"none"`` for fewer than
-        two blocks; all rows are then both fitted and tested.
+        The held-out rows.  For fewer than two blocks, the method is ``"none"``, and all
+        rows are both fitted and tested.
     """
     blocks, kind = blocks_of(campaign)
     names = np.random.default_rng(0).permutation(np.unique(blocks))
@@ -76,24 +75,24 @@ def hold_out(campaign: Campaign) -> HeldOut:
 
 
 def hidden(campaign: Campaign, rows: NDArray) -> Campaign:
-    """Return a campaign in which the readings of selected rows (R,) are NaN."""
+    """Return a campaign without the readings of selected rows (R,)."""
     readings = np.where(rows[:, None], np.nan, campaign.measured)
     return replace(campaign, measured=readings)
 
 
 def drawn(visit: NDArray, most: int) -> NDArray:
-    """Return a mask (R,) of about ``most`` random rows; visits are not split."""
+    """Return a mask (R,) of about ``most`` random rows, without splitting visits."""
     listed = np.unique(visit)
     count = most * len(listed) // max(len(visit), 1)
     return np.isin(visit, np.random.default_rng(0).permutation(listed)[:count])
 
 
 def blocks_of(campaign: Campaign) -> tuple[NDArray, str]:
-    """Return the blocks that are fitted or predicted as a whole.
+    """Return the blocks of rows that are held out as a whole.
 
     Returns:
-        (R,) index of the configuration, or of the time span if there are too few
-        configurations; and the kind of block as text.
+        (R,) index of the block of each row, and the kind of block as text.  Blocks are
+        configurations or, if there are too few configurations, time spans.
     """
     blocks = campaign.configuration
     if len(np.unique(blocks)) >= FEWEST:

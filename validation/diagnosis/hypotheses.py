@@ -1,13 +1,12 @@
-"""List the hypotheses of a diagnosis: library effects at certain frames.
+"""List the hypotheses of a diagnosis, which are library effects at certain frames.
 
-An effect may act at one frame, at several frames with separate parameters, or at
-several frames with a common parameter, where a group consists of all frames or of all
-frames of one kind (``leg1.rod``, ``leg2.rod``).  Each case is a separate hypothesis.
-Each fitted parameter of a hypothesis is called a slot.
+An effect may act at one frame or at several frames.  The frames may have separate or
+common parameters.  Each of these possibilities is a separate hypothesis.  Each fitted
+parameter of a hypothesis is called a slot.
 
-Between sessions, the machine may be homed again, its tool changed or the device moved,
-so an effect may have different parameters in each session.  Such a hypothesis contains
-one copy of every slot per session, which acts only in the rows of this session.
+Between sessions, the machine may be homed, its tool may be changed, or the measuring
+device may be moved.  An effect may therefore have different parameters in each session.
+Such a hypothesis contains one copy of every slot for each session.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -22,22 +21,21 @@ from forcefit.assembly.measurement.conditions import Conditions
 from forcefit.assembly.model.robot import Robot
 
 PER_SESSION = ("registration", "encoder_offset", "drift")
-# Largest number of unknowns of one effect; if an effect requires more, frames of one
-# kind share an unknown.
+# Largest number of unknowns of one effect.  If an effect has more, similar frames share
+# an unknown.
 _MOST_UNKNOWNS = 24
 
 
 @dataclass(frozen=True)
 class Slot:
-    """A fitted parameter, which sets one or several unknowns of an effect.
+    """A fitted parameter, which is the value of one or several unknowns of an effect.
 
     Attributes:
         names: names of the unknowns with this value.
         unknown: scale and bounds of the unknowns.
         start: start value of a fit.
-        shape: whether the model is strongly nonlinear in the parameter, which is then
-            fixed during screening.
-        session: name of the only session in which the parameter acts; None for all
+        shape: whether the model is strongly nonlinear in the parameter.
+        session: name of the session to which the parameter applies.  None for all
             sessions.
     """
 
@@ -50,11 +48,11 @@ class Slot:
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """Assumption that an effect acts at certain frames, with parameters to fit.
+    """Assumption that an effect acts at certain frames.
 
     Attributes:
         effect: name of the effect.
-        where: frames at which the effect acts; empty for effects of the whole machine.
+        where: frames at which the effect acts, empty for effects of the whole machine.
         slots: parameters to fit.
     """
 
@@ -73,12 +71,12 @@ class Hypothesis:
 
     @property
     def start(self) -> NDArray:
-        """(k,) start values of a fit."""
+        """Start values (k,) of a fit."""
         return np.array([slot.start for slot in self.slots])
 
     @property
     def bounds(self) -> tuple[NDArray, NDArray]:
-        """(k,) lower and (k,) upper bounds."""
+        """Lower bounds (k,) and upper bounds (k,)."""
         return (
             np.array([slot.unknown.lower for slot in self.slots]),
             np.array([slot.unknown.upper for slot in self.slots]),
@@ -86,10 +84,9 @@ class Hypothesis:
 
 
 def hypotheses(conditions: Conditions, loads: Sequence[str]) -> list[Hypothesis]:
-    """Return all hypotheses that given conditions can test, ordered by effect.
+    """Return all hypotheses that can be tested under given conditions.
 
-    ``loads`` contains the load components that the campaign records, such as
-    ``["fx"]``.
+    ``loads`` contains the recorded load components, such as ``["fx"]``.
     """
     return [h for effect in LIBRARY.values() for h in _of(effect, conditions, loads)]
 
@@ -127,9 +124,9 @@ def _of(
 def _choices(
     effect: Effect, unknowns: tuple[Unknown, ...], loads: Sequence[str]
 ) -> Iterator[list[Unknown]]:
-    """Yield subsets of the unknowns of an effect without frames, the full set first."""
+    """Yield sets of unknowns to fit for an effect without frames."""
     if effect.follows_load:
-        # A load offset in a direction without recorded load is not a candidate.
+        # An offset is fitted only for recorded load components.
         kept = {f"offset.{name}" for name in loads}
         unknowns = tuple(
             u for u in unknowns if u.name in kept or "offset." not in u.name
@@ -147,7 +144,7 @@ def _choices(
 def _groupings(
     places: tuple[str, ...], each: int
 ) -> Iterator[tuple[tuple[str, ...], ...]]:
-    """Yield all partitions of frames into groups with common unknowns."""
+    """Yield all divisions of frames into groups with common unknowns."""
     if not places:
         return
     kinds: dict[str, list[str]] = {}
@@ -168,7 +165,7 @@ def _scanned(
     effect: Effect, where: tuple[str, ...],
     slots: list[tuple[tuple[str, ...], Unknown]], conditions: Conditions,
 ) -> Iterator[Hypothesis]:  # fmt: skip
-    """Yield one hypothesis per start value of a shape parameter, or a single one."""
+    """Yield one hypothesis for each start value of a shape parameter."""
     scan: tuple[float, ...] = next((u.scan for _, u in slots if u.scan), (0.0,))
     by = next((u.scan_by for _, u in slots if u.scan_by), "")
     size = float(np.ptp(getattr(conditions, by))) if by else 1.0
@@ -188,9 +185,8 @@ def _scanned(
 def with_declared(listed: Sequence[Hypothesis], robot: Robot) -> list[Hypothesis]:
     """Return the hypotheses that can be combined with the declared effects.
 
-    A declared effect and a hypothesis of the same effect must combine to a single
-    effect.  Contact laws and delays are therefore omitted if one is declared, and a
-    drift has the declared time constant.  Springs may be stiffer than declared.
+    A declared effect and a hypothesis of the same effect must be equivalent to a single
+    effect.  Contact laws and delays are therefore omitted if one is declared.
     """
     curved = {
         (name, key.removesuffix(".coefficient").removesuffix(".time_constant"))
@@ -211,13 +207,13 @@ def with_declared(listed: Sequence[Hypothesis], robot: Robot) -> list[Hypothesis
     return list(kept)
 
 
-# Two instances of one of these nonlinear effects do not combine to a single effect.
+# Effects of which two instances are not equivalent to a single instance.
 _CURVED = ("contact_stiffening", "delayed_expansion")
 _SPRINGS = ("drive_compliance", "base_compliance")
 
 
 def _stiffer(slot: Slot, soft: Mapping[str, float]) -> Slot:
-    """Return a slot whose compliances may offset declared compliances."""
+    """Return a slot that permits joints to be stiffer than declared."""
     names = [
         n.removesuffix(".compliance").replace("compliance.", "stiffness.")
         for n in slot.names
@@ -237,10 +233,10 @@ def _held(slot: Slot, constant: float) -> Slot:
 def with_sessions(
     listed: Sequence[Hypothesis], sessions: Sequence[str], further: Sequence[str] = ()
 ) -> list[Hypothesis]:
-    """Return the hypotheses and, in addition, those with parameters per session.
+    """Return the hypotheses, and hypotheses with separate parameters for each session.
 
-    The additional hypotheses exist only for several sessions.  They cover each effect
-    of :data:`PER_SESSION` and ``further`` whose parameters are not shared among frames.
+    The latter are returned only for several sessions.  They cover each effect of
+    :data:`PER_SESSION` and ``further``.
     """
     if len(sessions) < 2:
         return list(listed)
@@ -254,18 +250,18 @@ def with_sessions(
 
 
 def _each(h: Hypothesis, sessions: Sequence[str]) -> Hypothesis:
-    """Return a hypothesis with separate parameters for every session."""
+    """Return a hypothesis with separate parameters for each session."""
     slots = (replace(slot, session=name) for name in sessions for slot in h.slots)
     return replace(h, slots=tuple(slots))
 
 
 def sessions_of(h: Hypothesis) -> tuple[str | None, ...]:
-    """Return the sessions of the parameters, or (None,) if they apply to all rows."""
+    """Return the sessions of the parameters, or (None,) if there are no sessions."""
     return tuple(dict.fromkeys(slot.session for slot in h.slots)) or (None,)
 
 
 def in_one_session(h: Hypothesis, session: str | None) -> tuple[Hypothesis, NDArray]:
-    """Return a hypothesis restricted to one session, and its slots."""
+    """Return the part of a hypothesis that acts in one session, and its slots."""
     own = [k for k, s in enumerate(h.slots) if s.session in (None, session)]
     slots = tuple(replace(h.slots[k], session=None) for k in own)
     return replace(h, slots=slots), np.array(own, dtype=int)

@@ -1,7 +1,7 @@
-"""List functions that act at several places, and cubic springs.
+"""List candidate functions that act at several locations.
 
-For example, all bodies may swell with humidity, or all drives may have backlash.  All
-places share a form but have separate coefficients.
+For example, all bodies may swell with humidity, or all drives may have backlash.  The
+function has the same form at all locations, but separate coefficients.
 """
 
 import math
@@ -32,9 +32,11 @@ Parts = tuple[CandidatePart, ...]
 
 
 def joint_functions(functions: Functions, rows: NDArray) -> list[Element]:
-    """Return visible functions at several places and cubic springs.
+    """Return functions at several locations that affect the readings.
 
-    Their columns contain the cells of the given rows.
+    Args:
+        functions: functions at single locations.
+        rows: rows for which columns are computed.
     """
     some = functions.at_rows(rows)
     listed: list[tuple[Candidate, float]] = []
@@ -47,13 +49,13 @@ def joint_functions(functions: Functions, rows: NDArray) -> list[Element]:
 
 
 def _of_wrench(functions: Functions) -> list[tuple[Candidate, float]]:
-    """Return backlash, cubic springs and springs with a knee at all joints."""
+    """Return functions of the joint wrench, such as backlash and nonlinear springs."""
     names = functions.places.names
     joints = [p[0] for p in names if len(p) == 1 and p[0][2] == "compliance"]
     prior = -math.log(4.0 * max(len(functions.variables), 1) * max(len(joints), 1))
     listed = []
     for name, component, kind in joints:
-        if component == THREAD:  # the wrench along a thread is not a variable
+        if component == THREAD:  # the wrench along a thread is no variable
             continue
         wrench = f"wrench.{name}.{'mf'[component[0] == 't']}{component[1]}"
         part = CandidatePart(name, (component,), wrench)
@@ -66,21 +68,20 @@ def _of_wrench(functions: Functions) -> list[tuple[Candidate, float]]:
 
 
 def _knees(functions: Functions, name: str, component: str) -> list[CandidateShape]:
-    """Return spring laws with a knee for the load of a drive or spring."""
+    """Return springs with load-dependent stiffness for the load of a joint."""
     robot = functions.conditions.robot
     frame, axis = robot.frame(name), AXES.index(component)
-    if frame.pitch:  # the wrench along a thread is not a variable
+    if frame.pitch:  # the wrench along a thread is no variable
         return []
     if axis != frame.own_axis or name not in (*drives(robot), *elastic_joints(robot)):
         return []
     load = functions.sensitivities.wrenches[:, robot.index(name), axis]
-    # For a slide, a jump at load zero is omitted, because the library contains the
-    # clearance of a slide along its own axis.
+    # A jump at zero load of a slide is the library effect of joint clearance.
     return forms.knees(np.abs(load), jump=frame.turns)
 
 
 def _by_kind(functions: Functions) -> Iterator[tuple[str, Parts, list[CandidateShape]]]:
-    """Return functions that act at all bodies, or at all drives along their motions."""
+    """Return functions that act on all bodies or on all drives."""
     for kind, parts in places_of(functions.campaign.robot, functions.variables):
         if len(parts) > 1:
             known = functions.known(parts[0].variable)
@@ -93,7 +94,7 @@ def _by_kind(functions: Functions) -> Iterator[tuple[str, Parts, list[CandidateS
 def _at_drives(
     functions: Functions,
 ) -> Iterator[tuple[str, Parts, list[CandidateShape]]]:
-    """Return functions at all drives: of common variables, and backlash over a turn."""
+    """Return functions that act on all drives."""
     conditions, robot = functions.conditions, functions.campaign.robot
     own = [(f.name, (own_component(f),)) for f in robot.frames if f.actuated]
     if len(own) < 2:

@@ -47,9 +47,9 @@ from forcefit.validation.diagnosis.whitening import (
     whitening_of,
 )
 
-# [sigma] A held-out residual with a smaller rms counts as noise, whatever its p-value.
+# [sigma] Smallest rms of a held-out residual that is not treated as noise.
 _LOOSE = 1.25
-# Largest ratio of the number of determined unknowns to the number of readings.
+# Largest accepted number of determined unknowns per reading.
 _SHARE = 0.5
 
 
@@ -59,8 +59,8 @@ class Judged:
 
     Attributes:
         fit: the machine.
-        used: (R,) bool, True for fitted rows.
-        held: (R,) bool, True for held-out rows.
+        used: (R,) mask of the fitted rows.
+        held: (R,) mask of the held-out rows.
     """
 
     fit: MachineFit
@@ -72,12 +72,12 @@ def judge(
     campaign: Campaign, traced: Traced, fit: MachineFit, held: HeldOut,
     folds: Sequence[Judged],
 ) -> Diagnosis:  # fmt: skip
-    """Return the diagnosis, with errors on held-out rows and the verdict.
+    """Return the diagnosis with its verdict and the errors on held-out rows.
 
     Args:
         campaign: campaign of R rows, as measured.
         traced: result of the search.
-        fit: the machine that is saved.
+        fit: the fitted machine.
         held: the held-out rows.
         folds: machines fitted without the held-out rows.
     """
@@ -162,8 +162,8 @@ def judge(
 
 
 def _noisy(campaign: Campaign, traced: Traced) -> Campaign:
-    """Return the campaign with the noise level against which residuals are tested."""
-    # The declared sigma is used unless part of it is common noise of points.
+    """Return the campaign with the standard deviations used to test residuals."""
+    # Without common noise, the declared sigma is used.
     common = traced.campaign.common
     if common is None:
         return campaign
@@ -174,7 +174,7 @@ def _noisy(campaign: Campaign, traced: Traced) -> Campaign:
 def _outlying_held(
     campaign: Campaign, traced: Traced, held: HeldOut, residual: NDArray
 ) -> NDArray:
-    """Return (R,) bool: outliers among the held-out rows."""
+    """Return a mask (R,) of the outliers among the held-out rows."""
     outliers = np.zeros(len(campaign), dtype=bool)
     judged = campaign.take(held.rows)
     whitened = np.nan_to_num(whiten(judged, residual[held.rows]))
@@ -186,7 +186,7 @@ def _outlying_held(
 def _of_all_rows(
     believed: Campaign, traced: Traced, fit: MachineFit, rows: NDArray
 ) -> tuple[MachineFit, NoiseInTime | None]:
-    """Refit the same unknowns to more rows with the estimated noise."""
+    """Refit the parameters of a machine to all rows."""
     more = believed.cells & ~traced.campaign.cells
     sigma = np.where(more, traced.selected.noise.tau, 1.0) * believed.sigma
     believed = replace(believed, sigma=sigma)
@@ -209,7 +209,7 @@ def _fails(
     campaign: Campaign, folds: Sequence[Judged], residual: NDArray, rows: NDArray,
     lack: LackOfFit,
 ) -> bool:  # fmt: skip
-    """Return whether held-out residuals exceed noise and fit uncertainty."""
+    """Return whether held-out residuals are larger than noise and fit errors."""
     squares, count = 0.0, 0
     for one in folds:
         own = campaign.cells & (one.held & rows)[:, None] & np.isfinite(residual)
@@ -250,7 +250,7 @@ def _needed(campaign: Campaign, fit: MachineFit) -> str:
 
 
 def _uncertainty(campaign: Campaign, residual: NDArray, rows: NDArray) -> float:
-    """Return the standard error of the held-out rms [sigma], from the block scatter."""
+    """Return the standard error of the held-out rms [sigma]."""
     z = np.where(campaign.cells, residual / campaign.sigma, np.nan)[rows]
     _, block = np.unique(blocks_of(campaign)[0][rows], return_inverse=True)
     sums = np.bincount(block, np.nansum(z**2, axis=1))
@@ -262,7 +262,7 @@ def _uncertainty(campaign: Campaign, residual: NDArray, rows: NDArray) -> float:
 
 
 def _impossible(campaign: Campaign) -> tuple[str, ...]:
-    """Return a remark on rows with impossible readings; empty if there are none."""
+    """Return a remark on impossible readings, or an empty tuple."""
     ids = [campaign.ids[i] for i in np.flatnonzero(impossible_rows(campaign))]
     if not ids:
         return ()

@@ -1,9 +1,9 @@
-"""Test whether a residual is noise and find its outliers and trends.
+"""Test whether a residual is noise, and find its outliers and trends.
 
-The residual is compared with the declared sigma and with the scatter of repeats.  A
-trend is a dependence of the residual on one variable, for example a pose component, a
-load or a covariate.  It is fitted to all six reading components with separate
-coefficients.
+The residual is compared with the declared sigma and with the scatter of repeated
+measurements.  A trend is a dependence of the residual on one variable, for example on a
+load or a temperature.  The coefficients of a trend differ between the six components of
+the readings.
 
 Sources:
     Draper, Smith, Applied Regression Analysis, 3rd ed., section 2.1 (lack of fit and
@@ -24,11 +24,11 @@ from forcefit.validation.diagnosis.noise import repeat_scatter
 from forcefit.validation.diagnosis.separability import orthonormal_basis
 
 SIGNIFICANT = 1e-4  # p-value below which a residual is not noise
-UNLIKELY = 1e-3  # p-value below which one of many tested residuals is unlikely
-OUTLIERS = 20  # one outlier is accepted per this number of rows
-# Number of bins per covariate range; rows in one bin count as replicates.
+UNLIKELY = 1e-3  # p-value below which one of many tested hypotheses is rejected
+OUTLIERS = 20  # number of rows for each accepted outlier
+# Number of bins of a covariate.  Rows in one bin can be repeats of each other.
 _LEVELS = 30
-_OUTLYING = 5.5  # smallest ratio of an outlying row's rms to the median rms of all rows
+_OUTLYING = 5.5  # smallest rms of an outlier, relative to the median rms of all rows
 _MOST = 6  # largest number of reported trends
 
 
@@ -37,14 +37,14 @@ class LackOfFit:
     """Result of the test of a residual.
 
     Attributes:
-        rms: [-] rms of the whitened residual, computed with its degrees of freedom.
+        rms: [-] rms of the whitened residual per degree of freedom.
         probability: p-value of the residual for noise with the declared sigma.
-        repeats: [-] rms of the whitened scatter between repeats; NaN without repeats.
+        repeats: [-] rms of the whitened scatter of repeats, NaN without repeats.
         repeats_freedom: [-] degrees of freedom of this scatter.
         against_repeats: p-value of the residual for noise with the scatter of the
             repeats.
-        common: whether common noise of points was estimated from the residual itself,
-            which is then significant only if it also exceeds the scatter of repeats.
+        common: whether noise common to several points was estimated.  The residual is
+            then also tested against the scatter of repeats.
     """
 
     rms: float
@@ -56,7 +56,7 @@ class LackOfFit:
 
     @property
     def significant(self) -> bool:
-        """Whether the residual exceeds both sigma and the scatter of repeats."""
+        """Whether the residual exceeds the noise."""
         by_repeats = self.against_repeats < SIGNIFICANT
         if self.sigma_too_small:
             return by_repeats
@@ -64,7 +64,7 @@ class LackOfFit:
 
     @property
     def sigma_too_small(self) -> bool:
-        """Whether the scatter of repeats exceeds the declared sigma."""
+        """Whether the scatter of repeats exceeds the declared sigma significantly."""
         if not self.repeats_freedom:
             return False
         squares = self.repeats**2 * self.repeats_freedom
@@ -72,15 +72,12 @@ class LackOfFit:
 
 
 def lack_of_fit(campaign: Campaign, residual: NDArray, unknowns: int) -> LackOfFit:
-    """Test whether a residual is noise.
+    """Return the result of a test whether a residual is noise.
 
     Args:
         campaign: campaign of R rows with N measured cells.
-        residual: (N,) whitened residual, with independent values if it is noise.
+        residual: (N,) whitened residual.
         unknowns: number of fitted unknowns.
-
-    Returns:
-        The result of the test.
     """
     rss = float(residual @ residual)
     freedom = max(1, len(residual) - unknowns)
@@ -91,8 +88,7 @@ def lack_of_fit(campaign: Campaign, residual: NDArray, unknowns: int) -> LackOfF
     repeats, between = repeat_scatter(residual, group)
     against = 1.0
     if between and freedom > between:
-        # Lack of fit over pure error.  If the device rounds, repeats may have zero
-        # scatter.
+        # Ratio of lack of fit to pure error.  Rounded repeats may have zero scatter.
         excess = (rss - between * repeats**2) / (freedom - between)
         ratio = excess / repeats**2 if repeats else (np.inf if excess > 0 else 0.0)
         against = float(f.sf(ratio, freedom - between, between))
@@ -104,10 +100,8 @@ def lack_of_fit(campaign: Campaign, residual: NDArray, unknowns: int) -> LackOfF
 
 
 def _alike(campaign: Campaign) -> NDArray:
-    """Return group numbers (R,) by command, load and covariates."""
-    # Time is ignored.  Other covariates count as equal if they differ by at most a
-    # thirtieth of their range.  Then an effect that is not modelled does not count as
-    # noise.
+    """Return numbers (R,) that are equal for rows with similar conditions."""
+    # Time is ignored.  Each other covariate is divided into bins.
     parts = [campaign.repeat]
     for name, values in campaign.covariates.items():
         span = float(np.ptp(values))
@@ -122,21 +116,19 @@ def outlying(campaign: Campaign, residual: NDArray, most: int | None = None) -> 
     Args:
         campaign: campaign of R rows with N measured cells.
         residual: (N,) whitened residual.
-        most: largest number of outliers; by default one row in twenty.
+        most: largest number of outliers, by default one row in twenty.
 
     Returns:
-        (R,) bool, True for an outlier.
+        Mask (R,) of the outliers.
 
     Sources:
-        Baarda (1968), A testing procedure for use in geodetic networks: the largest
-        residual is tested first.
+        Baarda (1968), A testing procedure for use in geodetic networks.
     """
     rows = np.nonzero(campaign.cells)[0]
     squares = np.bincount(rows, residual**2, minlength=len(campaign))
     cells = np.bincount(rows, minlength=len(campaign))
     rms = np.sqrt(squares / np.maximum(cells, 1))
-    # A row with few cells scatters more, so its rms is compared with the largest rms
-    # that noise causes in that many cells.
+    # Whitened noise has an rms of 1, so an rms below 5.5 is never an outlier.
     far = rms > _OUTLYING * max(float(np.median(rms)), 1.0)
     most = len(campaign) // OUTLIERS if most is None else most
     if far.sum() > most:
@@ -151,8 +143,7 @@ class Trend:
     Attributes:
         against: description of the variable.
         share: [-] fraction of the squared whitened residual that the variable explains.
-        probability: probability that noise causes a fraction this large in any tested
-            trend.
+        probability: p-value of the trend, corrected for the number of tested trends.
     """
 
     against: str
@@ -168,10 +159,10 @@ def trends(
     Args:
         campaign: campaign of R rows.
         conditions: conditions of the campaign.
-        residual: (R, 6) [rad, m] residual; NaN for components that were not measured.
+        residual: (R, 6) [rad, m] residual, NaN for components that were not measured.
 
     Returns:
-        At most six trends that noise is unlikely to cause.
+        At most six significant trends.
     """
     z = residual / campaign.sigma
     tried = list(_candidates(campaign, conditions))
@@ -183,7 +174,7 @@ def trends(
 def _candidates(
     campaign: Campaign, conditions: Conditions
 ) -> Iterator[tuple[str, NDArray]]:
-    """Yield the name of each variable and its functions (R, p), without constants."""
+    """Yield the name of each tested trend and its regression columns (R, p)."""
     loads = campaign.loads
     force = loads[:, 3:]
     size = np.linalg.norm(force, axis=1)
@@ -215,13 +206,13 @@ def _candidates(
 
 
 def _powers(x: NDArray) -> NDArray:
-    """Return a variable minus its mean, and the square of this difference (R, 2)."""
+    """Return a centred variable and its square, (R, 2)."""
     centred = x - x.mean()
     return np.column_stack([centred, centred**2])
 
 
 def _test(name: str, X: NDArray, z: NDArray, tried: int) -> Trend | None:
-    """Test whether functions of a variable explain the residual (F test)."""
+    """Test the significance of a trend by an F test."""
     before = after = 0.0
     extra = freedom = 0
     for column in z.T:

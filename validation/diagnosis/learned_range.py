@@ -1,8 +1,8 @@
-"""Determine the range on which a model was identified and rows outside it.
+"""Determine the range on which a model was identified, and rows outside it.
 
-An identified effect is known only in the range of the covariates on which it was
-identified.  If a joint made a full turn, its angle is compared modulo a turn, unless
-the robot file contains a function of the angle that does not repeat.
+An identified effect is known only in the range of the variables in the campaign.  If a
+joint made a full turn, its angle is compared modulo one turn, unless a function in the
+robot file is not periodic in this angle.
 """
 
 from collections.abc import Iterator
@@ -17,10 +17,10 @@ from forcefit.assembly.model.function import Function
 from forcefit.assembly.model.robot import Robot
 from forcefit.validation.campaign.campaign import LOAD, Campaign
 
-_MARGIN = 0.05  # accepted extrapolation beyond the range, relative to its width
-_SAME = 1e-3  # accepted relative difference if the variable never varied
-# Forms that repeat after a turn of any variable, and forms that repeat only after a
-# turn of the first variable.
+_MARGIN = 0.05  # accepted distance from the range, relative to its width
+_SAME = 1e-3  # accepted distance from the range, relative to the largest value
+# Forms that are periodic in the first variable.  The first two forms are also periodic
+# in the second variable.
 _PERIODIC = ("waves", "reversal_waves", "scaled_waves", "reversal", "slip")
 
 
@@ -31,8 +31,8 @@ class Beyond:
     Attributes:
         variable: public name of the variable.
         learned: smallest and largest value during identification.
-        now: smallest and largest value in the given rows.
-        rows: number of rows outside the range.
+        now: smallest and largest value in the compared campaign.
+        rows: number of rows of this campaign outside the range.
         count: total number of rows.
     """
 
@@ -43,7 +43,7 @@ class Beyond:
     count: int
 
     def table(self) -> dict[str, Any]:
-        """Return plain values."""
+        """Convert to plain values."""
         return {
             "variable": self.variable, "learned": list(self.learned),
             "now": list(self.now), "rows": self.rows,
@@ -60,8 +60,8 @@ class Beyond:
 def learned_range(campaign: Campaign, rows: NDArray) -> dict[str, tuple[float, float]]:
     """Return the range of every variable in selected rows.
 
-    Variables are drives, load components and all covariates except time.  The result
-    maps their public names to the smallest and largest value.
+    Variables are drive coordinates, load components and all covariates except time.
+    The result maps the name of each variable to its smallest and largest value.
     """
     ranges = {}
     for name, values in _variables(campaign).items():
@@ -74,8 +74,8 @@ def learned_range(campaign: Campaign, rows: NDArray) -> dict[str, tuple[float, f
 def beyond(robot: Robot, campaign: Campaign) -> tuple[Beyond, ...]:
     """Return the variables outside the range in which a robot was identified.
 
-    A variable is listed if it exceeds its range by more than a twentieth of its width.
-    The list is empty if the robot file contains no range.
+    A distance from the range of up to 5 % of its width is accepted.  The result is
+    empty if the robot file contains no range.
     """
     left = []
     for name, values, outside in _outside(robot, campaign):
@@ -86,7 +86,7 @@ def beyond(robot: Robot, campaign: Campaign) -> tuple[Beyond, ...]:
 
 
 def beyond_by_row(robot: Robot, campaign: Campaign) -> NDArray:
-    """Return (R,) texts: the names of variables outside their range, if any."""
+    """Return for each row the names of the variables outside their range."""
     names = np.full(len(campaign), "", dtype=object)
     for name, _, outside in _outside(robot, campaign):
         names[outside] = [f"{before} {name}".strip() for before in names[outside]]
@@ -96,7 +96,7 @@ def beyond_by_row(robot: Robot, campaign: Campaign) -> NDArray:
 def _outside(
     robot: Robot, campaign: Campaign
 ) -> Iterator[tuple[str, NDArray, NDArray]]:
-    """Yield the name, values (R,) and mask (R,) of each variable outside its range."""
+    """Yield name, values (R,) and mask (R,) of each variable outside its range."""
     variables = _variables(campaign)
     for name, (low, high) in robot.learned_range.items():
         values = variables.get(name, np.zeros(0))
@@ -110,7 +110,7 @@ def _outside(
 
 
 def _repeats(robot: Robot, name: str) -> bool:
-    """Return whether the robot's functions repeat after a full turn of a variable."""
+    """Return whether a robot's functions are periodic in a joint coordinate."""
     turning = [f"q.{f.name}" for f in robot.frames if f.joint == "revolute"]
     return name in turning and all(
         _turns_over(function, name)
@@ -120,7 +120,7 @@ def _repeats(robot: Robot, name: str) -> bool:
 
 
 def _turns_over(function: Function, name: str) -> bool:
-    """Return whether a function repeats after a full turn of one variable."""
+    """Return whether a function is periodic in an angle with a period of one turn."""
     forms = _PERIODIC if name == function.variables[0] else _PERIODIC[:2]
     return function.form in forms and "period" not in function.parameters
 
@@ -134,6 +134,6 @@ def _variables(campaign: Campaign) -> dict[str, NDArray]:
     }
     variables |= {f"load.{a}": w for a, w in zip(LOAD, campaign.loads.T, strict=True)}
     for name, values in campaign.covariates.items():
-        if name != "time":  # time starts again in each session
+        if name != "time":  # time restarts in each session
             variables["approach" if name == "approach" else f"cov.{name}"] = values
     return variables

@@ -1,14 +1,12 @@
 """Find the measurement that best discriminates between two candidate models.
 
-If model A is true, an additional measurement differs by d from the prediction of model
-B, which was fitted to the same readings.  J C J' is the covariance of B's prediction
-due to the uncertainty of its parameters.  The measurement with the largest
-non-centrality
+Two models A and B were fitted to the same readings.  For an additional measurement, d
+is the whitened difference between their predictions, and J C J' is the covariance of
+the prediction of B.  If A is true, the best measurement has the largest non-centrality
 
-    d' (I + J C J')^-1 d     (whitened)
+    d' (I + J C J')^-1 d.
 
-discriminates best between the models.  The smaller of the non-centralities with A and
-with B as the true model is used.
+Because the true model is unknown, the smaller value for A and for B is used.
 
 Sources:
     Atkinson, Fedorov (1975), The design of experiments for discriminating between two
@@ -32,13 +30,12 @@ from forcefit.assembly.measurement.predict import predict
 from forcefit.validation.campaign.campaign import LOAD, Campaign
 from forcefit.validation.diagnosis.fit import MachineFit
 
-_TRIED = 240  # number of measuring conditions compared
-# Ratio of the tested to the measured range of loads and covariates.
+_TRIED = 240  # number of compared measuring conditions
+# Range of tested loads and temperatures, relative to the measured range.
 _FURTHER = 1.5
-# step of numerical derivatives relative to a parameter's standard deviation
+# Step of numerical derivatives, relative to the standard deviation of a parameter.
 _STEP = 1e-3
-# Conditions whose non-centrality exceeds this fraction of the largest one count as
-# equally good.
+# Smallest accepted non-centrality, relative to the largest one.
 _AS_GOOD = 0.97
 _DECIDES = 1.0  # [-] smallest non-centrality of a useful measurement
 
@@ -48,12 +45,12 @@ class NextMeasurement:
     """A measurement that discriminates between models.
 
     Attributes:
-        why: the reason as text.
+        why: the reason for the measurement as a sentence.
         configuration: commanded coordinates or pose by column name.
-        load: (6,) [N m, N] at the reference point, base axes.
-        covariates: values of covariates to set, for example a temperature.
-        power: [-] non-centrality of one reading under these conditions.  With a value
-            of 10, the measurement nearly always decides between the models.
+        load: (6,) [N m, N] load at the reference point, base axes.
+        covariates: temperature and side of approach, if recorded.
+        power: [-] non-centrality of one measurement.  With a value of 10, the
+            measurement nearly always decides between the models.
     """
 
     why: str
@@ -69,22 +66,20 @@ def next_measurement(
     fit: MachineFit,
     rivals: Sequence[MachineFit],
 ) -> NextMeasurement | None:
-    """Return the measurement that discriminates between a fit and a rival model.
+    """Return the measurement that best discriminates between two models.
 
-    The search covers the measured configurations and reachable ones between any two of
-    them.  Loads and covariates may exceed their measured ranges by half.  If a rival is
-    indistinguishable from the fit (for example a longer bar and a rotated encoder), the
-    next rival is used.
+    Configurations are measured ones or lie between two measured ones.  Loads and
+    temperatures may exceed their measured ranges by half.  If no measurement
+    distinguishes a rival model from the best model, the next rival is tested.
 
     Args:
         campaign: the measurements.
-        conditions: declared conditions of the campaign, including the registration.
+        conditions: declared conditions of the campaign.
         fit: the best model.
         rivals: other models, most probable first.
 
     Returns:
-        The measurement, or None if none of those tested distinguishes a rival from the
-        fit.
+        The measurement, or None if no tested measurement distinguishes the models.
     """
     tried = _conditions_tried(conditions)
     sigma = np.nanmedian(campaign.sigma, axis=0)
@@ -93,8 +88,7 @@ def next_measurement(
     for rival in rivals:
         b, Jb, Cb = _model(tried, rival, sigma)
         powers = np.minimum(_power(a - b, Jb, Cb), _power(b - a, Ja, Ca))
-        # Choose the condition with the smallest load among those nearly as good as the
-        # best one.
+        # Among nearly equivalent conditions, choose the one with the smallest load.
         good = powers >= _AS_GOOD * powers.max()
         best = int(np.argmin(np.where(good, size, np.inf)))
         if powers[best] >= _DECIDES:
@@ -107,7 +101,7 @@ def _measurement(
     campaign: Campaign, tried: Conditions, best: int, power: float,
     fits: Sequence[MachineFit],
 ) -> NextMeasurement:  # fmt: skip
-    """Convert one of the tested conditions to text and numbers."""
+    """Convert a tested condition to a measurement."""
     sets = [sorted({e.hypothesis.effect for e in one.effects}) for one in fits]
     names = [" + ".join(effects) or "nothing" for effects in sets]
     why = (
@@ -122,7 +116,7 @@ def _measurement(
 
 
 def _conditions_tried(conditions: Conditions) -> Conditions:
-    """Return reachable conditions with extended ranges of loads and covariates."""
+    """Return random measuring conditions to compare."""
     rng = np.random.default_rng(0)
     tried = _between(conditions.take(rng.integers(0, len(conditions), _TRIED)), rng)
     largest = np.abs(conditions.load).max(axis=0)
@@ -130,8 +124,7 @@ def _conditions_tried(conditions: Conditions) -> Conditions:
     temperature = tried.temperature
     if np.isfinite(temperature).all():
         low, high = conditions.temperature.min(), conditions.temperature.max()
-        # If a campaign was measured at one temperature, a change by ten kelvin is
-        # assumed to be possible.
+        # A temperature change of 10 K is assumed to be possible.
         span = max(_FURTHER * (high - low), 10.0)
         temperature = rng.choice([low, (low + high) / 2, low + span], _TRIED)
     approach = tried.approach
@@ -146,8 +139,8 @@ def _conditions_tried(conditions: Conditions) -> Conditions:
 
 
 def _between(measured: Conditions, rng: np.random.Generator) -> Conditions:
-    """Return conditions with half of the configurations moved towards others."""
-    # Rest positions of clearances are known only for the measured configurations.
+    """Replace half of the configurations by intermediate ones."""
+    # Rest positions of joints are known only for the measured configurations.
     if measured.rest is not None:
         return measured
     actuated = np.array([frame.actuated for frame in measured.robot.frames])
@@ -160,8 +153,7 @@ def _between(measured: Conditions, rng: np.random.Generator) -> Conditions:
     for i, posture in enumerate(postures):
         if posture is not None:
             coordinates[i], transforms[i] = posture.coordinates, posture.transforms
-    # Second-order terms of the declared errors cancel in the difference of both models,
-    # and are not known for other configurations.
+    # Second-order terms of the declared errors are equal in both models.
     return replace(
         measured, coordinates=coordinates, transforms=transforms, second_order=0.0
     )
@@ -170,8 +162,18 @@ def _between(measured: Conditions, rng: np.random.Generator) -> Conditions:
 def _model(
     tried: Conditions, fit: MachineFit, sigma: NDArray
 ) -> tuple[NDArray, NDArray, NDArray]:
-    """Return (S, 6) whitened predictions with a machine's effects, and derivatives."""
-    # Parameters of one session do not apply to a new measurement.
+    """Return whitened predictions, their derivatives, and the parameter covariance.
+
+    Args:
+        tried: S measuring conditions.
+        fit: fitted machine with k parameters.
+        sigma: (6,) [rad, m] standard deviations of the readings.
+
+    Returns:
+        (S, 6) predictions, (S, 6, k) derivatives and (k, k) covariance.  Components
+        without sigma are omitted.
+    """
+    # Parameters of a single session do not apply to a new measurement.
     parts = [one for one in fit.effects if one.session is None]
     places = [fit.unknowns.place(one) for one in parts]
     chosen = np.concatenate([np.arange(len(fit.x))[own] for own in [slice(0), *places]])
@@ -187,8 +189,7 @@ def _model(
         return predict(conditions).deviation / sigma
 
     model = read(fit.x, finite)
-    # Finite motions hardly change the derivatives but take a hundred times longer to
-    # compute.
+    # The derivatives neglect finite motions, which are slow to compute.
     middle = read(fit.x, False) if finite else model
     J = np.zeros((*middle.shape, len(chosen)))
     for k, place in enumerate(chosen):
@@ -202,11 +203,11 @@ def _model(
 
 
 def _power(d: NDArray, J: NDArray, C: NDArray) -> NDArray:
-    """Return the non-centrality (S,) of the difference d; 0 where it is not finite."""
+    """Return the non-centralities (S,) of differences d, 0 if d is not finite."""
     S = np.eye(d.shape[1]) + np.einsum("sik,kl,sjl->sij", J, C, J)
     good = np.isfinite(d).all(axis=1) & np.isfinite(S).all(axis=(1, 2))
     powers = np.zeros(len(d))
-    # S is 1 plus a positive semidefinite matrix up to round-off, which may be large.
+    # Without round-off errors, all eigenvalues of S would be at least 1.
     values, vectors = np.linalg.eigh(S[good])
     along = np.einsum("sij,si->sj", vectors, d[good])
     powers[good] = np.sum(along**2 / np.maximum(values, 1.0), axis=1)
@@ -214,7 +215,7 @@ def _power(d: NDArray, J: NDArray, C: NDArray) -> NDArray:
 
 
 def _configuration(campaign: Campaign, tried: Conditions, row: int) -> dict[str, float]:
-    """Return the command of a tested condition in the columns of the campaign."""
+    """Return the commanded configuration of a tested condition by column name."""
     if campaign.commanded == "joints":
         return {
             f"q.{frame.name}": float(tried.coordinates[row, i])

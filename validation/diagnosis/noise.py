@@ -1,7 +1,7 @@
 """Estimate the noise relative to the declared sigma, and detect blunders.
 
-The noise of a good reading is distributed as N(0, tau^2).  One reading in five thousand
-is expected to be a blunder, whose standard deviation is thirty times larger.
+The whitened noise of a good reading is distributed as N(0, tau^2). One reading in 5000
+is expected to be a blunder, with a standard deviation of 30 tau.
 
 Sources:
     Box, Tiao (1968), A Bayesian approach to some outlier problems, Biometrika 55, 119.
@@ -16,15 +16,15 @@ from scipy.stats import chi2
 from forcefit.results.text import readings_text
 
 _BLUNDERS = 2e-4  # prior probability of a blunder
-_WIDTH = 30.0  # ratio of the standard deviation of a blunder to tau
-_LEFT_OUT = 1e-12  # weight of a blunder relative to a good reading
-# Smallest ratio of a blunder's residual to tau before a model has been fitted.
+_WIDTH = 30.0  # standard deviation of a blunder, relative to tau
+_LEFT_OUT = 1e-12  # weight of a blunder, relative to that of a good reading
+# Smallest residual of a blunder before a model is fitted, relative to tau.
 _CLEAR = 10.0
-# Largest fraction of blunders, as in the final test; more indicate an effect.
+# Largest accepted fraction of blunders among the readings.
 _MANY = 0.05
-_UNLIKE = 4.0  # standard deviations by which tau must differ from 1 to be reported
+_UNLIKE = 4.0  # smallest reported difference of tau from 1, in standard deviations
 _CLOSE = 0.2  # smallest abs(ln tau) that is reported
-_CHANCE = 1e-4  # p-value below which the readings count as not repeatable
+_CHANCE = 1e-4  # p-value below which the readings are reported as not repeatable
 _MEDIAN = 0.4549  # median of chi-square with one degree of freedom
 
 
@@ -36,8 +36,8 @@ class Noise:
         tau: ratio of true to declared sigma.
         tau_std: standard deviation of tau.
         findings: sentences about the noise for the user.
-        common: [rad, m] standard deviations of rotation and translation of the common
-            motion of the points of one measurement.
+        common: [rad, m] standard deviations of the rotation and translation that are
+            common to all points of a measurement.
     """
 
     tau: float
@@ -47,11 +47,15 @@ class Noise:
 
 
 def probability_good(squares: NDArray, *, clearly: bool = False) -> NDArray:
-    """Return the probabilities (n,) that readings are good, from expected squares.
+    """Return the probabilities (n,) that readings are not blunders.
 
-    It is set to 1 for readings that are more probably good than not, and for all
-    readings if there are too many outliers.  If ``clearly`` is true, only large
-    residuals count as outliers, because effects have not been fitted yet.
+    Args:
+        squares: (n,) expected squares of the whitened residuals.
+        clearly: whether only large residuals are treated as blunders.
+
+    Returns:
+        The probabilities.  Values above 0.5 are set to 1. If there are too many
+        blunders, all values are set to 1.
     """
     v = max(float(np.median(squares)) / _MEDIAN, 1e-12)
     with np.errstate(over="ignore", under="ignore"):
@@ -65,12 +69,15 @@ def probability_good(squares: NDArray, *, clearly: bool = False) -> NDArray:
 
 
 def cell_weights(good: NDArray) -> NDArray:
-    """Return relative precisions (n,): 1 for good readings, nearly 0 for blunders."""
+    """Return relative precisions (n,), 1 for good readings and about 0 for blunders."""
     return np.maximum(good, _LEFT_OUT)
 
 
 def repeat_scatter(z: NDArray, group: NDArray) -> tuple[float, int]:
-    """Return the rms [sigma] within groups of repeats and its degrees of freedom."""
+    """Return the rms of whitened readings about the means of groups of repeats.
+
+    The second value is the number of degrees of freedom.
+    """
     _, number, count = np.unique(group, return_inverse=True, return_counts=True)
     mean = np.bincount(number, weights=z) / count
     freedom = len(z) - len(count)
@@ -82,14 +89,14 @@ def findings(
     tau: float, tau_std: float, repeats: tuple[float, int], *, memory: bool,
     common: tuple[float, float] = (0.0, 0.0),
 ) -> tuple[str, ...]:  # fmt: skip
-    """Return sentences about the noise, none if it agrees with the declared sigma.
+    """Return sentences about noise that differs from the declared sigma.
 
     Args:
         tau: ratio of true to declared sigma.
         tau_std: standard deviation of tau.
         repeats: result of :func:`repeat_scatter` for the residual.
-        memory: whether the model depends on earlier rows.
-        common: [rad, m] common noise of the points of a measurement.
+        memory: whether the model of a row depends on earlier rows.
+        common: [rad, m] noise that is common to the points of a measurement.
     """
     told = []
     if any(common):

@@ -14,9 +14,9 @@ G       ``slopes``      (N, k)     change of the whitened readings per unknown
 H       ``covariance``  (k, k)     (G'G)^-1, covariance of the unknowns for white noise
 ======  ==============  =========  ===================================================
 
-Fits assume white noise.  If the correlation matrix is R instead of 1, the covariance of
-the fitted unknowns is H G'R G H. The likelihood of a and tau is computed by a Kalman
-filter on a grid of values.
+Fits assume white noise.  If the correlation matrix of the noise is R, the covariance of
+the fitted unknowns is H G'R G H. The likelihood is computed by a Kalman filter for a
+grid of values of a and tau.
 
 Sources:
     Uhlenbeck, Ornstein (1930), On the theory of the Brownian motion, Phys. Rev. 36.
@@ -34,9 +34,9 @@ from forcefit.validation.campaign.campaign import Campaign
 from forcefit.validation.diagnosis.lack_of_fit import SIGNIFICANT
 
 _SHARES = np.array([0.05, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 0.95])
-# Number of time constants between the typical time step and the longest session.
+# Number of tested correlation times.
 _CONSTANTS = 12
-_FEWEST = 30  # smallest number of rows with a known time
+_FEWEST = 30  # smallest number of rows for an estimate
 
 
 @dataclass(frozen=True)
@@ -62,9 +62,8 @@ def noise_in_time(campaign: Campaign, residual: NDArray) -> NoiseInTime | None:
         residual: (N,) whitened residual.
 
     Returns:
-        The maximum-likelihood fraction and time constant.  None if too few rows have a
-        time, or if white noise shows this correlation more often than once in 10^4
-        cases.
+        The maximum-likelihood estimate.  None if there are too few rows, if no time was
+        recorded, or if the correlation is not significant.
     """
     if "time" not in campaign.covariates or len(campaign) < _FEWEST:
         return None
@@ -78,8 +77,7 @@ def noise_in_time(campaign: Campaign, residual: NDArray) -> NoiseInTime | None:
     for times, z in series:
         more = _innovations(times, z, constants)
         squares, logs = squares + more[0], logs + more[1]
-    # The noise variance is also estimated, because white noise with an overestimated
-    # sigma does not appear white.
+    # The variance of the noise is estimated together with its correlation.
     count = len(residual)
     gain = count * np.log(residual @ residual / squares) - logs
     best = np.unravel_index(np.argmax(gain), gain.shape)
@@ -92,12 +90,11 @@ def noise_in_time(campaign: Campaign, residual: NDArray) -> NoiseInTime | None:
 def widened(
     covariance: NDArray, slopes: NDArray, campaign: Campaign, noise: NoiseInTime
 ) -> NDArray:
-    """Return the covariance (k, k) under correlated noise of a white-noise fit.
+    """Return the covariance (k, k) of fitted unknowns under correlated noise.
 
     Args:
-        covariance: (k, k) covariance for white noise.
-        slopes: (N, k) derivatives G of the whitened readings.  The estimate of the
-            unknowns is the covariance times G' times the whitened readings.
+        covariance: (k, k) covariance H for white noise.
+        slopes: (N, k) derivatives G of the whitened readings.
         campaign: campaign of R rows with N measured cells.
         noise: the correlated noise.
     """
@@ -113,7 +110,7 @@ def widened(
 
 
 def _series(campaign: Campaign) -> Iterator[tuple[NDArray, NDArray]]:
-    """Yield the times and cells of each series of one component, point and session."""
+    """Yield the times and cells of each component, point and session."""
     rows, columns = np.nonzero(campaign.cells)
     time = campaign.covariates["time"][rows]
     own = [
@@ -130,7 +127,10 @@ def _series(campaign: Campaign) -> Iterator[tuple[NDArray, NDArray]]:
 def _innovations(
     times: NDArray, z: NDArray, constants: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Return (shares, constants) sums over a series of v^2/S and of ln S."""
+    """Return the sums of v^2 / S and ln S over a series, each (shares, constants).
+
+    Here v is the innovation of the Kalman filter, and S is its variance.
+    """
     share = _SHARES[:, None]
     fading = np.exp(-np.diff(times)[:, None] / constants)
     mean = np.zeros((len(_SHARES), len(constants)))

@@ -1,9 +1,9 @@
-"""Describe nuisance parameters, the geometric errors and compliances of any machine.
+"""Describe nuisance parameters, which are geometric errors and joint compliances.
 
-No frame is manufactured exactly as drawn, and no part is rigid.  Each of these unknowns
-has a Gaussian prior about its declared value.  Its standard deviation is the
-``tolerance`` of the frame, or a value common to a group of unknowns that the readings
-determine.
+Every machine has small geometric errors and compliances.  Each of these unknowns has a
+Gaussian prior about its declared value.  The prior standard deviation is the
+``tolerance`` of the frame.  Without a tolerance, it is common to a group of unknowns
+and estimated from the readings.
 """
 
 from collections.abc import Container
@@ -22,24 +22,24 @@ from forcefit.validation.diagnosis.signatures import UNSEEN, whiten
 
 GEOMETRY, SPRINGS = "geometry", "springs"
 KINDS = ("rotation", "translation")
-LARGEST_TURN = 0.2  # [rad] largest error of a drive, a frame or a device
+LARGEST_TURN = 0.2  # [rad] largest plausible rotation error of a frame or drive
 # Largest plausible translation of a frame, relative to the size of the robot.
 LARGEST_SHIFT = 0.1
-# Columns below this fraction of the largest one in their group affect no reading.
+# Smallest norm of a column above round-off, relative to the largest in its group.
 _ROUNDING = 1e-9
-_SAME = 1 - 1e-6  # cosine above which two columns are equal
+_SAME = 1 - 1e-6  # smallest cosine of two parallel columns
 
 
 @dataclass(frozen=True, eq=False)
 class Nuisance:
-    """Columns and priors of k unknown geometric errors and spring compliances.
+    """Columns and priors of k unknown geometric errors and joint compliances.
 
     Attributes:
         columns: (N, k) change of the whitened readings per unknown.
         spring: (k,) bool, True for a spring, whose compliance cannot be negative.
-        frame, axis: (k,) index of the frame in the campaign's robot, and component of
-            the screw at the frame, 0 to 5.
-        given: (k,) declared standard deviation; NaN where none is declared.
+        frame: (k,) index of the frame in the campaign's robot.
+        axis: (k,) screw component at the frame, 0 to 5.
+        given: (k,) declared prior standard deviation, NaN if it is not declared.
         most: (k,) largest plausible standard deviation.
     """
 
@@ -52,16 +52,20 @@ class Nuisance:
 
     @property
     def group(self) -> NDArray:
-        """(k,) 0, 1: rotations, translations of frames; 2, 3: of springs."""
+        """Group (k,) of each unknown.
+
+        The groups are 0 and 1 for rotations and translations of frames, and 2 and 3 for
+        rotational and translational springs.
+        """
         return 2 * self.spring + self.axis // 3
 
     @property
     def declared(self) -> bool:
-        """Whether the robot declares tolerances; geometric errors are then fitted."""
+        """Whether the robot file declares tolerances."""
         return bool(np.isfinite(self.given).any())
 
     def take(self, unknowns: NDArray) -> "Nuisance":
-        """Return selected unknowns, by a mask (k,) or by indices."""
+        """Return the unknowns that a mask (k,) or indices select."""
         return Nuisance(
             self.columns[:, unknowns], self.spring[unknowns], self.frame[unknowns],
             self.axis[unknowns], self.given[unknowns], self.most[unknowns],
@@ -74,14 +78,18 @@ def nuisance(
 ) -> Nuisance:  # fmt: skip
     """Return the geometric errors and springs that affect the readings.
 
-    Springs describe compliance distributed over many joints.  A spring is omitted if
-    its column is parallel to one of ``named`` (N, c), which belongs to a library effect
-    with a single unknown.  ``response`` is the response under declared conditions.
+    Args:
+        campaign: the measurements.
+        conditions: declared conditions of the campaign.
+        response: responses of the readings under these conditions.
+        named: (N, c) columns of library effects with a single unknown.  Springs with a
+            parallel column are omitted.
+        kinds: kinds of nuisance parameters to return.
     """
     robot, n = campaign.robot, len(campaign.robot.frames)
     own = [conditions.robot.index(frame.name) for frame in robot.frames]
     screws, carried = response.screws[:, :, own], response.wrenches[:, own]
-    # Frames of closures and of the platform cannot have a joint spring.
+    # Frames of loop closures and of the platform cannot have a joint spring.
     carried[:, [not _may_give(robot, f.name) for f in robot.frames]] = 0.0
     changes = np.concatenate([screws, screws * carried[:, None]], axis=2)
     given = np.full((2 * n, 6), np.nan)
@@ -105,31 +113,34 @@ def nuisance(
 
 
 def _may_give(robot: Robot, name: str) -> bool:
-    """Return whether a joint stiffness can be defined for a frame."""
+    """Return whether a frame can have a joint stiffness."""
     return name != robot.platform and all(name not in pair for pair in robot.closures)
 
 
 def visible(small: Nuisance) -> NDArray:
-    """Return a mask (k,) of the unknowns that visibly change a reading."""
+    """Return a mask (k,) of the unknowns that affect the readings."""
     size = np.linalg.norm(small.columns, axis=0)
     largest = np.zeros(4)
     np.maximum.at(largest, small.group, size)
-    # A tolerance of zero declares a direction exact.
+    # A tolerance of zero excludes a geometric error.
     shown = (size > _ROUNDING * largest[small.group]) & ~(small.given == 0.0)
     return np.asarray(shown & (size > UNSEEN / small.most))
 
 
 def _is_among(columns: NDArray, named: NDArray) -> NDArray:
-    """Return a mask (k,) of the columns (N, k) that are parallel to a named column."""
+    """Return a mask (k,) of the columns (N, k) that are parallel to a given column."""
     unit = [c / np.maximum(np.linalg.norm(c, axis=0), 1e-300) for c in (named, columns)]
     return np.asarray((np.abs(unit[0].T @ unit[1]) > _SAME).any(axis=0))
 
 
 def with_error(robot: Robot, frame: NDArray, axis: NDArray, x: NDArray) -> Robot:
-    """Return a robot with x (k,) [rad, m] added to its geometric errors.
+    """Return a robot with additional geometric errors.
 
-    x acts at the frames with indices ``frame`` (k,), in the screw components ``axis``
-    (k,), 0 to 5.
+    Args:
+        robot: the robot.
+        frame: (k,) indices of frames.
+        axis: (k,) screw components at these frames, 0 to 5.
+        x: (k,) [rad, m] errors to add.
     """
     errors = robot.errors.copy()
     np.add.at(errors, (frame, axis), x)
@@ -137,10 +148,13 @@ def with_error(robot: Robot, frame: NDArray, axis: NDArray, x: NDArray) -> Robot
 
 
 def with_compliance(robot: Robot, frame: NDArray, axis: NDArray, x: NDArray) -> Robot:
-    """Return a robot with compliances x (k,) in series with its joints.
+    """Return a robot with additional compliances in series with its joints.
 
-    x [rad/(N m), m/N] acts at the frames with indices ``frame`` (k,), in the screw
-    components ``axis`` (k,), 0 to 5.  A value of 0 changes nothing.
+    Args:
+        robot: the robot.
+        frame: (k,) indices of frames.
+        axis: (k,) screw components at these frames, 0 to 5.
+        x: (k,) [rad/(N m), m/N] compliances to add.
     """
     frames = list(robot.frames)
     for i, a, c in zip(frame.tolist(), axis.tolist(), x.tolist(), strict=True):

@@ -1,8 +1,8 @@
-"""List the places at which a function can act, with the reading responses.
+"""List the locations at which a function can act, with the responses of the readings.
 
-A place is a screw component at a frame, at the base or in the reading; a component of
-the load; or several components at one frame.  Places with equal responses are listed
-only once.
+A location is a screw component at a frame, at the base or in the reading, a component
+of the load, or several components at one frame.  Locations with equal responses are
+listed only once.
 """
 
 from dataclasses import dataclass, field
@@ -22,26 +22,23 @@ from forcefit.validation.diagnosis.sensitivities import Sensitivities
 from forcefit.validation.diagnosis.signatures import fingerprints
 from forcefit.validation.diagnosis.whitening import Whitening
 
-Where = tuple[str, str, str]  # place, screw component, kind of candidate function
-# Ratio of the largest unrecorded force (for example of a cable) to the largest recorded
-# force.
+Where = tuple[str, str, str]  # location, screw component, kind of candidate function
+# Largest plausible unrecorded force, relative to the largest recorded force.
 _HEAVY = 10.0
-_FORCE = 1000.0  # [N] largest unrecorded force if no load is recorded
-# Products are cached only for forms with at most this number of columns, to limit
-# memory.
+_FORCE = 1000.0  # [N] largest plausible unrecorded force if no load is recorded
+# Largest number of columns of a form for which inner products are cached.
 _REMEMBERED = 8
 
 
 @dataclass(frozen=True, eq=False)
 class Weighted:
-    """Weighted responses at all places, in selected cells.
+    """Weighted responses of selected cells to functions at all locations.
 
     Attributes:
         rows: (R,) rows that contain selected cells.
         answers: (S, R, 6) responses, zero in cells that are not selected.
         squares: (S, R) sums of squares over the cells of each row.
-        pair_products: (pairs, R) sums of products of two components that act at one
-            place.
+        pair_products: (pairs, R) sums of products of two components at one location.
         cells: row and component of the selected cells.
         known: cache of inner products of each form.
     """
@@ -54,7 +51,12 @@ class Weighted:
     known: dict[object, tuple[NDArray, NDArray]] = field(default_factory=dict)
 
     def products(self, key: object, columns: NDArray) -> tuple[NDArray, NDArray]:
-        """Return B'B (S, m, m) at all places and (pairs, m, m) of columns (R, m)."""
+        """Return inner products of the columns (R, m) of a form.
+
+        Returns:
+            (S, m, m) inner products for each component, and (pairs, m, m) inner
+            products for each pair of components at one location.
+        """
         if key in self.known:
             return self.known[key]
         m = columns.shape[1]
@@ -67,18 +69,19 @@ class Weighted:
 
 
 class Places:
-    """Places at which functions would change the readings of a campaign.
+    """Locations at which functions would change the readings of a campaign.
 
     Attributes:
-        names: components of each place.
-        members: indices of the S single components that form each place.
-        equal: other components with the same response as a place.
-        most: largest plausible unknown of each place.
-        sizes: for each number of components: places, members and number of rotations.
+        names: screw components of each location.
+        members: indices of these components in the list of S single components.
+        equal: other components with the same response.
+        most: largest plausible unknown at each location.
+        sizes: for each number of components, the locations, their members, and a mask
+            of the rotations.
     """
 
     def __init__(self, campaign: Campaign, sensitivities: Sensitivities) -> None:
-        """List the places of a design, without using measured values."""
+        """List the locations at which functions can act in a campaign."""
         self._campaign, self._sensitivities = campaign, sensitivities
         self._plausible = LARGEST_TURN, LARGEST_SHIFT * size_of(campaign.robot)
         singles, combined = self._listed()
@@ -100,7 +103,7 @@ class Places:
         return len(self.names)
 
     def _listed(self) -> tuple[list[Where], list[tuple[Where, ...]]]:
-        """Return all single components and combinations."""
+        """Return all single components and all combinations of components."""
         singles: list[Where] = [("load", force, "screw") for force in LOADS[3:]]
         combined = [tuple(singles)]
         for kind, (part, *others) in places_of(self._campaign.robot, [""]):
@@ -136,7 +139,7 @@ class Places:
         self.number = {own[0]: k for k, each in enumerate(same) for own in each}
 
     def _list_combinations(self, combined: list[tuple[Where, ...]]) -> None:
-        """List the places that combine several components of one frame."""
+        """List the combinations of several components at one frame."""
         known = {frozenset(members) for members in self.members}
         for own in combined:
             shown = [w for w in own if w in self.number]
@@ -148,7 +151,7 @@ class Places:
                 self.equal.append([])
 
     def _preference(self, where: Where) -> tuple[bool, bool, bool]:
-        """Return a sort key that puts drives first, then frames, then other places."""
+        """Return a sort key that puts drives first, then other frames."""
         name, component, kind = where
         frames = {f.name: f for f in self._campaign.robot.frames}
         frame = frames.get(name)
@@ -156,7 +159,7 @@ class Places:
         return kind != "screw", not own, frame is None
 
     def plausible(self, where: Where) -> float:
-        """Return the largest plausible displacement, compliance or force at a place."""
+        """Return the largest plausible displacement, compliance or force."""
         name, component, kind = where
         conditions = self._sensitivities.conditions
         if name == "load":
@@ -172,11 +175,7 @@ class Places:
         return most / size if size > 0 else 0.0
 
     def weighted(self, cells: NDArray, whiten: Whitening) -> Weighted:
-        """Return the weighted responses at all places in cells (N,) bool.
-
-        Rows of one measurement have equal variables, so the product of a response and a
-        function is whitened like the response itself.
-        """
+        """Return the weighted responses at all locations in selected cells (N,)."""
         row, component = (axis[cells] for axis in np.nonzero(self._campaign.cells))
         rows, row = np.unique(row, return_inverse=True)
         answers = np.zeros((len(self._answers), len(rows), 6))
@@ -189,7 +188,7 @@ class Places:
         return Weighted(rows, answers, squares, pair_products, (row, component))
 
     def joined(self, members: NDArray, whole: NDArray, cross: NDArray) -> NDArray:
-        """Return (f, c, s m, s m) inner products of combinations of s components."""
+        """Return inner products (f, c, s m, s m) for combinations of s components."""
         c, s = members.shape
         f, _, m, _ = whole.shape
         B = np.zeros((f, c, s, m, s, m))

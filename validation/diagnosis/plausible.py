@@ -1,9 +1,8 @@
 """Find implausible machine parameters and impossible sensor readings.
 
-A fit may explain readings by absurd parameters, for example a base 29 m away on a
-foundation as soft as rubber.  The plausible ranges are wide and depend on the size of
-the robot and on the largest load.  If a parameter is outside its range, the deviation
-probably has a different cause, and no effect is claimed.
+The plausible ranges are wide.  They depend on the size of the robot and on the largest
+load.  If a parameter is outside its range, the deviation probably has a different
+cause, and no effect is claimed.
 
 Sources:
     Ashby, Materials Selection in Mechanical Design, 4th ed., figure 4.11 (expansion of
@@ -26,13 +25,13 @@ from forcefit.validation.diagnosis.nuisance import (
     LARGEST_TURN,
 )
 
-# [rad, or relative to the robot's size] largest plausible deformation under the largest
-# load
+# Largest plausible deformation under the largest load.  Rotations are in rad, and
+# translations are relative to the size of the robot.
 _GIVES = 0.2
-# Largest plausible geometric error of a manufactured frame: rotation [rad], and
-# translation relative to the robot's size.
+# Largest plausible geometric error of a manufactured frame.  The rotation is in rad,
+# and the translation is relative to the size of the robot.
 _MADE = (0.1, 0.02)
-_HOT = 150.0  # [K] largest plausible difference from the calibration temperature
+_HOT = 150.0  # [K] largest plausible difference from the median temperature
 _G = 9.81  # [m/s^2] acceleration of gravity
 _FACTORS = {"load_gain": (0.3, 3.0), "modulus_scale": (0.2, 5.0)}
 _LIKELY = "check the declared stiffness, the units and the registration"
@@ -48,19 +47,20 @@ def impossible_rows(campaign: Campaign) -> NDArray:
 
 
 def implausible(campaign: Campaign, fit: MachineFit) -> tuple[str, ...]:
-    """Return one sentence for each implausible parameter of a fitted machine."""
+    """Return a sentence for each implausible parameter of a fitted machine."""
     return tuple(f"{one}: {_LIKELY}" for one in _implausible(campaign, fit))
 
 
 def _implausible(campaign: Campaign, fit: MachineFit) -> Iterator[str]:
-    """Yield a statement for each implausible parameter."""
+    """Yield a message for each implausible parameter."""
     robot, size = campaign.robot, size_of(campaign.robot)
     force = float(np.abs(campaign.loads[:, 3:]).max())
     force += _G * sum(frame.mass for frame in robot.frames)
     moment = float(np.abs(campaign.loads[:, :3]).max()) + force * size
     reach = ", so compliant that the loads move the platform out of its workspace"
     shift = LARGEST_SHIFT * size
-    # Smallest and largest plausible value for each unit, and the statement otherwise.
+    # Smallest and largest plausible value for each unit, and the message about a value
+    # outside this range.
     ranges = {
         "rad": (-LARGEST_TURN, LARGEST_TURN, f", larger than {LARGEST_TURN:.2g}"),
         "m": (-shift, shift, f", larger than {shift:.2g}"),
@@ -89,11 +89,14 @@ def _implausible(campaign: Campaign, fit: MachineFit) -> Iterator[str]:
 def _parameters(
     campaign: Campaign, fit: MachineFit
 ) -> Iterator[tuple[str, str, float]]:
-    """Yield effect, parameter and value, for a drift the value at its end."""
+    """Yield the effect, name and value of each parameter.
+
+    For a drift, the value is the deviation at the end of the campaign.
+    """
     bare = campaign.robot.without_effects()
     for one in fit.effects:
         values = one.hypothesis.public(bare, fit.own(one)[0])
-        if one.session is None:  # values of one session are added to those of the file
+        if one.session is None:  # values of a single session are differences
             machine = fit.robot.effects.get(one.hypothesis.effect, {})
             values = {k: machine.get(k, v) for k, v in values.items()}
         went = 1.0

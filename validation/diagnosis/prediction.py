@@ -1,7 +1,7 @@
-"""Predict the readings of a robot, in fits, tests and for saved files.
+"""Predict the readings of a robot.
 
-A diagnosis uses the same function to fit a robot and to compute its errors as
-``forcefit validation predict`` uses for the saved file.
+The same function predicts readings in a diagnosis and in ``forcefit validation
+predict``.
 """
 
 from dataclasses import replace
@@ -26,13 +26,11 @@ def finite_conditions(campaign: Campaign, rows: NDArray | None = None) -> Condit
 
     Args:
         campaign: campaign of R rows.
-        rows: indices or mask of the rows to return, whose readings may depend on
-            earlier rows.
+        rows: indices or mask of the rows to return.  None for all rows.
 
     Returns:
         The conditions of these rows.  For a robot with clearance, the conditions of the
-        linear model are returned, because the rest position without a load is
-        undetermined.
+        linear model are returned.
     """
     conditions = conditions_of(campaign)
     if rows is not None:
@@ -48,15 +46,19 @@ def predicted(
     """Return the predicted readings of a robot for the commands of a campaign.
 
     Args:
-        campaign: campaign of R rows; its readings are not used.
-        robot: robot with the same frames and closures as the campaign's.
-        linear: whether to linearise motions.
+        campaign: campaign of R rows.  Its readings are not used.
+        robot: robot with the same frames and closures as in the campaign.  None for the
+            robot of the campaign.
+        linear: whether to neglect finite motions.
     """
     campaign = replace(campaign, robot=campaign.robot if robot is None else robot)
     return predict((conditions_of if linear else finite_conditions)(campaign))
 
 
 def residual_of(campaign: Campaign, robot: Robot, *, linear: bool = False) -> NDArray:
-    """Return (R, 6) [rad, m] readings minus predicted readings; NaN if not measured."""
+    """Return the measured minus the predicted readings (R, 6) [rad, m].
+
+    Components that were not measured are NaN.
+    """
     deviation = predicted(campaign, robot, linear=linear).deviation
     return np.asarray(campaign.measured - deviation)

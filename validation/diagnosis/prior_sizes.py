@@ -5,8 +5,8 @@ standard deviation s,
 
     d ln p(z) / d ln s = sum of [(mu^2 + V)/s^2 - 1],
 
-which is zero for s^2 = sum mu^2 / sum (1 - V/s^2).  MacKay's iteration repeats this
-formula; here, the change in s per step is limited.
+which is zero for s^2 = sum mu^2 / sum (1 - V/s^2). MacKay's method iterates this
+equation.  Here, the change in s per step is limited.
 
 Sources:
     MacKay (1992), Bayesian interpolation, Neural Computation 4, 415.
@@ -23,28 +23,28 @@ from scipy.linalg import cho_solve, solve_triangular
 from forcefit.validation.diagnosis.gaussian import FREEDOM, deviance, size_penalty
 
 Eigen = tuple[NDArray, NDArray]
-_STEPS = 25  # largest number of steps; about ten are needed
-# Change in ln s at which the iteration ends, because the evidence hardly changes.
+_STEPS = 25  # maximum number of iterations
+# Change in ln s below which the iteration ends.
 _SETTLED = 0.03
-_LEAP = 4.0  # largest factor on s in one step
-_BEGIN = 4.0  # [sigma] start value of a group's contribution to the readings
-# [sigma] A standard deviation with a smaller contribution to the readings is set to 0.
+_LEAP = 4.0  # largest factor by which s changes in one iteration
+_BEGIN = 4.0  # [sigma] start value of the contribution of a group to the readings
+# [sigma] Smallest contribution of a group to the readings.
 _LEAST = 1e-2
 
 
 @dataclass(frozen=True, eq=False)
 class Sizes:
-    """Optimised prior standard deviations, and the posterior.
+    """Optimised prior standard deviations and the posterior for them.
 
     Attributes:
-        std: (k,) prior standard deviation of every unknown, divided by the noise scale
+        std: (k,) prior standard deviation of each unknown, divided by the noise scale
             tau.
         of_group: prior standard deviation of each group.
         mean: (k,) posterior mean.
         covariance: (k, k) posterior covariance, divided by tau^2.
         squares: value of z' C^-1 z.
         log_det: value of ln det C.
-        cost: penalty of the optimisation, see :func:`.gaussian.size_penalty`.
+        cost: evidence penalty of the optimisation, see :func:`.gaussian.size_penalty`.
     """
 
     std: NDArray
@@ -57,7 +57,7 @@ class Sizes:
 
     @property
     def determined(self) -> NDArray:
-        """(k,) 1 for unknowns determined by the readings, 0 by the prior alone."""
+        """Fraction (k,) of the prior variance that the readings remove."""
         with np.errstate(divide="ignore", invalid="ignore"):
             share = 1 - np.diag(self.covariance) / self.std**2
         return np.where(self.std > 0, share, 0.0)
@@ -65,7 +65,7 @@ class Sizes:
 
 @dataclass(frozen=True, eq=False)
 class Grouped:
-    """Linear model whose k unknowns share prior standard deviations in groups.
+    """Linear model whose k unknowns share a prior standard deviation in each group.
 
     Attributes:
         gram: (k, k) inner products of columns.
@@ -73,8 +73,8 @@ class Grouped:
         squares: sum of squares of the readings.
         count: n, number of readings.
         group: (k,) group of each unknown.
-        given: (k,) fixed standard deviation; NaN if it is optimised.
-        most: (k,) largest plausible standard deviation.
+        given: (k,) fixed prior standard deviation, NaN if it is optimised.
+        most: (k,) largest plausible prior standard deviation.
     """
 
     gram: NDArray
@@ -86,7 +86,7 @@ class Grouped:
     most: NDArray
 
     def without(self, unknowns: NDArray) -> "Grouped":
-        """Return the model after removing the unknowns with the given indices."""
+        """Return the model without the unknowns of given indices."""
         kept = np.delete(np.arange(len(self.along)), unknowns)
         return replace(
             self, gram=self.gram[np.ix_(kept, kept)], along=self.along[kept],
@@ -100,9 +100,11 @@ def best_sizes(
 ) -> Sizes:  # fmt: skip
     """Return the prior standard deviations of all groups that maximise the evidence.
 
-    The iteration starts at ``start``, which maps groups to standard deviations.
-    ``eigen`` maps some groups to the eigenvalues and eigenvectors of their block of the
-    inner products.
+    Args:
+        model: the linear model.
+        start: mapping from groups to start values.
+        eigen: mapping from groups to the eigenvalues and eigenvectors of their block of
+            ``model.gram``.
     """
     given, group, count = model.given, model.group, model.count
     free = np.isnan(given)
@@ -153,15 +155,18 @@ def best_sizes(
 
 @dataclass(frozen=True, eq=False)
 class _Posterior:
-    """Posterior at given prior standard deviations, in the rotated unknowns.
+    """Posterior of the rotated unknowns for given prior standard deviations.
 
     Attributes:
         std: (k,) prior standard deviations.
         x: (k,) posterior means divided by the prior standard deviations.
-        determined: (k,) 1 minus relative variances; for the largest group only the sum.
+        determined: (k,) 1 minus the posterior variances, relative to the prior.  Only
+            the sum is valid for the largest group.
         left: value of z' C^-1 z.
         log_det: value of ln det C.
-        D, E, L: 1 + s^2 times eigenvalues, C D^-1, and L L' = A - C D^-1 C'.
+        D: 1 plus s^2 times the eigenvalues.
+        E: C D^-1.
+        L: Cholesky factor of A - C D^-1 C'.
     """
 
     std: NDArray
@@ -176,21 +181,22 @@ class _Posterior:
 
 @dataclass(frozen=True, eq=False)
 class _Turned:
-    """Inner products of the columns after a rotation of the largest group's unknowns.
+    """Inner products after a rotation of the unknowns of the largest group.
 
-    The block of these unknowns in the inner products is then diagonal, and so is D in
+    The rotation makes the block of these unknowns diagonal.  Because they share one
+    standard deviation, D is diagonal in
 
-        M = 1 + S G S = [A  C; C' D],
+        M = 1 + S G S = [A  C; C' D].
 
-    because these unknowns share one standard deviation.  M is factored by means of A -
-    C D^-1 C'.  This matrix is small even if the largest group contains hundreds of
-    unknowns.
+    Only the Schur complement A - C D^-1 C', which is small, must be factored.
 
     Attributes:
-        values, V: eigenvalues and eigenvectors of the group's block.
-        group, rest: indices of the unknowns in this group and of all others.
-        inner, across: inner products among the others, and between the others and the
-            group.
+        values: eigenvalues of the block of the largest group.
+        V: eigenvectors of this block.
+        group: indices of the unknowns in this group.
+        rest: indices of all other unknowns.
+        inner: inner products among the other unknowns.
+        across: inner products between the other unknowns and this group.
         along: (k,) inner products with the readings.
     """
 
@@ -203,7 +209,7 @@ class _Turned:
     along: NDArray
 
     def posterior(self, std: NDArray, squares: float) -> _Posterior:
-        """Return the posterior at prior standard deviations (k,)."""
+        """Return the posterior for prior standard deviations (k,)."""
         o, g = self.rest, self.group
         s, S = (float(std[g[0]]) if len(g) else 0.0), std[o]
         D = 1.0 + s**2 * self.values
@@ -227,13 +233,13 @@ class _Turned:
         )  # fmt: skip
 
     def back(self, x: NDArray) -> NDArray:
-        """Transform unknowns (last axis) back to their original axes."""
+        """Transform rotated unknowns (last axis) back to the original unknowns."""
         turned = x.copy()
         turned[..., self.group] = x[..., self.group] @ self.V.T
         return turned
 
     def covariance(self, at: _Posterior) -> NDArray:
-        """Return the (k, k) posterior covariance."""
+        """Return the posterior covariance (k, k)."""
         o, g = self.rest, self.group
         inverse = solve_triangular(
             at.L, np.hstack([np.eye(len(o)), -at.E]), lower=True, check_finite=False

@@ -1,9 +1,8 @@
-"""Estimate the errors of functions outside the range of their variable.
+"""Estimate the extrapolation errors of functions.
 
-The range of a function's variable is divided into five parts, each of which is
-predicted by a fit to the other four.  The fit uses the prior standard deviations of the
-model and the leave-block-out identity (:mod:`.gaussian`), without iteration.  Random
-held-out rows do not test extrapolation, because they are surrounded by fitted rows.
+The range of a variable is divided into five parts.  Each part is predicted by a fit to
+the other four parts, with the prior standard deviations of the model.  Random held-out
+rows do not test extrapolation, because they are surrounded by fitted rows.
 """
 
 from dataclasses import dataclass
@@ -16,19 +15,18 @@ from forcefit.validation.diagnosis.candidates import Candidate
 from forcefit.validation.diagnosis.gaussian import leave_block_out
 from forcefit.validation.diagnosis.states import State
 
-PARTS = 5  # number of parts of a range, equal to the number of folds
-_DISTINCT = 4  # smallest number of different values in each part
+PARTS = 5  # number of parts of the range of a variable
+_DISTINCT = 4  # smallest number of distinct values in each part
 
 
 @dataclass(frozen=True)
 class RangeError:
-    """Errors of a function on unfitted parts of its variable's range.
+    """Extrapolation errors of models with and without a function.
 
     Attributes:
         variable: public name of the variable.
-        without: [sigma] rms of all readings, predicted by the model without the
-            function.
-        after: [sigma] rms of all readings, predicted by the model with the function.
+        without: [sigma] rms error of the model without the function.
+        after: [sigma] rms error of the model with the function.
     """
 
     variable: str
@@ -41,9 +39,15 @@ def range_error(
 ) -> RangeError | None:
     """Return the extrapolation error of a function in a model.
 
-    With several variables, the largest error is returned.  The result is None if no
-    variable has enough distinct values.  ``without`` is the model without the function.
-    ``rows`` (n,) are the rows of the fitted cells.
+    Args:
+        candidate: the function.
+        best: model with the function.
+        without: model without the function.
+        rows: (n,) rows of the fitted cells.
+
+    Returns:
+        The largest error over the variables of the function.  None if no variable has
+        enough distinct values.
     """
     conditions = best.readings.columns.conditions
     names = dict.fromkeys(v for part in candidate.parts for v in part.variables)

@@ -21,7 +21,7 @@ _FEWEST_POINTS = 3  # smallest number of points that determine a pose
 
 
 def device_frame(declared: Conditions) -> Hypothesis:
-    """Return the hypothesis of an unknown rotation and translation of the device."""
+    """Return the hypothesis that the pose of the measuring device is unknown."""
     unknowns = LIBRARY["registration"].unknowns(declared.robot)
     slots = (Slot((u.name,), u, u.start) for u in unknowns if u.name in BASE)
     return Hypothesis("registration", (), tuple(slots))
@@ -32,15 +32,14 @@ def register(campaign: Campaign, conditions: Conditions) -> Conditions:
 
     Args:
         campaign: rows from which the pose is estimated.
-        conditions: conditions to which the pose is added, of these rows or of more
-            rows.
+        conditions: conditions of these or other rows, to which the pose is added.
 
     Returns:
-        The conditions with the device pose (registration) of each session.
+        The conditions with the pose of the device in each session.
 
     Raises:
-        BadInput: there are too few complete positions and rotations, or a session
-            contains no usable row.
+        BadInput: there are too few complete readings, or a session contains no usable
+            row.
     """
     own = with_second_order(conditions_of(campaign))
     if campaign.session is None or conditions.session is None:
@@ -59,7 +58,7 @@ def register(campaign: Campaign, conditions: Conditions) -> Conditions:
 
 
 def _device(campaign: Campaign, own: Conditions) -> dict[str, dict[str, float]]:
-    """Return the best-fit pose of the device as an effect."""
+    """Return the fitted pose of the device as an effect."""
     start, frame = coarse_frame(campaign, own), device_frame(own)
     begin = np.array([start[name] for name in BASE])
     unknowns = Unknowns(campaign.robot, (Acting(frame, begin, None, True),))
@@ -68,7 +67,7 @@ def _device(campaign: Campaign, own: Conditions) -> dict[str, dict[str, float]]:
 
 
 def coarse_frame(campaign: Campaign, conditions: Conditions) -> dict[str, float]:
-    """Return a start value of the device pose (Kabsch or mean rotation)."""
+    """Return a start value for the pose of the device."""
     model = predict(conditions).deviation
     nominal = conditions.measured_points
     answered = np.isfinite(model).all(axis=1)
@@ -77,7 +76,7 @@ def coarse_frame(campaign: Campaign, conditions: Conditions) -> dict[str, float]
     seen = (nominal + campaign.measured[:, 3:])[full]
     thought = (nominal + model[:, 3:])[full]
     if not turned.any() and not off_one_line(thought):
-        known = campaign.registration == "known"  # then a command asked for the fit
+        known = campaign.registration == "known"  # a command option requested the fit
         found = "a fit of the registration" if known else "an unknown registration"
         instead = "--fit zeros" if known else 'registration = "known" in campaign.toml'
         raise BadInput(
@@ -96,22 +95,22 @@ def coarse_frame(campaign: Campaign, conditions: Conditions) -> dict[str, float]
 def device_rotation(
     points: NDArray, seen: NDArray, turns: NDArray, seen_turns: NDArray
 ) -> NDArray:
-    """Return the device rotation, fitted to orientations or else to points.
+    """Return the rotation of the device, fitted to orientations or to points.
 
     Args:
-        points: (P, 3) [m] points in base axes, not collinear if there are no
+        points: (P, 3) [m] points in base axes.  They are used if there are no
             orientations.
         seen: (P, 3) [m] the same points in the axes of the device.
-        turns: (T, 3, 3) orientations in the axes of the base.
+        turns: (T, 3, 3) orientations in base axes.
         seen_turns: (T, 3, 3) the same orientations in the axes of the device.
 
     Returns:
-        (3, 3) rotation from the base's axes to the device's axes.
+        (3, 3) rotation from base axes to device axes.
     """
     if len(turns):
         gap = seen_turns @ np.swapaxes(turns, 1, 2)
         return Rotation.from_matrix(gap).mean().as_matrix()
-    # Centring one of the two sets of points suffices.
+    # It is sufficient to centre one of the two sets of points.
     centred = points - points.mean(axis=0)
     return Rotation.align_vectors(seen, centred)[0].as_matrix()
 

@@ -1,9 +1,9 @@
-"""Linearise the effects of a model repeatedly at their estimates.
+"""Linearise the effects of a model at their estimates.
 
-Derivatives at the start values neglect products of two effects, nonlinear parameters (a
-time constant, an exponent) and finite motions.  The prediction with all effects of a
-model is therefore compared with the sum of their linear contributions, and if they
-differ, all derivatives are recomputed at the estimates.
+Derivatives at the start values neglect products of effects, nonlinear parameters such
+as time constants, and finite motions.  The nonlinear prediction is therefore compared
+with the sum of the linear contributions of all effects.  If they differ, all
+derivatives are recomputed at the estimates.
 """
 
 from collections.abc import Sequence
@@ -17,23 +17,28 @@ from forcefit.validation.diagnosis.hypotheses import in_one_session, sessions_of
 from forcefit.validation.diagnosis.signatures import Signature, Tangents
 from forcefit.validation.diagnosis.states import Models, State
 
-_ROUNDS = 3  # largest number of linearisations; they may oscillate
-MOVED = 0.3  # smaller changes of the log posterior affect no decision
-_LINEAR = 0.5  # largest squared whitened linearisation error
-# Largest factor on a nonlinear parameter per linearisation.
+_ROUNDS = 3  # maximum number of linearisations
+MOVED = 0.3  # smallest relevant change of the log posterior
+_LINEAR = 0.5  # largest accepted sum of squared whitened linearisation errors
+# Largest factor by which a nonlinear parameter changes in one linearisation.
 _SHIFT = 3.0
 
 
 class Relinearisation:
-    """Linearises models at their estimates, caching the results."""
+    """Linearises models at their estimates and caches the results."""
 
     def __init__(self, tangents: Tangents, models: Models) -> None:
-        """Start with an empty cache; ``tangents`` are the derivatives of all cells."""
+        """Create an empty cache.
+
+        Args:
+            tangents: derivatives of all cells.
+            models: models of the readings.
+        """
         self.tangents, self.models = tangents, models
         self._about: dict[object, list[Element] | None] = {}
 
     def relinearised(self, state: State) -> State:
-        """Relinearise a model until the linearisation is valid at its estimates."""
+        """Repeat linearisation and fit of a model until its estimates converge."""
         for _ in range(_ROUNDS):
             elements = self._again(state)
             if elements is None:
@@ -44,7 +49,7 @@ class Relinearisation:
         return state
 
     def _again(self, state: State) -> tuple[Element, ...] | None:
-        """Return the elements linearised at the estimates; None if nothing changes."""
+        """Return the elements linearised at the estimates, or None if unchanged."""
         own = [
             (k, e)
             for k, e in enumerate(state.elements)
@@ -73,7 +78,7 @@ class Relinearisation:
         return tuple(elements)
 
     def _misses(self, effects: list[Element], xs: list[NDArray]) -> float:
-        """Return the sum of squared whitened errors of the linearisation."""
+        """Return the sum of the squared whitened linearisation errors."""
         linear = np.zeros(len(self.models.readings.cells))
         for e, x in zip(effects, xs, strict=True):
             linear += e.columns @ ((x - e.begin)[e.slots] / e.scale)
@@ -85,10 +90,10 @@ class Relinearisation:
     def again(
         self, elements: Sequence[Element], xs: Sequence[NDArray]
     ) -> list[Element]:
-        """Return jointly acting effects, linearised at given values of their slots.
+        """Return elements that are linearised together at given values.
 
-        The sum of the returned elements is exact at these values.  If the model has no
-        solution there, the given elements are returned unchanged.
+        Their sum is exact at these values.  If the model has no solution at these
+        values, the given elements are returned.
         """
         robot = self.tangents.campaign.robot
         middle = self.combined(elements, xs)
@@ -99,7 +104,7 @@ class Relinearisation:
                 return list(elements)
             middle = middle - signature.columns @ x
             made.append(replace(signature, offset=np.zeros_like(middle)))
-        # The first element stores the offset of all elements together.
+        # The first element stores the sum of all offsets.
         made[0] = replace(made[0], offset=middle)
         return [
             replace(effect_element(s, robot, e.log_prior, x), first=e.origin)
@@ -109,7 +114,7 @@ class Relinearisation:
     def _one(
         self, elements: Sequence[Element], xs: Sequence[NDArray], k: int
     ) -> Signature:
-        """Return the k-th effect, linearised at given values while all others act."""
+        """Return the k-th effect, linearised in the presence of all other effects."""
         h, offset = elements[k].hypothesis, np.zeros_like(self.tangents.declared)
         columns = np.zeros((len(offset), len(h.slots)))
         for session in _sessions(elements):
@@ -123,7 +128,7 @@ class Relinearisation:
         return Signature(h, offset, columns)
 
     def combined(self, elements: Sequence[Element], xs: Sequence[NDArray]) -> NDArray:
-        """Return the whitened contribution (N,) of effects that act together."""
+        """Return the whitened contribution (N,) of all effects together."""
         total = np.zeros_like(self.tangents.declared)
         for session in _sessions(elements):
             effects = self._public(elements, xs, session)
@@ -134,7 +139,7 @@ class Relinearisation:
     def _public(
         self, elements: Sequence[Element], xs: Sequence[NDArray], session: str | None
     ) -> dict[str, dict[str, float]]:
-        """Return the parameters by public name for one session."""
+        """Return the parameters of one session by public name."""
         robot, values = self.tangents.derivatives.conditions.robot, {}
         for e, x in zip(elements, xs, strict=True):
             there, own = in_one_session(e.hypothesis, session)
@@ -143,18 +148,18 @@ class Relinearisation:
 
 
 def _sessions(elements: Sequence[Element]) -> tuple[str | None, ...]:
-    """Return the sessions in which the effects differ, or (None,)."""
+    """Return the sessions with separate parameters, or (None,) if there are none."""
     every = [name for e in elements for name in sessions_of(e.hypothesis)]
     return tuple(dict.fromkeys(name for name in every if name is not None)) or (None,)
 
 
 def _has_shapes(e: Element) -> bool:
-    """Return whether any unknown of an element is a nonlinear parameter."""
+    """Return whether all nonlinear parameters of an effect are among the unknowns."""
     return all(j in e.slots for j, slot in enumerate(e.hypothesis.slots) if slot.shape)
 
 
 def _within(e: Element, x: NDArray) -> NDArray:
-    """Limit the change of nonlinear parameters to the allowed factor."""
+    """Limit the change of nonlinear parameters."""
     for j, slot in enumerate(e.hypothesis.slots):
         if slot.shape:
             x[j] = np.clip(x[j], e.begin[j] / _SHIFT, e.begin[j] * _SHIFT)

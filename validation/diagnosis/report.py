@@ -1,4 +1,4 @@
-"""Create the self-contained report page of a diagnosis."""
+"""Create the report page of a diagnosis."""
 
 from pathlib import Path
 from typing import Any
@@ -28,7 +28,7 @@ _ASSUMED = (
     "Effects missing from the library appear as learned functions or as outside the "
     "library; effects that the design cannot distinguish are named together.",
 )
-# Unfavourable verdicts; None if additional rows could decide.
+# Verdicts without a confirmed result.  None if additional rows could give a result.
 _GOOD = {AMBIGUOUS: None, NOT_ENOUGH_ROWS: None, OUTSIDE_LIBRARY: False}
 NOWHERE = Provenance()
 Table = dict[str, Any]
@@ -40,12 +40,12 @@ def write_report(
     tally: Calibration | None = None,
     provenance: Provenance = NOWHERE,
 ) -> None:
-    """Write the report page of a diagnosis; on failure, no incomplete file remains.
+    """Write the report page of a diagnosis.
 
     Args:
         diagnosis: the diagnosis.
         path: path of the page.
-        tally: error rates from simulated campaigns, or None.
+        tally: error rates from simulated campaigns, None to omit them.
         provenance: the command and its input files.
 
     Raises:
@@ -59,7 +59,10 @@ def report_page(
     tally: Calibration | None = None,
     provenance: Provenance = NOWHERE,
 ) -> str:
-    """Return the page as HTML including its charts; see :func:`write_report`."""
+    """Return the report page as self-contained HTML.
+
+    The arguments are those of :func:`write_report`.
+    """
     campaign, answer = diagnosis.campaign, results.table(diagnosis, tally)
     body = [
         section("Errors before and after", figures.error_chart(diagnosis)),
@@ -109,7 +112,7 @@ def report_page(
 
 
 def _section(title: str, content: str) -> list[str]:
-    """Return a section, or an empty text if it has no content."""
+    """Return a section, or no section if the content is empty."""
     return [section(title, content)] if content else []
 
 
@@ -144,7 +147,7 @@ def _steps(answer: Table) -> str:
 
 
 def _sets(answer: Table) -> str:
-    """Tabulate the sets of effects with their probabilities."""
+    """Tabulate the alternative sets of effects with their probabilities."""
     rows: list[list[Cell]] = [
         [" + ".join(one["names"]) or "none", one["probability"]]
         for one in answer["alternatives"]
@@ -164,7 +167,7 @@ def _learned(answer: Table) -> str:
 
 
 def _parameters(answer: Table) -> tuple[str, str]:
-    """Tabulate the parameters of the most probable set, with a title."""
+    """Return the title and the table of the effect parameters."""
     rows: list[list[Cell]] = [
         [f"{effect['name']}: {p['name']}", Value(p["value"], p["unit"], 6),
          Value(p["std"], p["unit"], 2),
@@ -196,7 +199,7 @@ def _structure(answer: Table) -> list[str]:
 
 
 def _next(answer: Table) -> list[str]:
-    """Return the section on the next measurement."""
+    """Return the section about the next measurement."""
     following = answer["next_measurement"]
     if following is None:
         return []
@@ -208,7 +211,7 @@ def _next(answer: Table) -> list[str]:
 
 
 def _noise(diagnosis: Diagnosis) -> list[str]:
-    """State the noise and the outliers."""
+    """Describe the noise and the outliers in sentences."""
     lack = diagnosis.lack
     far = np.array(diagnosis.campaign.ids)[diagnosis.outliers]
     repeats = "the campaign contains no repeats"

@@ -1,15 +1,15 @@
 """Compute joint wrenches and the response of the readings to small screws.
 
-Both are computed with the linear model at the declared state, for all rows together.  A
-small geometric error changes the readings by the response times its screw.  A spring
-changes them by the response times its compliance times its wrench.
+Both are computed with the linear model in the declared state.  A geometric error
+changes the readings by J times its screw.  A spring changes the readings by J times its
+compliance times its wrench w.
 
 ======  =============  ============  =================================================
 symbol  code           shape         meaning
 ======  =============  ============  =================================================
 D       ``reading``    (R, 6, 6)     change of the reading per unit platform screw
 J       ``screws``     (R, 6, n, 6)  change of the reading per unit screw at a frame
-w       ``wrenches``   (R, n, 6)     [N m, N] through every joint, in its axes
+w       ``wrenches``   (R, n, 6)     wrench at every joint [N m, N], joint axes
 ======  =============  ============  =================================================
 """
 
@@ -30,15 +30,21 @@ from forcefit.assembly.measurement.settled_clearance import (
 )
 from forcefit.assembly.measurement.without_clearance import flexibility
 
-_STEP = 1e-5  # [rad, m] step of a central difference with error 1e-10
-# Wrenches below this fraction of the largest moment or force are round-off.
+_STEP = 1e-5  # [rad, m] step of central differences
+# Smallest component of a wrench above round-off, relative to the largest component.
 _ROUNDING = 1e-9
-_AT_ONCE = 50  # number of postures computed together, which limits memory
+_AT_ONCE = 50  # number of postures that are computed together, to limit memory
 
 
 @dataclass(frozen=True, eq=False)
 class Responses:
-    """Responses of R readings of a robot with n frames; see the module for symbols."""
+    """Responses of R rows of readings of a robot with n frames.
+
+    Attributes:
+        reading: (R, 6, 6) change of the readings per unit platform screw.
+        screws: (R, 6, n, 6) change of the readings per unit screw at a frame.
+        wrenches: (R, n, 6) [N m, N] wrench at every joint, joint axes.
+    """
 
     reading: NDArray
     screws: NDArray
@@ -46,9 +52,10 @@ class Responses:
 
 
 def responses(conditions: Conditions) -> Responses:
-    """Return the responses of R rows to small screws, with clearances in rest position.
+    """Return the responses of R rows to small screws at frames.
 
-    The responses are zero in rows without a solution.
+    Joints are at rest positions within their clearances.  The responses are zero in
+    rows without a solution.
     """
     tight = _without_clearance(conditions)
     distinct, which = tight.postures.distinct
@@ -69,14 +76,13 @@ def responses(conditions: Conditions) -> Responses:
     screws = np.einsum("rij,rjk->rik", D, platform[which])
     good = np.isfinite(screws).all(axis=(1, 2)) & np.isfinite(wrenches).all(axis=1)
     screws[~good], wrenches[~good] = 0.0, 0.0
-    # Struts between ball joints transmit no moment; small computed moments are
-    # round-off errors.
+    # Remove round-off errors, such as small moments in struts between ball joints.
     wrenches[np.abs(wrenches) < _ROUNDING * np.abs(wrenches).max(initial=0.0)] = 0.0
     return Responses(D, screws.reshape(R, 6, n, 6), wrenches.reshape(R, n, 6))
 
 
 def _without_clearance(conditions: Conditions) -> Conditions:
-    """Return the rows with clearances in rest position."""
+    """Fix the joints at rest positions within their clearances."""
     if not virtual_joints(conditions.robot).cones.shape[1]:
         return conditions
     if conditions.rest is not None:

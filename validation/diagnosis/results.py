@@ -1,4 +1,4 @@
-"""Convert a diagnosis to plain values in the public format."""
+"""Convert a diagnosis to plain values for JSON."""
 
 import math
 from dataclasses import asdict
@@ -19,15 +19,19 @@ from forcefit.validation.diagnosis.sequence import LEARNED
 
 # Verdicts for which effects are listed.
 LISTED = {statuses.EXPLAINED, statuses.AMBIGUOUS, statuses.LEARNED}
-_HARDLY = 0.05  # frames with fewer determined combinations are not listed
-# Half width [standard deviations] of the interval that contains 90 % of a normal
-# distribution.
+_HARDLY = 0.05  # smallest number of determined unknowns of a listed frame
+# Half width of the 90 % interval of a normal distribution, in standard deviations.
 _INTERVAL = 1.645
 _UNITS = {GEOMETRY: ("rad", "m"), SPRINGS: ("rad/(N m)", "m/N")}
 
 
 def table(diagnosis: Diagnosis, tally: Calibration | None = None) -> dict[str, Any]:
-    """Return a diagnosis in the public format, with simulated error rates if any."""
+    """Return a diagnosis as plain values for JSON.
+
+    Args:
+        diagnosis: the diagnosis.
+        tally: error rates from simulated campaigns, None to omit them.
+    """
     listed = diagnosis.verdict in LISTED
     ids = np.array(diagnosis.campaign.ids)
     noise, held = diagnosis.traced.selected.noise, diagnosis.held
@@ -92,12 +96,15 @@ def table(diagnosis: Diagnosis, tally: Calibration | None = None) -> dict[str, A
 
 
 def _plain(one: Any) -> dict[str, Any] | None:
-    """Convert a dataclass to plain values; None stays None."""
+    """Convert a dataclass to plain values.  None remains None."""
     return None if one is None else asdict(one)
 
 
 def steps(diagnosis: Diagnosis) -> list[dict[str, Any]]:
-    """Return the model sequence, with rms in m, or in rad without positions."""
+    """Return the models of the sequence with their errors.
+
+    Errors are in m.  If no position was measured, they are in rad.
+    """
     rows = []
     for step in diagnosis.sequence:
         error = step.error
@@ -114,16 +121,15 @@ def steps(diagnosis: Diagnosis) -> list[dict[str, Any]]:
 
 
 def small(diagnosis: Diagnosis, name: str) -> dict[str, Any] | None:
-    """Return the geometric errors or springs of all frames in the public format.
+    """Return the geometric errors or springs of all frames as plain values.
 
     Args:
         diagnosis: a diagnosis.
         name: ``"geometry"`` or ``"springs"``.
 
     Returns:
-        Prior standard deviations, the number of combinations that the readings
-        determine, and the determined fraction of every unknown.  None if the machine is
-        as declared.
+        Values, standard deviations and determined fractions of all unknowns, with their
+        prior standard deviations.  None if the fit contains none of these unknowns.
     """
     fit = diagnosis.fit
     part = next((part for part in fit.unknowns.small if part.name == name), None)
@@ -159,11 +165,10 @@ def small(diagnosis: Diagnosis, name: str) -> dict[str, Any] | None:
 
 
 def effects(diagnosis: Diagnosis) -> list[dict[str, Any]]:
-    """Return the identified effects with their parameters, in the public format.
+    """Return the identified effects and their parameters as plain values.
 
-    Returns:
-        The effects.  An effect that the robot file declares is listed with its saved
-        value, declared value and difference.
+    A parameter that the robot file contains is listed with its declared value and the
+    difference from this value.
     """
     bare, shown = diagnosis.campaign.robot.without_effects(), []
     for one in diagnosis.fit.effects:
@@ -173,7 +178,7 @@ def effects(diagnosis: Diagnosis) -> list[dict[str, Any]]:
         shown.append({
             "name": name,
             **({} if one.session is None else {"session": one.session}),
-            # Frames without an identified compliance or clearance are not listed.
+            # Frames without an identified parameter are not listed.
             "where": [frame for frame in one.hypothesis.where if frame in acting],
             "probability": diagnosis.probability.get(name, 0.0),
             "parameters": [
@@ -184,7 +189,7 @@ def effects(diagnosis: Diagnosis) -> list[dict[str, Any]]:
 
 
 def _parameter(p: Parameter, unit: str) -> dict[str, Any]:
-    """Return a machine parameter, with its declared value if there is one."""
+    """Convert a parameter to plain values."""
     found = {"declared": p.declared, "difference": p.difference, "corrected": p.value}
     return {
         "name": p.name, "value": p.value, "std": p.std,
@@ -195,7 +200,7 @@ def _parameter(p: Parameter, unit: str) -> dict[str, Any]:
 
 
 def _unnamed(diagnosis: Diagnosis) -> list[dict[str, Any]]:
-    """Return geometric errors and springs if no library effect is claimed."""
+    """Return geometric errors and springs if no effect or function was identified."""
     if diagnosis.effects or diagnosis.fit.unknowns.functions:
         return []
     found = [(words, small(diagnosis, name)) for name, words in WORDS.items()]
@@ -209,10 +214,9 @@ def _unnamed(diagnosis: Diagnosis) -> list[dict[str, Any]]:
 
 
 def learned(diagnosis: Diagnosis) -> list[dict[str, Any]]:
-    """Return the learned functions in the public format.
+    """Return the learned functions as plain values.
 
-    Functions that do not reduce the error of the held-out rows are not reported,
-    because outliers and other noise in the fitted rows can also lead to functions.
+    Functions are listed only if they reduce the error of the held-out rows.
     """
     if not diagnosis.better:
         return []
@@ -221,7 +225,7 @@ def learned(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     places = places or [len(sequence) - 1]
     shown = []
     for k, functions in enumerate(functions_of(diagnosis)):
-        # The fits of some folds may contain fewer functions.
+        # The model sequence of a fold may contain fewer functions.
         at = places[min(k, len(places) - 1)]
         found = diagnosis.traced.selected.functions[k]
         same = [

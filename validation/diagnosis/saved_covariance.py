@@ -1,11 +1,9 @@
-"""Store the parameter covariance of a robot file in a separate file.
+"""Store the covariance of the parameters of a robot file in a separate file.
 
-Parameters are geometric errors, compliances in series with joints, effect parameters
-and function coefficients.  From their joint posterior covariance C follows the
-uncertainty of predicted readings:
-
-    covariance of the readings = J C J', where J contains their derivatives by the
-    parameters.
+Parameters are geometric errors, joint compliances, effect parameters and function
+coefficients.  Their posterior covariance C determines the uncertainty of predicted
+readings.  The covariance of the readings is J C J', where J contains their derivatives
+with respect to the parameters.
 """
 
 import io
@@ -35,7 +33,7 @@ from forcefit.validation.diagnosis.unknowns import (
 ERROR, COMPLIANCE, EFFECT, FUNCTION = (
     "geometric_error", "joint_compliance", "effect", "function",
 )  # fmt: skip
-# Smallest compliance after a correction, relative to the declared compliance.
+# Smallest compliance of a joint, relative to the declared compliance.
 _STAYS = 1e-3
 
 
@@ -44,10 +42,11 @@ class Number:
     """Identifier of a parameter in a robot file.
 
     Attributes:
-        kind: one of the four kinds in the module's docstring.
-        owner: the frame, the effect, or the index of the function in the file.
+        kind: ``"geometric_error"``, ``"joint_compliance"``, ``"effect"`` or
+            ``"function"``.
+        owner: name of the frame or effect, or index of the function.
         name: name of the screw component or of the parameter.
-        session: session of an effect that acts in a single session, otherwise None.
+        session: session in which the effect acts, ``""`` for all sessions.
     """
 
     kind: str
@@ -56,7 +55,10 @@ class Number:
     session: str = ""
 
     def of(self, robot: Robot) -> float:
-        """Return the parameter's value in a robot; 0 for a compliance in series."""
+        """Return the value of the parameter in a robot.
+
+        Joint compliances are relative to this robot and therefore 0.
+        """
         if self.kind == ERROR:
             return float(
                 robot.errors[robot.index(self.owner), READING.index(self.name)]
@@ -69,7 +71,7 @@ class Number:
         return 0.0
 
     def moved(self, robot: Robot, by: float) -> Robot:
-        """Return the robot with the parameter increased; compliances stay positive."""
+        """Return the robot with an increased parameter."""
         if self.kind == ERROR:
             row, axis = robot.index(self.owner), READING.index(self.name)
             return with_error(robot, *map(np.atleast_1d, (row, axis, by)))
@@ -88,7 +90,7 @@ class Number:
         )
 
     def _softened(self, robot: Robot, by: float) -> Robot:
-        """Change the compliance of a joint component."""
+        """Return the robot with an increased joint compliance."""
         row, axis = robot.index(self.owner), READING.index(self.name)
         K = robot.frames[row].resistance
         stiffness = np.inf if K is None else float(K[axis, axis])
@@ -115,7 +117,7 @@ class SavedCovariance:
 
     @property
     def std(self) -> NDArray:
-        """(k,) standard deviations of the parameters."""
+        """Standard deviations (k,) of the parameters."""
         return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
 
 
@@ -141,11 +143,10 @@ def covariance_of(fit: MachineFit, robot: Robot) -> SavedCovariance:
 
 
 def _value(number: Number, robot: Robot, saved: Robot) -> float:
-    """Return the value of a parameter in a robot near the saved one, or 0 if absent."""
+    """Return the value of a parameter in a changed robot, or 0 if it is absent."""
     if number.kind != FUNCTION:
         return number.of(robot)
-    # The nearby robot may have an additional function, with zero coefficients in the
-    # saved robot.
+    # The changed robot may lack a function.  Its functions can also have other indices.
     own = saved.functions[int(number.owner)]
     alike = [f for f in saved.functions if _names(f) == _names(own)]
     there = [f for f in robot.functions if _names(f) == _names(own)]
@@ -156,12 +157,12 @@ def _value(number: Number, robot: Robot, saved: Robot) -> float:
 
 
 def _names(function: Function) -> tuple[object, ...]:
-    """Return the properties that distinguish the functions of a file."""
+    """Return the properties that identify a function in a robot file."""
     return function.where, function.variables, function.form, function.kind
 
 
 def _numbers(fit: MachineFit, robot: Robot) -> list[Number]:
-    """Return those parameters of a saved robot that depend on the unknowns."""
+    """Return the parameters of a saved robot that depend on the fitted unknowns."""
     numbers = [n for part in fit.unknowns.small for n in _of_frames(part, robot)]
     for one in fit.unknowns.effects:
         effect = one.hypothesis.effect
@@ -176,7 +177,7 @@ def _numbers(fit: MachineFit, robot: Robot) -> list[Number]:
 
 
 def _of_frames(part: Small, robot: Robot) -> list[Number]:
-    """Return the names of geometric errors or compliances in the order of unknowns."""
+    """Return the identifiers of geometric errors or joint compliances."""
     kind = ERROR if part.name == GEOMETRY else COMPLIANCE
     return [
         Number(kind, robot.frames[row].name, READING[axis])
@@ -199,10 +200,10 @@ def write_covariance(saved: SavedCovariance, path: Path | str) -> None:
 
 
 def read_covariance(robot: Robot) -> SavedCovariance | None:
-    """Read the covariance file that a robot file names.
+    """Read the covariance file of a robot.
 
     Returns:
-        The covariance, or None if the robot file names no file.
+        The covariance, or None if the robot has no covariance file.
 
     Raises:
         BadInput: the file does not exist, or belongs to a different robot.
@@ -233,8 +234,8 @@ def known_covariance(robot: Robot) -> SavedCovariance:
     """Return the covariance of all parameters in a robot file.
 
     Returns:
-        The covariance from the file that the robot file names.  Parameters missing
-        there are independent, with standard deviations ``tolerance`` of frames and
+        The covariance from the covariance file of the robot.  Further parameters are
+        treated as independent, with the standard deviations ``tolerance`` of frames and
         ``std`` of functions.
 
     Raises:

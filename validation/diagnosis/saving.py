@@ -1,8 +1,8 @@
-"""Save the robot of a diagnosis with its uncertainty and range of validity.
+"""Save the robot that a diagnosis identified, with its uncertainty.
 
-The posterior covariance of all parameters is written to a separate file.  In the robot
-file, ``tolerance`` is the standard deviation of geometric errors, and ``std`` that of
-function coefficients.
+The posterior covariance of all parameters is written to a separate file.  The robot
+file also contains standard deviations, ``tolerance`` for geometric errors and ``std``
+for function coefficients.
 """
 
 import hashlib
@@ -31,12 +31,7 @@ if TYPE_CHECKING:
 
 
 def corrected(diagnosis: "Diagnosis") -> Robot:
-    """Return the robot to be saved.
-
-    Returns:
-        The fitted robot, together with the range of its data, the measured point, the
-        uncertainty of its geometric errors, and a record of the diagnosis.
-    """
+    """Return the fitted robot with its uncertainty and a record of the diagnosis."""
     campaign, robot = diagnosis.campaign, _with_tolerances(diagnosis.fit)
     ranges = learned_range(campaign, ~diagnosis.outliers)
     x, y, z = campaign.reference_point.tolist()
@@ -54,7 +49,8 @@ def functions_of(diagnosis: "Diagnosis") -> list[list[Function]]:
     """Return the learned functions with coefficients and standard deviations.
 
     Returns:
-        One or several robot-file functions for every learned function.
+        A list for each learned function, because one learned function may require
+        several functions in a robot file.
     """
     fit, units = diagnosis.fit, diagnosis.campaign.motion_units
     learned = []
@@ -69,7 +65,7 @@ def functions_of(diagnosis: "Diagnosis") -> list[list[Function]]:
 
 
 def _named(one: Function, units: Mapping[str, str]) -> Function:
-    """Label a function by which a frame moves in proportion to a variable."""
+    """Label a function that describes a measured motion of a frame."""
     name = one.variables[0].removeprefix("cov.")
     kinds = {"rad" if component[0] == "r" else "m" for component in one.components}
     straight = one.form == "powers" and one.kind == "screw" and one.where != "load"
@@ -90,8 +86,8 @@ def _with_tolerances(fit: MachineFit) -> Robot:
     for part, own in fit.unknowns.places:
         if not isinstance(part, Small) or part.name != GEOMETRY:
             continue
-        # A component on which no reading depends gets the prior standard deviation of
-        # the other components of its kind.
+        # If no reading depends on a component, its standard deviation is that of the
+        # prior.
         unseen = np.repeat(
             [part.std[part.axis // 3 == kind].max(initial=0.0) for kind in (0, 1)], 3
         )
@@ -127,7 +123,7 @@ def _record(diagnosis: "Diagnosis") -> dict[str, Any]:
 
 
 def _digest(campaign: Campaign) -> str:
-    """Return a digest that identifies a campaign by its commands and readings."""
+    """Return a digest of the commands and readings of a campaign."""
     text = hashlib.sha256()
     for values in (campaign.coordinates, campaign.loads, campaign.measured):
         text.update(np.round(values, 12).tobytes())

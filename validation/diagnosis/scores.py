@@ -17,27 +17,27 @@ from forcefit.validation.diagnosis.states import MORE, State
 from forcefit.validation.diagnosis.weighted_readings import WeightedReadings
 from forcefit.validation.diagnosis.whitening import Whitening
 
-BEAM = 6  # largest number of candidate elements added to a model on trial
-OF_NAME = 2  # largest number of these candidates with the same name
-_VARIABLES = 4  # number of variables whose products with others are scored
-# Largest number of columns of a function at several places; limits memory.
+BEAM = 6  # number of candidate elements that are tried for a model
+OF_NAME = 2  # largest number of these candidates that have the same name
+_VARIABLES = 4  # number of variables whose products with other variables are scored
+# Largest number of columns of a function at several locations, to limit memory.
 _WIDEST = 600
-# Number of halvings of a shape parameter's step before the final fit refines it.
+# Number of halvings of the step of a shape parameter.
 _HALVINGS = 6
 
 
 class Scores:
-    """Scores of all candidates for models of the same readings."""
+    """Scores of all candidates for models of given readings."""
 
     def __init__(self, readings: WeightedReadings) -> None:
-        """Store the readings; scores are computed when first used."""
+        """Store the readings.  Scores are computed when they are first used."""
         self.readings, self.columns = readings, readings.columns
         self.functions = readings.columns.functions
         self._made: dict[object, Element | None] = {}
 
     @cached_property
     def _whiten_sample(self) -> tuple[NDArray, Whitening]:
-        """(N,) mask of the sampled cells, and their whitening map."""
+        """Mask (N,) of the sampled cells, and their whitening transformation."""
         cells, some = self.readings.cells.copy(), self.readings.sampled
         cells[cells] = some
         root, common = self.readings.root[some], self.readings.common
@@ -45,22 +45,22 @@ class Scores:
 
     @cached_property
     def weighted(self) -> Weighted:
-        """Responses at all places in the sampled cells."""
+        """Responses at all locations in the sampled cells."""
         return self.functions.places.weighted(*self._whiten_sample)
 
     @cached_property
     def _library(self) -> Dense:
-        """Effects of the library, prepared for scoring."""
+        """Library effects, prepared for scoring."""
         return self._dense(self.columns.library)
 
     @cached_property
     def _explicit(self) -> Dense:
-        """Functions at several places in the sampled cells, prepared for scoring."""
+        """Functions at several locations in the sampled cells, prepared for scoring."""
         own = self.readings.cells[self.columns.sampled]
         return Dense(self.columns.explicit, own, self._whiten_sample[1])
 
     def _dense(self, elements: list[Element]) -> Dense:
-        """Return elements prepared for scoring in the fitted cells."""
+        """Prepare elements for scoring in the fitted cells."""
         return Dense(elements, self.readings.cells, self.readings.whiten)
 
     def _gain(self, e: Element, base: State) -> float:
@@ -70,7 +70,7 @@ class Scores:
     def best_to_add(
         self, state: State, *, functions: bool, products: bool = False
     ) -> list[tuple[float, Element]]:
-        """Return the best elements to add to a model and estimated log posteriors."""
+        """Return the best elements to add to a model, with estimated log posteriors."""
         listed = [*self._library.elements, *self._explicit.elements]
         some = self._explicit.gains(state.sample_marginal)
         gains = [self._library.gains(state.marginal), self._more * some]
@@ -101,7 +101,7 @@ class Scores:
         return [(begin + w, e) for w, e in best[: BEAM + 2]]
 
     def _products(self, found: Sequence[ScoredFunction]) -> list[Request]:
-        """Return requests for products of the variables of the best functions."""
+        """Return products to score, formed from the variables of the best functions."""
         names = list(dict.fromkeys(f.candidate.parts[0].variable for f in found))
         names = names[:_VARIABLES]
         if "approach" in self.functions.variables:
@@ -111,7 +111,7 @@ class Scores:
     def look(
         self, state: State, requests: Sequence[Request], most: int = 3
     ) -> list[ScoredFunction]:
-        """Return the best functions to add to a model, scored over all rows."""
+        """Return the best functions to add to a model."""
         found = self.functions.look(
             state.sample_marginal, self.weighted, requests, most
         )
@@ -123,17 +123,17 @@ class Scores:
 
     @property
     def _more(self) -> float:
-        """Ratio of the number of readings to the number of sampled readings."""
+        """Number of readings divided by the number of sampled readings."""
         return len(self.readings.sampled) / max(int(self.readings.sampled.sum()), 1)
 
     def _element(self, one: Candidate, log_prior: float) -> Element | None:
-        """Return the element of a function with columns of all cells (cached)."""
+        """Return the element of a function for all cells."""
         if one not in self._made:
             self._made[one] = self.functions.element(one, log_prior)
         return self._made[one]
 
     def forms_of(self, last: Element, base: State) -> list[Element | None]:
-        """Return the highest-scoring forms of a function's variables."""
+        """Return functions with other forms at the same location, best first."""
         one = last.candidate
         variables = one.parts[0].variables
         priors = self.functions.shapes_of(variables)
@@ -158,7 +158,7 @@ class Scores:
         return [e for _, e in best]
 
     def sharper(self, e: Element, base: State) -> Element:
-        """Refine the search for the best shape parameter of a function."""
+        """Optimise the shape parameter of a function."""
         one = e.candidate
         if not len(one.shape.bends):
             return e

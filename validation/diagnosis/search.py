@@ -1,12 +1,12 @@
-"""Find the best model by a beam search with exchange of elements.
+"""Find the best model by a beam search and by exchanging elements.
 
 Steps:
 
-1. Score adding every library effect and function to each model of the beam.
+1. Score the addition of every library effect and function to each model of the beam.
 2. Add the best candidates, and optimise the prior standard deviations.
-3. Try all forms of an added function; relinearise effects at their estimates.
+3. Try all forms of an added function, and linearise effects at their estimates.
 4. Repeat until no added element increases the log posterior.
-5. Exchange elements of the best model for others until the model is stable.
+5. Exchange elements of the best model until the model no longer improves.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -21,20 +21,18 @@ Update = Callable[[str, int, int], None]
 # Elements to fit, and the model whose estimates are start values.
 Tried = tuple[tuple[Element, ...], State]
 _MOST = 5  # largest number of elements in a model (docs/diagnosis.md)
-_KEPT = 3  # width of the beam, the number of retained models
-_LOOKED = 2  # number of models to which functions are added
-_FORMS = 4  # number of models whose last function is tried in all forms
-# Largest accepted decrease of the log posterior when an element is added, because two
-# elements may be effective only together.
+_KEPT = 3  # width of the beam
+_LOOKED = 2  # number of models for which functions are scored
+_FORMS = 4  # number of models for which all forms of the last function are tried
+# Largest accepted decrease of the log posterior when an element is added.
 _DROP = 1.0
-# Largest number of rounds of exchanges, which may not converge if no model describes
-# the memory of the machine.
+# Maximum number of rounds of exchanges.
 _ROUNDS = 3
-_NEAR = 15.0  # largest error of a log posterior computed with fixed standard deviations
+_NEAR = 15.0  # largest error of an estimated log posterior
 
 
 class Search:
-    """Beam search over models of one set of weighted readings."""
+    """Beam search over models of given readings."""
 
     def __init__(self, readings: WeightedReadings) -> None:
         """Fit the models without effects and functions."""
@@ -46,7 +44,7 @@ class Search:
         self.seen: dict[object, State] = {}
 
     def run(self, update: Update) -> list[State]:
-        """Run the search; return all visited models, best first."""
+        """Run the search and return all visited models, best first."""
         self._keep(self.empty)
         front = [self.begin]
         for level in range(_MOST):
@@ -66,13 +64,13 @@ class Search:
         return sorted(self.seen.values(), key=lambda s: -s.score)
 
     def _keep(self, states: Iterable[State]) -> None:
-        """Store the models in which no effect is at its bounds."""
+        """Store the models in which no effect is at a bound."""
         for state in states:
             if state.supported:
                 self.seen[frozenset(origins(state.elements)), state.mode] = state
 
     def _grow(self, sources: Sequence[State], *, products: bool) -> list[State]:
-        """Return the best models with one element added, best first."""
+        """Add one element to models and return the best results, best first."""
         tried: dict[object, tuple[float, tuple[Element, ...], State]] = {}
         for state in self._without_nuisance(sources):
             looked, first = state in sources[:_LOOKED], state is sources[0]
@@ -100,7 +98,7 @@ class Search:
         return kept
 
     def _without_nuisance(self, states: Sequence[State]) -> list[State]:
-        """Return the models together with variants that have fewer nuisance groups."""
+        """Return the models and their variants with fewer nuisance parameters."""
         less = [
             self.models.state(s.elements, mode, s)
             for s in states
@@ -110,7 +108,7 @@ class Search:
         return [*states, *less]
 
     def _reformed(self, state: State) -> list[State]:
-        """Return variants of a model with other forms of its last function."""
+        """Return the model with other forms of its last function."""
         last = state.elements[-1]
         if last.name:
             return []
@@ -124,14 +122,14 @@ class Search:
         return [s for s in new if s.elements != state.elements]
 
     def _with_one_removed(self, state: State) -> list[State]:
-        """Return the variants of a model with one element removed."""
+        """Return variants of the model with one element removed."""
         if len(state.elements) < 2:
             return []
         own = origins(state.elements)
         return [self._fitted(_without(own, out), state) for out in own]
 
     def _fitted(self, elements: tuple[Element, ...], start: State) -> State:
-        """Fit a model with its best nuisance groups, linearised at its estimates."""
+        """Fit a model with its best nuisance parameters, and relinearise it."""
         return self.relinearisation.relinearised(self.models.best(elements, start))
 
     def _best(self) -> State:
@@ -139,7 +137,7 @@ class Search:
         return max(self.seen.values(), key=lambda s: s.score)
 
     def _exchange(self, best: State) -> None:
-        """Improve a model by removing each element or exchanging it for another."""
+        """Try to improve a model by removing or exchanging each of its elements."""
         own = origins(best.elements)
         self._keep(self._with_one_removed(best))
         curved = any(e.first for e in best.elements)
@@ -151,8 +149,7 @@ class Search:
             for less in self._without_nuisance([base])[1:]:
                 listed += self.scores.best_to_add(less, functions=False)
             listed.sort(key=lambda one: -one[0])
-            # Other forms of the same effect are always tried, because their estimates
-            # have similar errors.
+            # Other variants of the same effect are always tried.
             near = {
                 e.origin: e
                 for w, e in listed
@@ -165,7 +162,7 @@ class Search:
             self._keep(self._refined((elements, base) for elements in tried))
 
     def _refined(self, tried: Iterable[Tried]) -> list[State]:
-        """Fit models; optimise nuisance groups of the best three and relinearise."""
+        """Fit models, and relinearise the best three."""
         new = [self.models.state(elements, s.mode, s) for elements, s in tried]
         new.sort(key=lambda s: -s.score)
         best = [self._fitted(s.elements, s) for s in new[:_KEPT]]
@@ -173,7 +170,7 @@ class Search:
 
 
 def origins(elements: Iterable[Element]) -> tuple[Element, ...]:
-    """Return the elements, linearised at their start values."""
+    """Return the elements linearised at their start values."""
     return tuple(e.origin for e in elements)
 
 

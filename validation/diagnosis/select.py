@@ -1,9 +1,9 @@
-"""Select a model of the deviations, composed of library effects and functions.
+"""Select the library effects and functions that explain the deviations.
 
 A model is a set of elements, with or without geometric errors and springs
-(:mod:`.states`).  The search (:mod:`.search`) computes the posterior weight of many
-models.  The result describes the best one.  The probability of an effect is the summed
-weight of all models that contain it.
+(:mod:`.states`). The search (:mod:`.search`) computes the posterior weights of many
+models, and the best model is selected.  The probability of an effect is the sum of the
+weights of all models that contain the effect.
 """
 
 from collections.abc import Sequence
@@ -34,22 +34,18 @@ from forcefit.validation.diagnosis.states import State, prediction_gain
 from forcefit.validation.diagnosis.unknowns import Small
 from forcefit.validation.diagnosis.weighted_readings import NONE, WeightedReadings
 
-# Two models are equally good if their log posteriors differ by less than this value
-# (odds of 20).
+# Smallest relevant difference between two log posteriors, which is odds of 20.
 _EQUAL = 3.0
-# The best model must contain functions if the probability of functions exceeds this
-# value.
+# Probability of functions above which the selected model must contain one.
 _CLAIMED = 0.9
-# Predictions are equal if their squared whitened difference is below this value.
+# Squared whitened difference below which two predictions are treated as equal.
 _SAME = 1.0
-_LISTED = 20  # number of listed models; others have negligible weight
+_LISTED = 20  # largest number of listed models
 _COMPARED = 60  # number of models whose predictions are compared
 _FEWEST = 5  # smallest number of blocks for cross-validation of functions
-# Number of searches with updated shared noise, which hardly changes after the first
-# search.
+# Maximum number of searches with updated common noise.
 _AGAIN = 3
-# Required predictive gain of a function, in standard errors.  In tests, false functions
-# reached 1.8 and true functions at least 6.9.
+# Required predictive gain of a function, in standard errors.
 _SURE = 2.0
 
 
@@ -58,16 +54,16 @@ def select(
     update: Update = lambda what, done, total: None,
     common: tuple[float, float] | None = None,
 ) -> Selected:  # fmt: skip
-    """Select the effects and functions that are missing in the declared model.
+    """Select the effects and functions that the declared model lacks.
 
     Args:
         columns: columns of all N measured cells.
         z: (n,) whitened residual of the fitted cells.
-        cells: (N,) mask of the fitted cells; readings of other cells are not used.
-        update: function called with the stage, the finished steps and the number of
-            steps.
-        common: [rad, m] standard deviations of the common noise of a measurement's
-            cells, divided by tau; None if unknown.
+        cells: (N,) mask of the fitted cells.
+        update: function called with the stage, the number of finished steps and the
+            number of all steps.
+        common: [rad, m] standard deviations of the noise that is common to the cells of
+            a measurement, divided by tau.  None if they are unknown.
 
     Returns:
         The best model and the posterior probabilities.
@@ -88,7 +84,7 @@ def select(
         sizes = common_sizes(states[0]) if common is None else shared
         if np.array_equal(again, good) and stable(sizes, shared):
             break
-        states.clear()  # a model may have columns of hundreds of megabytes
+        states.clear()  # release memory
         good, shared = again, sizes
         search = search_of(good, shared)
         states = search.run(update)
@@ -98,13 +94,13 @@ def select(
 
 
 def _selected(search: Search, states: list[State], good: NDArray) -> Selected:
-    """Summarise all visited models."""
+    """Return the best model and the probabilities from all visited models."""
     states = _confirmed(search, _merged(states))
     weights = np.array([s.score for s in states])
     weights = np.exp(weights - logsumexp(weights))
     learned = np.array([_functions(s) > 0 for s in states])
     if learned[0] and not learned.all() and weights[learned].sum() < _CLAIMED:
-        # Functions are dropped if the model predicts equally well without them.
+        # A model without functions is preferred if functions are not probable enough.
         first = int(np.argmin(learned))
         order = [first, *(k for k in range(len(states)) if k != first)]
         states, weights = [states[k] for k in order], weights[order]
@@ -135,7 +131,7 @@ def _selected(search: Search, states: list[State], good: NDArray) -> Selected:
 
 
 def _small(search: Search, best: State, tau: float) -> tuple[Small, ...]:
-    """Return the fitted nuisance parameters and their priors."""
+    """Return the nuisance parameters of a model with their priors."""
     small = search.columns.nuisance.take(best.used)
     std = best.sizes.std[: len(small.frame)] * tau
     return tuple(
@@ -164,7 +160,10 @@ def _noise(search: Search, best: State, good: NDArray) -> Noise:
 
 
 def _probability(name: str, states: Sequence[State], weights: NDArray) -> float:
-    """Return the probability of an effect; finite motions count only if alone."""
+    """Return the probability of an effect.
+
+    Models with finite motions contribute only if they contain no other effect.
+    """
     has = [
         any(e.name == name for e in s.elements)
         and (len(s.elements) == 1 or not LIBRARY[name].finite)
@@ -174,12 +173,12 @@ def _probability(name: str, states: Sequence[State], weights: NDArray) -> float:
 
 
 def _confirmed(search: Search, states: list[State]) -> list[State]:
-    """Drop the best models as long as their functions fail cross-validation."""
+    """Remove the best model while its functions fail cross-validation."""
     blocks, models = search.columns.block[search.readings.cells], search.models
     while len(np.unique(blocks)) >= _FEWEST and len(states) > 1:
         best = states[0]
         learned = [e for e in best.elements if not e.name]
-        # Functions are tested individually and jointly, because two of them may
+        # Functions are tested one by one and all together, because two functions may
         # compensate each other.
         rests = [best.without([e]) for e in learned]
         sure = [
@@ -197,15 +196,13 @@ def _confirmed(search: Search, states: list[State]) -> list[State]:
 
 
 def _merged(states: Sequence[State]) -> list[State]:
-    """Return models with distinct predictions, the best first.
+    """Return models with distinct predictions, best first.
 
-    Of several models with equal predictions, the one with the fewest functions is
-    returned, because a function with the columns of a library effect is the same
-    effect.  Errors of the measuring device are an exception, because the machine may
-    have the same error.
+    Of several models with equal predictions, the model with the fewest functions is
+    returned.  Effects of the measuring device have less preference than functions.
     """
     every = _best_first(states)
-    # Models without functions are included in case no function is confirmed.
+    # Models without functions are needed if no function is confirmed.
     bare = [s for s in every if not _functions(s)][:_LISTED]
     compared = every[:_COMPARED]
     kept: list[State] = []
@@ -221,7 +218,7 @@ def _merged(states: Sequence[State]) -> list[State]:
 
 
 def _without_refinements(states: Sequence[State]) -> list[State]:
-    """Merge a model with a refined effect into a similar one with the simple effect."""
+    """Merge models with a refined effect into models with the simpler effect."""
     kept: list[State] = []
     for state in sorted(_best_first(states), key=_is_refined):
         plain = sorted(_refined(e) or e.name for e in state.elements)
@@ -242,7 +239,7 @@ def _best_first(states: Sequence[State]) -> list[State]:
 
 
 def _joined(one: State, other: State) -> State:
-    """Add the weight of one model to that of another."""
+    """Add the weight of a model to that of another model."""
     return replace(one, score=float(np.logaddexp(one.score, other.score)))
 
 
@@ -251,12 +248,12 @@ def _is_refined(state: State) -> bool:
 
 
 def _refined(e: Element) -> str:
-    """Return the simpler effect that an element refines; empty if there is none."""
+    """Return the simpler effect that an element refines, or an empty text."""
     return LIBRARY[e.name].refines if e.name else ""
 
 
 def _rank(state: State) -> int:
-    """Return the preference of a model among those with equal predictions."""
+    """Return a number that is smaller for a preferred model with equal predictions."""
     own = [e.name for e in state.elements if e.name]
     return _functions(state) + 2 * sum(LIBRARY[name].device_alone for name in own)
 
@@ -274,7 +271,7 @@ def _same(one: State, other: State) -> bool:
 
 
 def _models(states: Sequence[State], weights: NDArray) -> tuple[Model, ...]:
-    """Return the models by the names of their effects, best first."""
+    """Return the models as effect names with probabilities, best first."""
     total: dict[tuple[tuple[str, ...], tuple[str, ...]], float] = {}
     for state, weight in zip(states, weights, strict=True):
         effects = tuple(sorted(e.name for e in state.elements if e.name))
@@ -287,7 +284,7 @@ def _models(states: Sequence[State], weights: NDArray) -> tuple[Model, ...]:
 def _learned(
     search: Search, states: Sequence[State], weights: NDArray, k: int
 ) -> Learned:
-    """Return a function of the best model together with its equivalents."""
+    """Return a function of the best model and the locations of equivalent functions."""
     best, e = states[0], states[0].elements[k]
     rest = best.without([e])
     equal = list(search.columns.functions.equivalents(e.candidate))

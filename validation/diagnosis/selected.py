@@ -17,11 +17,11 @@ class Learned:
     """A learned function and its probability.
 
     Attributes:
-        candidate: places, variables and form.
-        equivalent: other places and variables that give the same predictions.
-        std: (m,) prior standard deviations of the unknowns of :class:`.Sensitivities`.
-        probability: probability that a model contains a function of these variables.
-        range_error: extrapolation error; None if it cannot be estimated.
+        candidate: locations, variables and form of the function.
+        equivalent: other locations and variables with the same predictions.
+        std: (m,) prior standard deviations of the unknowns.
+        probability: probability that there is a function of these variables.
+        range_error: extrapolation error, None if it cannot be estimated.
     """
 
     candidate: Candidate
@@ -33,7 +33,7 @@ class Learned:
 
 @dataclass(frozen=True)
 class Model:
-    """A model of the deviations and its probability.
+    """Effects and functions of a model, and its probability.
 
     Attributes:
         effects: names of its library effects.
@@ -51,16 +51,16 @@ class Selected:
     """Result of :func:`.select.select`.
 
     Attributes:
-        hypotheses: hypotheses of the best model, beginning with that of an unknown
+        hypotheses: effects of the best model, beginning with the pose of an unknown
             measuring frame.
-        values: (k,) estimates of the unknowns, in the order of the hypotheses.
+        values: (k,) estimates of the unknowns of the hypotheses.
         functions: functions of the best model.
-        small: geometric errors and springs that the best model contains.
-        noise: noise scale, and sentences about the noise.
-        weights: (n,) probability that a cell is good.
-        models: models by the names of their effects, best first.
-        probability: probability of each library effect in any visited model.
-        unknowns: [-] number of well-determined unknowns, including the measuring frame.
+        small: geometric errors and springs of the best model.
+        noise: estimated noise.
+        weights: (n,) probability that a cell is not a blunder.
+        models: all models, best first.
+        probability: probability of each library effect.
+        unknowns: [-] number of well-determined unknowns.
         states: the visited models, best first.
     """
 

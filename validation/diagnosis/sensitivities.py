@@ -4,12 +4,12 @@
 symbol  code             shape      meaning
 ======  ===============  =========  ==================================================
 a       ``sensitivity``  (R, 6)     change of the reading per unit of a component
-P       ``basis``        (R, p)     columns of a form in a variable
-T       ``mixed``        (p, q)     coefficients of the form per unknown of the search
+P       ``basis``        (R, p)     columns of a form
+T       ``mixed``        (p, q)     coefficients of the form per unknown
 ======  ===============  =========  ==================================================
 
-A component of a candidate contributes a times the row of P T times the unknowns to the
-readings of a row.
+In row r, a component of a candidate contributes a_r (P T)_r x to the readings, where x
+are the unknowns.
 """
 
 from collections.abc import Iterator
@@ -37,22 +37,22 @@ from forcefit.validation.diagnosis.candidates import (
 from forcefit.validation.diagnosis.function_forms import CandidateShape
 from forcefit.validation.diagnosis.responses import Responses
 
-# Prior size of the linear part of a spline per knot interval, relative to the spline.
+# Weight of the values of a spline in its prior, relative to the roughness.
 _STIFF = 0.1
-# Powers are dropped if their size after removing lower powers is below this fraction.
+# Smallest part of a power that lower powers cannot represent, relative to the power.
 _RANK = 1e-8
-# Step of the derivative relative to the largest load; the model is linear in the load.
+# Step of numerical derivatives, relative to the largest load or to a shape parameter.
 _STEP = 1e-3
-_BENT = 64  # number of cached columns of forms with a fitted shape parameter
-# Unknowns below this fraction of the largest one leave the readings unaffected.
+_BENT = 64  # number of forms whose columns are cached
+# Unknowns below this fraction of the largest unknown are treated as zero.
 _NOTHING = 1e-9
 
 
 class Sensitivities:
-    """Derivatives of the readings by components at any place, and variable values."""
+    """Derivatives of the readings with respect to functions at any location."""
 
     def __init__(self, conditions: Conditions, response: Responses) -> None:
-        """Store the declared conditions of R rows and their responses."""
+        """Store the conditions of R rows and the responses of their readings."""
         self.conditions, self._response = conditions, response
         self.rows = np.arange(len(conditions))
         self._origin = conditions.postures.platform[:, :3, 3]
@@ -60,7 +60,10 @@ class Sensitivities:
         self._raw = lru_cache(maxsize=_BENT)(self._unmixed)
 
     def take(self, rows: NDArray) -> "Sensitivities":
-        """Select rows without renormalising the forms."""
+        """Return the sensitivities of selected rows.
+
+        The normalisation of the forms does not change.
+        """
         other = copy(self)
         other.rows, other._origin = self.rows[rows], self._origin[rows]
         r = self._response
@@ -68,9 +71,9 @@ class Sensitivities:
         return other
 
     def about(self, conditions: Conditions, response: Responses) -> "Sensitivities":
-        """Return the sensitivities for conditions that effects have changed.
+        """Return the sensitivities for changed conditions.
 
-        The normalisation of the forms stays unchanged.
+        The normalisation of the forms does not change.
         """
         other = copy(self)
         other.conditions, other._response = conditions, response
@@ -78,12 +81,12 @@ class Sensitivities:
 
     @property
     def wrenches(self) -> NDArray:
-        """(R, n, 6) [N m, N] declared wrench through every joint, in its axes."""
+        """Declared wrench (R, n, 6) [N m, N] at every joint, joint axes."""
         return self._response.wrenches
 
     @cached_property
     def under_load(self) -> NDArray:
-        """(all, 6, 6) change of every reading per unit of a component of the load."""
+        """Change (all, 6, 6) of every reading per unit of each load component."""
         change = np.zeros((len(self.conditions), 6, 6))
         still = predict(self.conditions).deviation
         size = max(float(np.abs(self.conditions.load).max()), 1.0)
@@ -94,7 +97,7 @@ class Sensitivities:
         return change
 
     def sensitivity(self, where: str, component: str, kind: str) -> NDArray:
-        """Return changes (R, 6) of the reading per unit of a component at a place."""
+        """Return the changes (R, 6) of the readings per unit of a component."""
         if where == "load":
             return self.under_load[self.rows, :, LOADS.index(component)]
         robot, response = self.conditions.robot, self._response
@@ -103,12 +106,12 @@ class Sensitivities:
     def _basis(
         self, variables: tuple[str, ...], shape: CandidateShape
     ) -> tuple[NDArray, NDArray]:
-        """Return the columns (R, q) of a form, scaled to order one, and T (p, q)."""
+        """Return the normalised columns P T (R, q) of a form, and T (p, q)."""
         raw = self._unmixed(variables, shape)
         size = np.sqrt(np.mean(raw**2, axis=0))
         mixed = np.diag(1 / np.where(size > 0, size, 1.0))
         if shape.form == "powers" and len(shape.names) > 1:
-            # QR decomposition removes the lower powers from each power.
+            # The QR decomposition makes each power orthogonal to the lower powers.
             Q, R = np.linalg.qr(raw * np.diag(mixed))
             # At most as many powers can be determined as there are rows.
             good = np.flatnonzero(np.abs(np.diag(R)) > _RANK * np.sqrt(len(raw)))
@@ -124,7 +127,7 @@ class Sensitivities:
         return raw @ mixed, mixed
 
     def _unmixed(self, variables: tuple[str, ...], shape: CandidateShape) -> NDArray:
-        """Return the columns (R, p) of a form of variables."""
+        """Return the columns P (R, p) of a form."""
         if variables[0].startswith("wrench."):
             wrench = [self._wrench(*variables)]
             return FORMS[shape.form].basis(shape.names, wrench, dict(shape.given))
@@ -135,21 +138,25 @@ class Sensitivities:
         return raw
 
     def _wrench(self, name: str) -> NDArray:
-        """Return the load (R,) [N m or N] of a joint in the declared model."""
+        """Return one component (R,) [N m or N] of a joint wrench."""
         frame, _, component = name.removeprefix("wrench.").rpartition(".")
         row = self.conditions.robot.index(frame)
         return self._response.wrenches[:, row, LOADS.index(component)]
 
     def changes(self, one: Candidate, x: NDArray | None = None) -> NDArray:
-        """Return the contribution (R, 6, m) [rad, m] of a candidate per unknown.
+        """Return the changes of the readings per unknown of a candidate.
 
-        The contribution is linearised at the values ``x`` (m,) of the unknowns.  If
-        ``x`` is (m + 1,), its last value is the change of the shape parameter, and the
-        result contains a column for this parameter.
+        Args:
+            one: the candidate.
+            x: values of the unknowns, (m,) or (m + 1,). The last value of (m + 1,) is
+                the change of the shape parameter.
+
+        Returns:
+            (R, 6, m) or (R, 6, m + 1) [rad, m] changes per unknown.
         """
         m = len(self.axes(one))
         by = 0.0 if x is None or len(x) == m else float(x[-1])
-        # Values of one unknown are stored contiguously, because they are read together.
+        # Values of one unknown are stored contiguously for speed.
         blocks = [columns.T[:, :, None] * s for s, columns in self._factors(one, by)]
         if x is not None and len(x) > m:
             step = _STEP * float(one.shape.bends[0])
@@ -170,7 +177,7 @@ class Sensitivities:
         return total
 
     def axes(self, one: Candidate) -> NDArray:
-        """Return the screw component (m,) in which each unknown of a candidate acts."""
+        """Return the screw component (m,) that each unknown of a candidate changes."""
         counts = [columns.shape[1] for _, columns in self._factors(one)]
         components = [c for part in one.parts for c in part.components]
         kinds = [0 if is_turn(c) else 3 for c in components]
@@ -183,7 +190,7 @@ class Sensitivities:
     def _factors(
         self, one: Candidate, by: float = 0.0
     ) -> Iterator[tuple[NDArray, NDArray]]:
-        """Yield two factors for each component: (R, 6), and (R, q) of its unknowns."""
+        """Yield the sensitivity (R, 6) and the columns (R, q) for each component."""
         for part in one.parts:
             columns, mixed = self.basis(part.variables, one.shape)
             if by:
@@ -193,12 +200,16 @@ class Sensitivities:
                 yield self.sensitivity(part.where, component, one.kind), columns
 
     def fitted(self, one: Candidate, x: NDArray, std: NDArray) -> list[Function]:
-        """Return robot-file functions with fitted coefficients.
+        """Return the functions of a robot file that represent a fitted candidate.
 
-        A candidate may act at several places, called parts.  Each part on which the
-        readings depend yields one function, or one per session if a variable is unknown
-        in some sessions.  ``x`` is (m,) or (m + 1,), see :meth:`changes`.  ``std``
-        contains the standard deviations, treated as independent.
+        Args:
+            one: the candidate.
+            x: values of the unknowns, (m,) or (m + 1,) as in :meth:`changes`.
+            std: standard deviations of the unknowns.
+
+        Returns:
+            One function for each location that affects the readings.  If a variable is
+            unknown in some sessions, one function for each other session.
         """
         functions, at = [], 0
         m, given, sure = len(self.axes(one)), dict(one.shape.given), {}
@@ -210,7 +221,7 @@ class Sensitivities:
         for part, function in zip(one.parts, one.functions(), strict=True):
             _, mixed = self.basis(part.variables, one.shape)
             numbers, spread = dict(given), dict(sure)
-            shown = []  # components of the candidate on which the readings depend
+            shown = []  # components that affect the readings
             alone = len(part.components) == 1
             for component in part.components:
                 own = slice(at, at + mixed.shape[1])
@@ -238,7 +249,7 @@ class Sensitivities:
         return functions
 
     def _sessions(self, variables: tuple[str, ...]) -> tuple[str | None, ...]:
-        """Return the sessions in which variables are known, or (None,) for all rows."""
+        """Return the sessions in which variables are known, or (None,) for all."""
         conditions = self.conditions
         if variables[0].startswith("wrench.") or conditions.session is None:
             return (None,)
@@ -252,10 +263,15 @@ def sensitivity_at(
     where: str, component: str, kind: str,
     robot: Robot, response: Responses, origin: NDArray,
 ) -> NDArray:  # fmt: skip
-    """Return changes (R, 6) of the reading per unit of a component at a place.
+    """Return the changes (R, 6) of the readings per unit of a component.
 
-    The place is a frame, ``"base"`` or ``"reading"``.  ``origin`` (R, 3) [m] is the
-    position of the platform.
+    Args:
+        where: a frame, ``"base"`` or ``"reading"``.
+        component: screw component.
+        kind: ``"screw"`` or ``"compliance"``.
+        robot: the robot.
+        response: responses of the readings.
+        origin: (R, 3) [m] position of the platform.
     """
     unit = unit_screw(robot, where, component)
     if where == "reading":
@@ -275,7 +291,7 @@ def sensitivity_at(
 def in_cells(
     sensitivities: Sensitivities, one: Candidate, campaign: Campaign
 ) -> NDArray:
-    """Return changes (N, m) of the measured cells per unknown, divided by sigma."""
+    """Return the changes (N, m) of the measured cells per unknown, over sigma."""
     changes = np.moveaxis(sensitivities.changes(one), 2, 0) / campaign.sigma
     columns = changes.reshape(len(changes), -1)
     if not campaign.cells.all():

@@ -1,4 +1,4 @@
-"""State the result of a diagnosis in sentences."""
+"""Describe the result of a diagnosis in sentences."""
 
 import math
 from collections.abc import Sequence
@@ -27,7 +27,7 @@ def sentence(diagnosis: Diagnosis) -> str:
     if diagnosis.setup:
         faults = "; ".join(one.sentence for one in diagnosis.setup)
         return f"The campaign is set up wrongly: {faults}"
-    where = {  # rows of the errors, by hold-out method
+    where = {  # description of the held-out rows for each hold-out method
         "split": "held-out rows",
         "folds": f"rows held out in {len(diagnosis.held.folds)} folds",
         "none": "the fitted rows (too few to hold any out)",
@@ -71,13 +71,13 @@ def sentence(diagnosis: Diagnosis) -> str:
 
 
 def titles(diagnosis: Diagnosis) -> list[str]:
-    """Return a title (place and variables) for each learned function."""
+    """Return a title with location and variables for each learned function."""
     every = functions_of(diagnosis)
     return [function.title for functions in every for function in functions]
 
 
 def calibration_text(tally: Calibration) -> str:
-    """Format the error rates of the method for this design."""
+    """Describe the error rates of simulated diagnoses."""
 
     def counts(words: dict[str, int]) -> str:
         return ", ".join(f"{name} {n}" for name, n in sorted(words.items()))
@@ -95,7 +95,7 @@ def calibration_text(tally: Calibration) -> str:
 
 
 def open_text(open_: NDArray) -> str:
-    """State the number of rows in which the pose is undetermined."""
+    """Describe the rows in which the pose is undetermined."""
     return (
         f"clearances leave the pose undetermined in {int(open_.sum())} of "
         f"{len(open_)} rows (marked open): one of the minimum-energy poses is "
@@ -105,7 +105,7 @@ def open_text(open_: NDArray) -> str:
 
 
 def formula(function: Function) -> str:
-    """Format each component as a sum of coefficients times basis columns."""
+    """Format a function as a sum of coefficients times columns, for each component."""
     names = [name.rpartition(".")[2] for name in function.variables]
     words = []
     for component in function.components:
@@ -120,7 +120,7 @@ def formula(function: Function) -> str:
 
 
 def _column_text(function: Function, key: str, names: Sequence[str]) -> str:
-    """Format one basis column of a function."""
+    """Format one column of a function."""
     form, given = function.form, function.parameters
     head, _, word = key.rpartition(".")
     if form == "knee":

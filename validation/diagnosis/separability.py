@@ -1,10 +1,10 @@
-"""Determine which effects a campaign design can distinguish, before any fit.
+"""Determine which effects can be distinguished with the design of a campaign.
 
-The change of the readings by an effect is a linear combination of the columns A of its
-signature.  Nuisance parameters, for example an unknown registration, can imitate part
-of this change, so their columns are projected out first.  With P_f the projection onto
-the signature of effect f, |P_f A_e| / |A_e| is the fraction of effect e that f can
-imitate.
+An effect changes the readings by a linear combination of the columns A of its
+signature.  Nuisance parameters, such as an unknown device pose, can imitate part of
+this change.  Their columns are therefore projected out first.  With the projection P_f
+onto the signature of effect f, the fraction of effect e that f can imitate is |P_f A_e|
+/ |A_e|.
 
 Sources:
     Bjoerck, Golub (1973), Numerical methods for computing angles between linear
@@ -22,11 +22,10 @@ from forcefit.validation.diagnosis.signatures import UNSEEN
 
 LIKE = 0.98  # cosine above which a design cannot distinguish two signatures
 SEEN = 3.0  # [sigma] smallest norm of a detectable signature
-# Relative size of a direction below which only round-off remains, that is, other
-# columns imitate the direction.
+# Relative singular value below which a column is linearly dependent.
 ROUNDING = 1e-9
-# Relative size below which a direction of a signature counts as zero.  It exceeds
-# round-off, because signatures are secants and not exact derivatives.
+# Relative singular value below which a direction of a signature is treated as zero.  It
+# exceeds round-off, because signatures are finite differences.
 _RANK = 1e-3
 
 
@@ -36,17 +35,15 @@ class Separability:
 
     Attributes:
         names: names of the m effects.
-        strength: (m,) [sigma] norm of each effect's signature over all rows, at
-            plausible sizes of its unknowns, before nuisance parameters are projected
-            out.
-        left: (m,) fraction of the norm that remains after nuisance parameters are
+        strength: (m,) [sigma] norm of the signature of each effect with plausible
+            unknowns.
+        left: (m,) fraction of this norm that remains after nuisance parameters are
             projected out.
         unknowns: (m,) number of unknowns.
         rank: (m,) number of unknowns that the design can distinguish.
-        cosine: (m, m) cosine of the smallest angle between the spans of two signatures;
-            1 if they share a direction.
-        shared: (m, m) fraction of the row's effect that the column's effect can
-            imitate.
+        cosine: (m, m) cosine of the smallest angle between the spans of two signatures.
+        shared: (m, m) fraction of effect i that effect j can imitate, in element [i,
+            j].
     """
 
     names: tuple[str, ...]
@@ -59,27 +56,25 @@ class Separability:
 
     @property
     def visible(self) -> NDArray:
-        """(m,) bool, True if an effect with plausible parameters exceeds the noise."""
+        """Mask (m,) of effects that exceed the noise for plausible parameters."""
         return self.strength * self.left >= SEEN
 
     @property
     def traced(self) -> NDArray:
-        """(m,) bool, True if a sufficiently large effect can be detected."""
+        """Mask (m,) of effects that can be detected if they are sufficiently large."""
         return (self.strength * self.left >= UNSEEN) & (self.rank > 0)
 
     @property
     def shows_at(self) -> NDArray:
-        """(m,) factor on plausible sizes at which effects exceed the noise, or inf."""
+        """Factors (m,) on plausible parameters for effects that equal the noise.
+
+        The factor of an undetectable effect is infinite.
+        """
         size = np.where(self.traced, self.strength * self.left, 0.0)
         return np.divide(SEEN, size, out=np.full(len(size), np.inf), where=size > 0)
 
     def classes(self) -> list[tuple[str, ...]]:
-        """Return classes of effects that imitate each other completely.
-
-        Returns:
-            Classes of at least two effects.  A verdict can name only the class as a
-            whole.
-        """
+        """Return classes of at least two effects that the design cannot distinguish."""
         alike = (self.shared > LIKE) & (self.shared.T > LIKE)
         alike &= np.outer(self.traced, self.traced)
         waiting = list(range(len(self.names)))
@@ -96,13 +91,13 @@ class Separability:
         return groups
 
     def imitated(self) -> list[tuple[str, str]]:
-        """Return pairs (a, b) in which the span of b contains the span of a."""
+        """Return pairs (a, b) for which b can imitate a, but not vice versa."""
         one_way = (self.shared > LIKE) & (self.shared.T <= LIKE)
         one_way &= np.outer(self.traced, self.traced)
         return [(self.names[i], self.names[j]) for i, j in np.argwhere(one_way)]
 
     def overlapping(self) -> list[tuple[str, str]]:
-        """Return pairs of effects that can imitate each other in part."""
+        """Return pairs of effects that can partly imitate each other."""
         part = (self.cosine > LIKE) & (self.shared <= LIKE) & (self.shared.T <= LIKE)
         part &= np.outer(self.visible, self.visible)
         return [(self.names[i], self.names[j]) for i, j in np.argwhere(part) if i < j]
@@ -111,15 +106,12 @@ class Separability:
 def compare_signatures(
     columns: Mapping[str, NDArray], nuisance: NDArray | None = None
 ) -> Separability:
-    """Return norms, fractions and angles of effect signatures.
+    """Return a comparison of the signatures of effects.
 
     Args:
-        columns: for each effect (N, k) changes of the readings by unknowns of plausible
-            size, divided by sigma.
+        columns: mapping from each effect to the changes (N, k) of the readings caused
+            by plausible unknowns, divided by sigma.
         nuisance: (N, p) columns of nuisance parameters, divided by sigma.
-
-    Returns:
-        The comparison of all signatures.
     """
     names, left = tuple(columns), dict(columns)
     if nuisance is not None:
@@ -145,19 +137,22 @@ def compare_signatures(
 
 
 def _basis(columns: NDArray, whole: float) -> NDArray:
-    """Return an (N, r) orthonormal basis; ``whole`` is the norm of a large column."""
+    """Return an orthonormal basis (N, r) of the columns of a signature.
+
+    ``whole`` is the norm of the signature.
+    """
     return orthonormal_basis(columns, _RANK, _RANK * whole)
 
 
 def orthonormal_basis(
     columns: NDArray, rank: float = ROUNDING, floor: ArrayLike = 0.0
 ) -> NDArray:
-    """Return an (N, r) orthonormal basis of columns, independent of their units.
+    """Return an orthonormal basis (N, r) of columns, independent of their units.
 
     Args:
         columns: (N, k) columns.
-        rank: relative singular value below which normalised columns count as dependent.
-        floor: norm up to which a column counts as zero; one value, or (k,).
+        rank: relative singular value below which normalised columns are dependent.
+        floor: norm up to which a column is treated as zero, one value or (k,).
     """
     size = np.linalg.norm(columns, axis=0)
     kept = columns[:, size > floor] / size[size > floor]

@@ -1,8 +1,8 @@
-"""Test on held-out rows the sequence of models that leads to a fitted robot.
+"""Test a sequence of models, from the declared to the fitted robot.
 
-The order is fixed: declared, device pose, geometric errors, springs, library effects,
-learned functions.  Each model contains the unknowns of all preceding ones and is fitted
-as a whole.  The last model is the fitted robot.
+The unknowns are added in this order: device pose, geometric errors, springs, library
+effects, learned functions.  All unknowns of each model are fitted together, and the
+errors are computed on held-out rows.
 """
 
 from collections.abc import Sequence
@@ -22,10 +22,10 @@ LEARNED = "learned effects"
 _TERMS = (
     "declared", "registration", GEOMETRY, SPRINGS, "library effects", LEARNED,
 )  # fmt: skip
-# Indices of terms of the sequence.
+# Indices in the list of terms.
 _DECLARED, _REGISTRATION, _LIBRARY, _LEARNED = 0, 1, 4, 5
-# Position of a model in the sequence: its last term and its number of learned
-# functions.
+# Position of a model in the sequence, given by the index of its last term and its
+# number of learned functions.
 Place = tuple[int, int]
 
 
@@ -36,7 +36,7 @@ class Errors:
     Attributes:
         position: [m] error of the measured translations.
         rotation: [rad] error of the measured rotations.
-        normalised: [-] error of all measured components over sigma.
+        normalised: [-] error of all measured components, divided by sigma.
     """
 
     position: float
@@ -47,7 +47,16 @@ class Errors:
 def errors_of(
     campaign: Campaign, residual: NDArray, rows: NDArray | slice = slice(None)
 ) -> Errors:
-    """Return the rms of a residual (R, 6) [rad, m] in rows (R,) bool; NaN if empty."""
+    """Return the rms errors of a residual in selected rows.
+
+    Args:
+        campaign: campaign of R rows.
+        residual: (R, 6) [rad, m] residual.
+        rows: mask (R,) or slice of the selected rows.
+
+    Returns:
+        The errors, NaN if there are no residuals.
+    """
     z = np.where(campaign.cells, residual, np.nan)[rows]
     return Errors(rms(z[:, 3:]), rms(z[:, :3]), rms(z / campaign.sigma[rows]))
 
@@ -63,11 +72,10 @@ class Step:
     """A model of the sequence and its errors.
 
     Attributes:
-        term: term that this model adds: ``"declared"``, ``"registration"``,
-            ``"geometry"``, ``"springs"``, ``"library effects"`` or, for each function,
-            ``"learned effects"``.
-        unknowns: [-] number of added unknowns; for unknowns with a prior, the effective
-            number that the readings determine.
+        term: name of the added unknowns, which is ``"declared"``, ``"registration"``,
+            ``"geometry"``, ``"springs"``, ``"library effects"`` or ``"learned
+            effects"``.
+        unknowns: [-] number of added unknowns that the readings determine.
         error: error on the held-out rows.
     """
 
@@ -79,18 +87,17 @@ class Step:
 def stages(
     campaign: Campaign, fit: MachineFit, rows: NDArray, held: NDArray
 ) -> dict[Place, tuple[float, NDArray]]:
-    """Fit the models that lead to a fitted robot and test each on held-out rows.
+    """Fit the models of the sequence and compute their residuals on held-out rows.
 
     Args:
         campaign: campaign of R rows.
         fit: the last model of the sequence.
-        rows: (R,) bool, True for fitted rows.
-        held: (R,) bool, True for held-out rows.
+        rows: (R,) mask of the fitted rows.
+        held: (R,) mask of the held-out rows.
 
     Returns:
-        For each model, in order, the number of added unknowns as in :class:`Step`, and
-        the (R, 6) [rad, m] residual of the held-out rows, NaN elsewhere.  The last
-        model is ``fit``.
+        Mapping from the position of each model to the number of added unknowns and the
+        residual (R, 6) [rad, m], which is NaN in rows that are not held out.
     """
     shown, known = dict[Place, tuple[float, NDArray]](), 0.0
     finite = _has_finite_motions(fit.unknowns)
@@ -110,12 +117,12 @@ def stages(
 
 
 def _has_finite_motions(unknowns: Unknowns) -> bool:
-    """Return whether finite motions are among the added effects."""
+    """Return whether the effects include finite motions."""
     return any(LIBRARY[one.hypothesis.effect].finite for one in unknowns.effects)
 
 
 def _models(unknowns: Unknowns) -> dict[Place, Unknowns]:
-    """Yield the unknowns of the preceding models, omitting absent terms."""
+    """Return the unknowns of each model in the sequence."""
     device = tuple(one for one in unknowns.effects if one.device)
     now = replace(unknowns, effects=(), small=(), functions=())
     models = {(_DECLARED, 0): now}
@@ -132,7 +139,7 @@ def _models(unknowns: Unknowns) -> dict[Place, Unknowns]:
 
 
 def _start(unknowns: Unknowns, fit: MachineFit) -> NDArray:
-    """Return (k,) start values of a smaller model: fitted effects or prior means."""
+    """Return start values (k,) for the fit of a smaller model."""
     start = unknowns.mean
     for one in unknowns.effects:
         start[unknowns.place(one)] = fit.x[fit.unknowns.place(one)]
@@ -142,11 +149,9 @@ def _start(unknowns: Unknowns, fit: MachineFit) -> NDArray:
 def pooled(
     campaign: Campaign, folds: list[dict[Place, tuple[float, NDArray]]], rows: NDArray
 ) -> list[Step]:
-    """Return the sequence tested on rows (R,) of all folds together.
+    """Return the models of the sequence with errors on the rows (R,) of all folds.
 
-    Returns:
-        The steps in order.  The error of the last step is the error of the diagnosis.
-        If a step is missing in a fold, the preceding step is used.
+    If a model is missing in a fold, the preceding model is used.
     """
     steps = []
     for place in sorted(set().union(*folds)):
@@ -162,7 +167,7 @@ def pooled(
 
 
 def joined(residuals: Sequence[NDArray]) -> NDArray:
-    """Join the residual (R, 6) [rad, m] of one step from all folds."""
+    """Combine the residuals (R, 6) [rad, m] of one model from all folds."""
     residual = residuals[0]
     for other in residuals[1:]:
         residual = np.where(np.isnan(other), residual, other)

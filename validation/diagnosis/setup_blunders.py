@@ -1,8 +1,8 @@
-"""Detect set-up blunders: wrong signs, quarter turns, wrong units, exchanged columns.
+"""Detect blunders in the set-up of a campaign, such as wrong signs or units.
 
-Blunders are tested before any search for effects.  They change readings by decimetres,
-whereas effects change them by micrometres, so rigid motions and the declared springs
-suffice to identify them.  Several blunders may occur together.
+Blunders are searched for before any effects.  They change readings much more than
+effects do.  The declared model is therefore sufficient to identify blunders.  Several
+blunders may occur together.
 """
 
 from collections.abc import Sequence
@@ -25,24 +25,23 @@ from forcefit.validation.diagnosis.setup_corrections import (
     corrections,
 )
 
-_ROWS = 40  # number of rows by which corrections are compared
-# Fraction of cells, with the smallest residuals, that is used, so that single outliers
-# do not count.
+_ROWS = 40  # largest number of rows used to compare corrections
+# Fraction of cells that is used.  The cells with the largest residuals are omitted.
 _TRIMMED = 0.9
 _MOST = 3  # largest number of simultaneous blunders
-_BEAM = 4  # number of sets of corrections that are extended
-# If a set of corrections reduces the residual below this fraction of the initial one,
-# only this set is extended.
+_BEAM = 4  # width of the beam search
+# If a set of corrections reduces the residual below this fraction of the initial
+# residual, only this set is extended.
 _CLEAR = 0.1
-# A correction is added to a set only if it reduces the residual below this fraction of
-# the set's residual.
+# An additional correction must reduce the residual below this fraction of its value
+# without the correction.
 _LESS = 0.9
-# Blunders are reported if the residual falls below this fraction of the initial one.
+# Largest residual with which blunders are reported, relative to the initial residual.
 _DECISIVE = 0.5
-# A correction is necessary if the residual without it is larger by this factor.
+# Smallest factor by which the residual must increase without a necessary correction.
 _NEEDED = 1.5
-# A corrected set-up is rejected if its commanded positions spread by more than this
-# multiple of the readings.
+# Largest standard deviation of commanded positions, relative to that of the readings.
+# Other corrections are rejected.
 _FAR = 10.0
 _NOISE = 3.0  # [sigma] residual below which the search for blunders ends
 _LEAST = 100.0  # smallest decrease of chi-square for each reported blunder
@@ -57,10 +56,10 @@ class SetupBlunder:
     Attributes:
         kind: ``sign``, ``quarter_turn``, ``exchanged``, ``unit``, ``transposed`` or
             ``quaternion``.
-        columns: names of the columns of the campaign's table.
+        columns: names of the table columns that contain the blunder.
         before: [sigma] residual with all corrections except this one.
         after: [sigma] residual with all corrections.
-        sentence: sentence that advises the user what to check.
+        sentence: sentence about what the user should check.
     """
 
     kind: str
@@ -73,16 +72,15 @@ class SetupBlunder:
 def setup_blunders(
     campaign: Campaign, conditions: Conditions
 ) -> tuple[SetupBlunder, ...]:
-    """Return the set-up blunders whose correction reduces the residual decisively.
+    """Return the set-up blunders whose correction reduces the residual strongly.
 
     Args:
         campaign: measured deviations.
-        conditions: conditions of its R rows, as declared in the robot file.
+        conditions: declared conditions of its R rows.
 
     Returns:
-        The blunders, none if the residual does not decrease to half.  The residual is
-        the root mean square, in sigma, over the nine tenths of the cells with the
-        smallest residuals, after fitting an unknown device pose.
+        The blunders.  If their correction does not reduce the residual to less than
+        half, the result is empty.
     """
     rows = _sample(campaign)
     if not len(rows):
@@ -103,7 +101,7 @@ def setup_blunders(
 
 
 def _blunder(correction: Correction, before: float, after: float) -> SetupBlunder:
-    """Describe a blunder, including a sentence that advises the user what to check."""
+    """Describe a blunder, including a sentence for the user."""
     columns = correction.columns
     fit, s = ("fits", "") if len(columns) == 1 else ("fit", "s")
     sentence = (
@@ -140,13 +138,12 @@ def _search(judge: "_Judge", start: float) -> tuple[Corrections, float]:
 def _needed(
     judge: "_Judge", chosen: Corrections, left: float
 ) -> tuple[Corrections, float]:
-    """Drop the corrections that do not reduce the residual substantially."""
+    """Remove the corrections that hardly reduce the residual."""
     for one in chosen:
         fewer = _without(chosen, one)
         without = judge.residual(fewer)
         rivals = [without]
-        # If the springs hardly respond to the load, scaled-down loads fit no better
-        # than none.
+        # A correction of loads must also be better than omitting the loads.
 
         if one.array == "loads":
             rivals.append(judge.residual(fewer, loads=0.0))
@@ -156,12 +153,12 @@ def _needed(
 
 
 def _without(chosen: Sequence[Correction], one: Correction) -> Corrections:
-    """Remove one correction from a set."""
+    """Return a set of corrections without one of them."""
     return tuple(other for other in chosen if other is not one)
 
 
 def _sample(campaign: Campaign) -> NDArray:
-    """Select evenly spaced rows among those that can test a set-up."""
+    """Return evenly spaced rows among those with sufficient readings."""
     cells = campaign.cells
     enough = np.any if campaign.registration == "known" else np.all
     usable = cells[:, :3].all(axis=1) | enough(cells[:, 3:], axis=1)
@@ -170,7 +167,7 @@ def _sample(campaign: Campaign) -> NDArray:
 
 
 class _Judge:
-    """Computes the residuals of assumed set-ups in a sample of the rows."""
+    """Computes the residuals of assumed set-ups in selected rows."""
 
     def __init__(self, campaign: Campaign, conditions: Conditions) -> None:
         self.campaign, self.given = campaign, as_given(campaign)
@@ -182,13 +179,16 @@ class _Judge:
     def residual(
         self, made: Corrections, *, loads: float = 1.0, stated: bool = False
     ) -> float:
-        """Return the trimmed rms [sigma] of the residual; inf for unreachable commands.
+        """Return the trimmed rms [sigma] of the residual for corrected data.
 
         Args:
             made: corrections that are applied to the campaign.
             loads: factor on all loads.
-            stated: whether to use the declared sigma even if a correction scales
+            stated: whether to use the declared sigma although a correction scales
                 lengths.
+
+        Returns:
+            The residual, inf if a command is unreachable.
         """
         setup = self.given
         for correction in made:
@@ -217,12 +217,12 @@ class _Judge:
         return float(np.sqrt(np.mean(kept**2)))
 
     def _moved(self, setup: SetUp) -> Conditions | None:
-        """Return the conditions under a set-up, or None if a command is unreachable."""
+        """Return the conditions of a set-up, or None if a command is unreachable."""
         moved, given = replace(self.conditions, load=setup.loads), self.given
         if setup.places is not given.places or setup.axes is not given.axes:
             wide = np.nanstd(setup.points, axis=0).max()
             if np.std(setup.places, axis=0).max() > _FAR * wide:
-                return None  # solving unreachable targets takes long
+                return None  # the solver is slow for unreachable targets
             poses = np.hstack([setup.places, rotation_vector(setup.axes)])
             postures, _ = place_many(moved.robot, poses)
         elif setup.coordinates is not given.coordinates:
@@ -243,7 +243,7 @@ class _Judge:
     def _device(
         self, setup: SetUp, points: NDArray, turns: NDArray, own: NDArray
     ) -> tuple[NDArray, NDArray]:
-        """Fit the rotation (3, 3) and translation (3,) [m] of the device."""
+        """Fit the rotation (3, 3) and translation (3,) [m] of the measuring device."""
         if self.campaign.registration == "known":
             return np.eye(3), np.zeros(3)
         read, seen = points[own], setup.points[own]

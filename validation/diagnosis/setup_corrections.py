@@ -1,9 +1,9 @@
-"""Define corrections of set-up blunders: signs, units, exchanged columns and others.
+"""Define corrections of set-up blunders, such as wrong signs or units.
 
-The readings of a campaign are deviations from the commanded pose, but the device
-measured absolute poses.  Most corrections therefore change the absolute readings, that
-is, commanded poses combined with deviations.  Corrections with ``deviation`` set change
-only the deviations.
+The readings of a campaign are deviations from the commanded pose, but a device measures
+absolute poses.  Most corrections therefore change the absolute readings, which are the
+commanded poses plus the deviations.  If the attribute ``deviation`` is true, a
+correction changes only the deviations.
 """
 
 from collections.abc import Callable, Iterator
@@ -19,7 +19,7 @@ from forcefit.stiffness.screws import rotation_matrix
 from forcefit.validation.campaign.campaign import Campaign
 from forcefit.validation.diagnosis.signatures import loaded_components
 
-_UNITS = {  # factors between units that are often confused
+_UNITS = {  # conversion factors between units that are often confused
     "length": (25.4, 1e3),  # inches or millimetres instead of metres
     "angle": (180 / np.pi,),  # degrees instead of radians
     "load": (9.81, 1e3),  # kilograms-force or kilonewtons instead of newtons
@@ -27,21 +27,21 @@ _UNITS = {  # factors between units that are often confused
 
 
 def _rolled(turns: Rotation, by: int) -> Rotation:
-    """Shift the quaternion components of rotations cyclically."""
+    """Permute the quaternion components of rotations cyclically."""
     return Rotation.from_quat(np.roll(turns.as_quat(), by, axis=-1))
 
 
 _MISREAD = (
     ("transposed", "transposed", Rotation.inv),
-    # A quaternion (x, y, z, w) that is read as w x y z has the components y z w x.
+    # If (x, y, z, w) is read in the order w, x, y, z, the result is (y, z, w, x).
 
     ("quaternion", "with the quaternion's w taken last, not first",
      partial(_rolled, by=1)),
     ("quaternion", "with the quaternion's w taken first, not last",
      partial(_rolled, by=-1)),
 )  # fmt: skip
-# Columns, the corresponding array of SetUp, the correction in words, and whether only
-# the deviation changes.
+# Columns, array of SetUp, description of the correction, and whether only the deviation
+# changes.
 _LENGTHS = (
     ("pose.t", "places", "", False),
     ("meas.t", "points", ", as positions", False),
@@ -63,9 +63,9 @@ class SetUp:
         places: (R, 3) [m] commanded platform positions, if poses are commanded.
         axes: (R, 3, 3) commanded axes of the platform.
         loads: (R, 6) [N m, N] loads on the platform.
-        points: (R, 3) [m] measured positions, base axes; NaN if not measured.
-        turns: (R, 3, 3) measured axes of the platform; NaN if not measured.
-        nominal: commanded positions and axes as given in the file.
+        points: (R, 3) [m] measured positions, base axes, NaN if not measured.
+        turns: (R, 3, 3) measured axes of the platform, NaN if not measured.
+        nominal: uncorrected commanded positions and axes.
         sigma: (R, 6) [rad, m] standard deviations of the readings.
     """
 
@@ -85,9 +85,9 @@ class Correction:
 
     Attributes:
         kind: kind of the blunder in one word.
-        columns: columns of the campaign's table that the correction changes.
-        what: the correction in words, for a sentence.
-        array: name of the :class:`SetUp` array that it changes.
+        columns: table columns that the correction changes.
+        what: description of the correction as part of a sentence.
+        array: name of the :class:`SetUp` array to change.
         change: function that changes this array, or its deviation from the command.
         deviation: whether the deviation is changed instead of the absolute readings.
         sigma: factor on the standard deviations of positions.
@@ -102,7 +102,7 @@ class Correction:
     sigma: float = 1.0
 
     def apply(self, given: SetUp) -> SetUp:
-        """Apply this correction to a set-up."""
+        """Return a set-up with this correction."""
         values, about = getattr(given, self.array), given.nominal.get(self.array)
         if not self.deviation or about is None:
             values = self.change(values)
@@ -115,7 +115,7 @@ class Correction:
 
 
 def as_given(campaign: Campaign) -> SetUp:
-    """Return the set-up of a campaign of R rows as declared in its files."""
+    """Return the uncorrected set-up of a campaign of R rows."""
     T = campaign.transforms[:, campaign.robot.index(campaign.robot.platform)]
     axes = T[:, :3, :3]
     points = T[:, :3, 3] + np.einsum("rij,rj->ri", axes, campaign.targets)
@@ -132,7 +132,7 @@ def as_given(campaign: Campaign) -> SetUp:
 
 
 def corrections(campaign: Campaign) -> list[Correction]:
-    """Return all corrections that the columns of a campaign allow."""
+    """Return all corrections that are possible for the columns of a campaign."""
     read = np.isfinite(campaign.measured)
     there = {
         "pose.t": campaign.commanded == "pose",
@@ -144,8 +144,8 @@ def corrections(campaign: Campaign) -> list[Correction]:
     tried += _of_loads(campaign)
     for stem, array, how, deviation in _LENGTHS:
         for factor, what in _factors("length") if there[stem] else ():
-            # Otherwise sigma would grow with the lengths, and dividing by any factor
-            # would improve the fit.
+            # If sigma increased with the lengths, any large factor would improve the
+            # fit.
 
             sigma = min(factor, 1.0) if array == "points" else 1.0
             tried.append(Correction(
@@ -162,7 +162,7 @@ def corrections(campaign: Campaign) -> list[Correction]:
 
 
 def _of_joints(campaign: Campaign) -> Iterator[Correction]:
-    """Yield corrections of the signs, origins, order and units of joint coordinates."""
+    """Yield corrections of commanded joint coordinates."""
     frames, kinds = campaign.robot.frames, dict[str, list[int]]()
     count = np.arange(len(frames))
     of = partial(Correction, array="coordinates")
@@ -191,7 +191,7 @@ def _of_joints(campaign: Campaign) -> Iterator[Correction]:
 
 
 def _of_loads(campaign: Campaign) -> Iterator[Correction]:
-    """Yield corrections of loads: reactions instead of loads, and other units."""
+    """Yield corrections of the signs and units of loads."""
     names = tuple(f"load.{name}" for name in loaded_components(campaign))
     factors = [(-1.0, "with their signs reversed"), *_factors("load")]
     for factor, what in factors if names else ():
@@ -200,18 +200,18 @@ def _of_loads(campaign: Campaign) -> Iterator[Correction]:
 
 
 def _xyz(stem: str) -> tuple[str, ...]:
-    """Return the column names of three components, such as x, y, z."""
+    """Return the column names of the x, y and z components."""
     return tuple(f"{stem}{axis}" for axis in "xyz")
 
 
 def _factors(quantity: str) -> list[tuple[float, str]]:
-    """Yield conversion factors between two units in both directions."""
+    """Return the conversion factors between units in both directions."""
     both = (f for one in _UNITS[quantity] for f in (one, 1 / one))
     return [(factor, f"times {factor:.4g}") for factor in both]
 
 
 def _turned(turns: NDArray, change: Callable[[Rotation], Rotation]) -> NDArray:
-    """Apply a change to rotations (R, 3, 3); NaN stays NaN."""
+    """Apply a change to rotations (R, 3, 3), some of which may be NaN."""
     read = np.isfinite(turns).all(axis=(1, 2))
     changed = turns.copy()
     changed[read] = change(Rotation.from_matrix(turns[read])).as_matrix()

@@ -1,10 +1,10 @@
-"""Compute signatures, the first-order changes of the readings by hypotheses.
+"""Compute signatures, which are first-order changes of the readings by effects.
 
 ======  ============  ======  ========================================================
 symbol  code          shape   meaning
 ======  ============  ======  ========================================================
-z       ``residual``  (N,)    (reading - model) / sigma, measured cells only
-A       ``columns``   (N, k)  derivative of the model by each unknown / sigma
+z       ``residual``  (N,)    (reading - model) / sigma in the measured cells
+A       ``columns``   (N, k)  derivatives of the model by the unknowns / sigma
 o       ``offset``    (N,)    change of the model / sigma if all unknowns are zero
 ======  ============  ======  ========================================================
 """
@@ -32,24 +32,24 @@ from forcefit.validation.diagnosis.hypotheses import (
     sessions_of,
 )
 
-_PROBES = 3  # number of random projections by which equal columns are found
-_DIGITS = 6  # number of digits in which projections of equal columns must agree
-# Number of tested rows, those with the largest loads and with the largest rotations.
+_PROBES = 3  # number of random projections used to find equal columns
+_DIGITS = 6  # number of equal decimal places in projections of equal columns
+# Number of tested rows with the largest loads, and with the largest rotations.
 _PROBED = 4
-# Smallest visible change: sum of squares of all whitened readings.
+# Smallest visible change, as a sum of squares over all whitened readings.
 _HARDLY = 2.0
-# [sigma] A plausible unknown is invisible if the norm of its change of all readings is
-# smaller.
+# [sigma] Smallest visible change caused by a plausible unknown, as a norm over all
+# readings.
 UNSEEN = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
 class Signature:
-    """Contribution of a hypothesis to the model, in units of sigma.
+    """Linearised contribution of a hypothesis to the readings, in units of sigma.
 
     Attributes:
         hypothesis: the contributing hypothesis.
-        offset: (N,) contribution of the linearised hypothesis if all unknowns are zero.
+        offset: (N,) contribution if all unknowns are zero.
         columns: (N, k) contribution per unit of each unknown.
     """
 
@@ -59,19 +59,19 @@ class Signature:
 
     @property
     def finite(self) -> bool:
-        """Whether the model has a solution."""
+        """Whether all values are finite, that is, the model has a solution."""
         return bool(np.isfinite(self.columns).all() and np.isfinite(self.offset).all())
 
 
 def conditions_of(campaign: Campaign) -> Conditions:
-    """Return the conditions of a campaign for its declared machine.
+    """Return the conditions of a campaign for the machine in the robot file.
 
     Args:
         campaign: campaign of R rows.
 
     Returns:
-        Conditions of R rows.  Covariates are NaN in sessions that did not record them.
-        ``gravity.x``, ``.y``, ``.z`` [m/s^2] contain the known gravity in each row.
+        Conditions of R rows.  Covariates are NaN in sessions in which they were not
+        recorded.
 
     Raises:
         BadInput: a function of the robot depends on a covariate that is missing.
@@ -107,13 +107,13 @@ def loaded_components(campaign: Campaign) -> list[str]:
 
 
 def whiten(campaign: Campaign, deviation: NDArray) -> NDArray:
-    """Return the deviations (N, ...) of the measured cells, divided by sigma."""
+    """Divide the deviations (N, ...) of the measured cells by sigma."""
     some = deviation[campaign.cells]
     return some / campaign.sigma[campaign.cells].reshape(-1, *[1] * (some.ndim - 1))
 
 
 def fingerprints(columns: NDArray) -> list[tuple[float, ...]]:
-    """Return keys of columns (n, k) that agree for parallel columns."""
+    """Return a key for each column of (n, k), which is equal for parallel columns."""
     probes = np.random.default_rng(0).normal(size=(_PROBES, len(columns)))
     seen = probes @ columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
     seen *= np.sign(seen[0])
@@ -121,7 +121,7 @@ def fingerprints(columns: NDArray) -> list[tuple[float, ...]]:
 
 
 class Tangents:
-    """First derivatives of a campaign's readings by every unknown of every effect.
+    """First derivatives of the readings with respect to the unknowns of effects.
 
     Attributes:
         campaign: campaign of R rows with N measured cells.
@@ -130,26 +130,31 @@ class Tangents:
     """
 
     def __init__(self, campaign: Campaign, derivatives: Derivatives) -> None:
-        """Compute the declared readings in the measured cells."""
+        """Compute the readings of the declared model in the measured cells."""
         self.campaign, self.derivatives = campaign, derivatives
         self.declared = whiten(campaign, derivatives.declared)
 
     def model(self, effects: Mapping[str, Values], *, finite: bool = False) -> NDArray:
-        """Return whitened readings (N,) with effects (:meth:`.Derivatives.model`)."""
+        """Return the whitened readings (N,) of a machine with given effects.
+
+        The arguments are those of :meth:`.Derivatives.model`.
+        """
         return whiten(self.campaign, self.derivatives.model(effects, finite=finite))
 
     def rows_of(self, session: str | None) -> NDArray:
-        """Return an indicator (N, 1) of the cells of a session; None selects all."""
+        """Return a column (N, 1) that is 1 for the cells of a session, otherwise 0.
+
+        If the session is None, all values are 1.
+        """
         row = np.nonzero(self.campaign.cells)[0]
         if session is None or self.campaign.session is None:
             return np.ones((len(row), 1))
         return (self.campaign.session[row] == session)[:, None].astype(float)
 
     def at_start(self, hypothesis: Hypothesis) -> Signature:
-        """Return the first-order contribution of a hypothesis at its start values.
+        """Return the contribution of a hypothesis, linearised at its start values.
 
-        Each unknown applies to all rows or to one session.  Values are NaN where the
-        model has no solution.
+        Values are NaN in rows for which the model has no solution.
         """
         sessions = sessions_of(hypothesis)
         one = self._at_start(in_one_session(hypothesis, sessions[0])[0])
@@ -157,7 +162,7 @@ class Tangents:
         return Signature(hypothesis, one.offset, columns)
 
     def _at_start(self, hypothesis: Hypothesis) -> Signature:
-        """Return the contribution of a hypothesis whose unknowns apply to all rows."""
+        """Return the contribution of a hypothesis that applies to all rows."""
         if not hypothesis.slots:
             offset = np.zeros_like(self.declared)
             if not self._invisible(hypothesis):
@@ -175,8 +180,8 @@ class Tangents:
         return Signature(hypothesis, -columns @ begin, columns)
 
     def _invisible(self, hypothesis: Hypothesis) -> bool:
-        """Return whether an effect without unknowns is invisible at large loads."""
-        # The exact model is a hundred times slower than the linear model.
+        """Return whether an effect is invisible in the most sensitive rows."""
+        # The exact model is slow, so it is evaluated only in a few rows.
         conditions = self.derivatives.conditions
         load = np.linalg.norm(conditions.load, axis=1)
         size = np.linalg.norm(self.derivatives.declared[:, :3], axis=1)
@@ -193,14 +198,14 @@ class Tangents:
         return bool(np.mean(size**2) * len(self.declared) < _HARDLY)
 
     def _column(self, effect: str, slot: Slot, shapes: dict[str, float]) -> NDArray:
-        """Return the derivative (N,) by one unknown at the start values."""
+        """Return the derivative (N,) with respect to one unknown at its start value."""
         begun = whiten(self.campaign, self.derivatives.begun(effect, slot, shapes))
         return _seen((begun - self.declared) / (STEP * slot.unknown.scale), slot)
 
     def about(
         self, hypothesis: Hypothesis, x: NDArray, others: Mapping[str, Values]
     ) -> Signature:
-        """Return the contribution of a hypothesis at x (k,), with other effects."""
+        """Return the contribution of a hypothesis at x (k,) and with other effects."""
         robot = self.derivatives.conditions.robot
 
         def model(values: NDArray) -> NDArray:
@@ -220,6 +225,6 @@ class Tangents:
 
 
 def _seen(column: NDArray, slot: Slot) -> NDArray:
-    """Return a derivative (N,), or zero if no plausible unknown is visible."""
+    """Return a derivative (N,), or zeros if a plausible unknown is invisible."""
     size = np.linalg.norm(column) * slot.unknown.scale
     return np.zeros_like(column) if size < UNSEEN else column

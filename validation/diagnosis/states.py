@@ -27,10 +27,10 @@ from forcefit.validation.diagnosis.gaussian import (
 from forcefit.validation.diagnosis.prior_sizes import Grouped, Sizes, best_sizes
 from forcefit.validation.diagnosis.weighted_readings import NARROW, WeightedReadings
 
-# Whether geometric errors are included, and whether springs are included.
+# Whether geometric errors and whether springs are included in a model.
 Mode = tuple[bool, bool]
-MORE = math.log(2.0)  # each additional element halves the prior probability
-# Prior odds of 10 against including geometric errors, and against including springs.
+MORE = math.log(2.0)  # decrease of the log prior for each additional element
+# Decrease of the log prior if geometric errors are included, and if springs are.
 IN_USE = math.log(10.0)
 _GROUPS = 4  # number of groups of nuisance parameters
 
@@ -46,7 +46,7 @@ class State:
         sizes: standard deviations and posterior of all unknowns.
         score: log posterior, up to a constant.
         tau: ratio of the true to the declared sigma.
-        readings: readings that the model describes.
+        readings: the modelled readings.
     """
 
     elements: tuple[Element, ...]
@@ -58,23 +58,23 @@ class State:
     readings: WeightedReadings
 
     def _columns(self) -> NDArray:
-        """Return the columns (n, k) of all unknowns, which are too large to cache."""
+        """Return the columns (n, k) of all unknowns, which are not cached."""
         r = self.readings
         return np.hstack([r.small[:, self.used], *(r.own(e) for e in self.elements)])
 
     def _z(self) -> NDArray:
-        """Return the readings (n,) minus the offsets of the elements."""
+        """Return the readings (n,) minus the offsets of all elements."""
         return self.readings.without_offsets(self.elements)
 
     @cached_property
     def marginal(self) -> Marginal:
-        """Model with marginalised unknowns for the fitted cells."""
+        """Model of the fitted cells, with marginalised unknowns."""
         flat = self.readings.flat
         return marginalise(self._columns(), self.sizes.std, self._z(), flat)
 
     @cached_property
     def sample_marginal(self) -> Marginal:
-        """Model with marginalised unknowns for the cells of sampled rows."""
+        """Model of the sampled cells, with marginalised unknowns."""
         some = self.readings.sampled
         if some.all():
             return self.marginal
@@ -84,29 +84,29 @@ class State:
         return marginalise(X, self.sizes.std, z, flat)
 
     def forget(self) -> None:
-        """Release the memory of the marginal model, which is recomputed when needed."""
+        """Release the memory of the marginalised models."""
         for name in ("marginal", "sample_marginal"):
             self.__dict__.pop(name, None)
 
     @cached_property
     def fitted(self) -> NDArray:
-        """(n,) contribution of the model to the readings, whitened and weighted."""
+        """Whitened and weighted contribution (n,) of the model to the readings."""
         return self._columns() @ self.sizes.mean + (self.readings.z - self._z())
 
     @cached_property
     def left(self) -> NDArray:
-        """(n,) residual, whitened to independent noise, without weights."""
+        """Whitened residual (n,) without weights."""
         return (self.readings.z - self.fitted) / self.readings.root
 
     def own(self, k: int) -> slice:
-        """Return the slice of the k-th element in the model's unknowns."""
+        """Return the slice of the k-th element in the vector of unknowns."""
         counts = [e.columns.shape[1] for e in self.elements]
         begin = int(self.used.sum()) + sum(counts[:k])
         return slice(begin, begin + counts[k])
 
     @property
     def errors(self) -> NDArray:
-        """(n, 6) [rad, m] geometric errors of the robot's frames."""
+        """Estimated geometric errors (n, 6) [rad, m] of the frames."""
         columns = self.readings.columns
         small = columns.nuisance.take(self.used)
         errors = np.zeros((len(columns.campaign.robot.frames), 6))
@@ -120,7 +120,7 @@ class State:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Sorted names of the effects, and of the variables of functions."""
+        """Sorted names of the effects and descriptions of the functions."""
         names = [
             e.name or "of " + ", ".join(e.candidate.parts[0].variables)
             for e in self.elements
@@ -129,12 +129,12 @@ class State:
 
     @property
     def supported(self) -> bool:
-        """Whether all effects are inside their bounds."""
+        """Whether all effects are within their bounds."""
         means = [self.sizes.mean[self.own(k)] for k in range(len(self.elements))]
         return not any(map(_at_bounds, self.elements, means))
 
     def sizes_for(self, elements: Sequence[Element]) -> dict[int, float]:
-        """Return standard deviations by group, to start a model with other elements."""
+        """Return standard deviations by group, as start values for other elements."""
         own = self.sizes.of_group
         found = {g: s for g, s in own.items() if g < _GROUPS}
         for k, e in enumerate(self.elements):
@@ -150,7 +150,10 @@ class State:
 
 
 def _at_bounds(e: Element, mean: NDArray) -> bool:
-    """Return whether all values or a shape parameter of an effect are at a bound."""
+    """Return whether an effect is at a bound.
+
+    This is the case if all its values or one of its shape parameters are at a bound.
+    """
     if not e.name or not e.columns.shape[1]:
         return False
     at, x = (mean <= e.lower) | (mean >= e.upper), e.values(mean)
@@ -164,13 +167,12 @@ def _at_bounds(e: Element, mean: NDArray) -> bool:
 
 
 def prediction_gain(one: State, other: State, blocks: NDArray) -> float:
-    """Return how much better one model predicts than another, in standard errors.
+    """Return how much better a model predicts than another model, in standard errors.
 
-    Each block (n,) of readings is predicted by a fit to the others.  The gain is the
-    larger of the mean difference of the log predictive densities and Wilcoxon's
-    signed-rank statistic (1945).  The latter is needed because a few blocks often
-    dominate the mean and its scatter although nearly all blocks improve.  The gain is 0
-    for a single block, because its standard error is unknown.
+    Each block (n,) of readings is predicted by a fit to all other blocks.  The gain is
+    computed from the mean difference of the log predictive densities and from
+    Wilcoxon's signed-rank statistic (1945). The larger value is returned.  The gain is
+    0 for a single block.
     """
     densities = []
     for state in (one, other):
@@ -187,22 +189,22 @@ def prediction_gain(one: State, other: State, blocks: NDArray) -> float:
 
 
 class Models:
-    """Models of weighted readings, each fitted only once."""
+    """Models of weighted readings, fitted and cached."""
 
     def __init__(self, readings: WeightedReadings) -> None:
-        """Start with an empty cache."""
+        """Create an empty cache."""
         self.readings, self._small = readings, readings.columns.nuisance
         self._states: dict[object, State] = {}
 
     def forget(self) -> None:
-        """Release cached models and products of columns."""
+        """Release cached models and inner products."""
         for state in self._states.values():
             state.forget()
         self._states.clear()
         self.readings.forget()
 
     def modes(self) -> list[Mode]:
-        """Return the groups of nuisance parameters that a model may include."""
+        """Return the combinations of nuisance parameters that a model may include."""
         small = self._small
         springs = [False, True] if small.spring.any() else [False]
         geometry = [False, True] if (~small.spring).any() else [False]
@@ -212,7 +214,7 @@ class Models:
     def state(
         self, elements: tuple[Element, ...], mode: Mode, start: State | None = None
     ) -> State:
-        """Return the model with optimised standard deviations, from a cache.
+        """Return the model with optimised standard deviations.
 
         The optimisation starts at the standard deviations of ``start``.
         """
@@ -222,7 +224,10 @@ class Models:
         return self._states[key]
 
     def best(self, elements: tuple[Element, ...], start: State) -> State:
-        """Return the best model that differs by at most one nuisance group."""
+        """Return the best model, with or without geometric errors or springs.
+
+        The choice between these options may differ from ``start`` in only one of them.
+        """
         g, s = start.mode
         near = [m for m in self.modes() if m in {(g, s), (not g, s), (g, not s)}]
         states = [self.state(elements, m, start) for m in near]
@@ -231,7 +236,7 @@ class Models:
     def _fitted(
         self, elements: tuple[Element, ...], mode: Mode, start: State | None
     ) -> State:
-        """Optimise standard deviations, and remove springs of negative compliance."""
+        """Optimise standard deviations and remove springs with negative compliance."""
         spring, begin = self._small.spring, dict[int, float]()
         used = np.where(spring, mode[1], mode[0])
         if start is not None:
@@ -256,7 +261,7 @@ class Models:
         return State(elements, mode, used, sizes, score, tau, self.readings)
 
     def _linear(self, elements: tuple[Element, ...], used: NDArray) -> Grouped:
-        """Return the columns of included nuisance parameters and of the elements."""
+        """Return the linear model of nuisance parameters and elements."""
         readings, small = self.readings, self._small
         z = readings.without_offsets(elements)
         with_small, inner = readings.products(elements)

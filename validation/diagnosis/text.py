@@ -1,4 +1,4 @@
-"""Format the public table of a diagnosis as text for a terminal."""
+"""Format the plain values of a diagnosis as text for a terminal."""
 
 import math
 from typing import Any
@@ -65,7 +65,7 @@ def text(diagnosis: Diagnosis, tally: Calibration | None = None) -> str:
 
 
 def _effect_lines(effect: Table) -> list[str]:
-    """Return lines about an effect other than geometric errors or springs."""
+    """Return lines about a library effect."""
     if "combinations" in effect:
         return []
     there = f" in session {effect['session']}" if "session" in effect else ""
@@ -96,7 +96,7 @@ def _small_lines(one: Table | None, name: str) -> list[str]:
 
 
 def _function_lines(one: Table) -> list[str]:
-    """Describe a learned function in two to four lines."""
+    """Return lines about a learned function."""
     formula, parts = one["formula"], one["parts_of_range"]
     short = formula if len(formula) < 160 else f"{formula[:157]}..."
     lines = [f"learned: {one['label']}", f"  {short}"]
@@ -131,7 +131,7 @@ def _error_lines(answer: Table) -> list[str]:
 
 
 def _sequence_lines(answer: Table) -> list[str]:
-    """Return lines about the model sequence with errors on the held-out rows."""
+    """Return lines about the models of the sequence."""
     rows, last = answer["ladder"], math.nan
     unit = rows[-1]["unit"]
     lines = [f"{'model':<20}{'unknowns':>10}{unit:>12}{'sigma':>10}{'reduction':>11}"]
@@ -146,7 +146,7 @@ def _sequence_lines(answer: Table) -> list[str]:
 
 
 def _next_lines(one: Table) -> list[str]:
-    """Return a line about the measurement that would discriminate between models."""
+    """Return a line about the next measurement."""
     where = ", ".join(f"{k}={v:.4g}" for k, v in one["configuration"].items())
     covariates = "".join(f", {k} {v:g}" for k, v in one["covariates"].items())
     return [

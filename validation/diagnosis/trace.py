@@ -1,4 +1,4 @@
-"""Run the search of a diagnosis, from readings to machine parameters.
+"""Search for effects and functions, and fit the machine parameters.
 
 Steps:
 
@@ -47,20 +47,17 @@ from forcefit.validation.diagnosis.weighted_readings import NONE
 
 Update = Callable[[str, int, int], None]
 FINITE = next(name for name, effect in LIBRARY.items() if effect.finite)
-# Number of rows for model selection; the selected model is fitted to all rows.
+# Largest number of rows for model selection.
 _SEARCHED = 2000
-# Largest number of searches; each excludes the gross blunders found before.
+# Maximum number of searches, each of which excludes further blunders.
 _TURNS = 6
-_BENDS = 1  # number of repetitions with second-order terms of geometric errors
-_GROSS = 30.0  # smallest rms of a gross blunder / median rms of all rows
-# Functions of time must improve the prediction of other rows by this number of standard
-# errors.
+_BENDS = 1  # maximum number of updates of second-order terms
+_GROSS = 30.0  # smallest rms of a gross blunder, relative to the median rms of all rows
+# Required predictive gain of functions of time, in standard errors.
 _CLEARLY = 2.0
-# [sigma] Second-order terms are added if they change any reading by more.
+# [sigma] Smallest relevant second-order change of a reading.
 _BENT = 0.3
-_RIVALS = (
-    3  # largest number of rival machines, for which a next measurement is searched
-)
+_RIVALS = 3  # largest number of rival machines to compare
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,14 +65,13 @@ class Traced:
     """Result of the search for effects and functions.
 
     Attributes:
-        campaign: campaign of R rows with the estimated sigma, which is many times
-            larger for blunders, and the common noise.
-        conditions: conditions of all rows, including the registration and the
-            second-order terms of geometric errors.
-        used: (R,) bool, True for rows that were fitted.
-        outliers: (R,) bool, True for rows excluded because of a blunder.
+        campaign: campaign of R rows with the estimated noise.
+        conditions: conditions of all rows, with the pose of the device and second-order
+            terms of geometric errors.
+        used: (R,) mask of the fitted rows.
+        outliers: (R,) mask of the rows that were excluded because of a blunder.
         selected: models with their probabilities.
-        columns: columns of the campaign's cells.
+        columns: regression columns of the campaign.
     """
 
     campaign: Campaign
@@ -87,12 +83,12 @@ class Traced:
 
     @property
     def fitting(self) -> Campaign:
-        """Campaign of the fitted rows."""
+        """Campaign that contains only the fitted rows."""
         return self.campaign.take(self.used)
 
     @cached_property
     def unknowns(self) -> Unknowns:
-        """The unknown parameters of the machine, with their priors."""
+        """Unknown parameters of the machine, with their priors."""
         found, effects, at = self.selected, [], 0
         unknown = self.campaign.registration == "unknown"
         for k, h in enumerate(found.hypotheses):
@@ -109,7 +105,7 @@ class Traced:
 
     @property
     def _alone(self) -> bool:
-        """Whether the best model contains a single effect or function."""
+        """Whether the best model contains exactly one effect or function."""
         found = self.selected
         device = self.campaign.registration == "unknown"
         return len(found.hypotheses) - device + len(found.functions) == 1
@@ -138,7 +134,7 @@ class Traced:
         return list(found.values())
 
     def _device_frames(self, hypothesis: Hypothesis) -> list[Acting]:
-        """Return the estimated device pose as one hypothesis per session."""
+        """Return the estimated pose of the device for each session."""
         base = np.broadcast_to(self.conditions.base, (len(self.campaign), 6))
         own = {}
         for session in self.campaign.sessions or (None,):
@@ -150,7 +146,7 @@ class Traced:
 
 
 def _acting(hypothesis: Hypothesis, values: NDArray) -> list[Acting]:
-    """Return a hypothesis with its values, once per session with parameters."""
+    """Return the effects of a hypothesis, one for each session with parameters."""
     own = [(in_one_session(hypothesis, s), s) for s in sessions_of(hypothesis)]
     return [Acting(there, values[places], s) for (there, places), s in own]
 
@@ -159,19 +155,19 @@ def trace(
     campaign: Campaign, fitted: NDArray, declared: Declared, update: Update, *,
     odds: Mapping[str, float] = MappingProxyType({}),
 ) -> tuple[Traced, MachineFit]:  # fmt: skip
-    """Search for the effects and functions that are missing in a declared model.
+    """Search for the effects and functions that a declared model lacks.
 
     Args:
         campaign: campaign of R rows.
-        fitted: (R,) bool, True for rows whose readings the search may use.
-        declared: declared model, for all rows.
+        fitted: (R,) mask of the rows to which models are fitted.
+        declared: declared model of all rows.
         update: function called with the name of the step, the number of finished parts,
             and the number of all parts.
         odds: factors on the prior odds of effects and functions, see
             :class:`.columns.Columns`.
 
     Returns:
-        The identified effects and the machine fitted with them.
+        The search result, and the machine fitted with the identified effects.
 
     Raises:
         BadInput: the pose of the measuring frame is unknown, and the readings do not
@@ -211,14 +207,14 @@ def trace(
 
 
 def _searched_rows(campaign: Campaign, fitted: NDArray) -> NDArray:
-    """Return a mask (R,) of rows for model selection, either all or a random sample."""
+    """Return a mask (R,) of the rows for model selection, at most a random sample."""
     chosen = np.zeros(len(campaign), dtype=bool)
     chosen[fitted] = drawn(campaign.measured_at_once[fitted], _SEARCHED)
     return chosen
 
 
 def _without_outlying(traced: Traced, fit: MachineFit) -> tuple[Traced, MachineFit]:
-    """Mark outliers among the rows outside the sample, and refit without them."""
+    """Find outliers outside the sample, and refit the machine without them."""
     others = traced.used & ~np.isin(np.arange(len(traced.used)), traced.columns.row)
     if not others.any():
         return traced, fit
@@ -234,7 +230,7 @@ def _without_outlying(traced: Traced, fit: MachineFit) -> tuple[Traced, MachineF
 def _with_its_errors(
     campaign: Campaign, declared: Declared, derivatives: Derivatives, fitted: NDArray
 ) -> Derivatives:
-    """Add the second-order terms of geometric errors to derivatives."""
+    """Return derivatives with the second-order terms of geometric errors."""
     conditions, seen = derivatives.conditions, hidden(campaign, ~fitted)
     alone = dict.fromkeys([*LIBRARY, FUNCTION], 0.0)
     columns = Columns(campaign, derivatives, odds=alone)
@@ -243,7 +239,7 @@ def _with_its_errors(
         z = whiten(campaign, campaign.measured - predict(conditions).deviation)
         known = cells & np.isfinite(z)
         selected = select(columns, z[known], known, common=NONE)
-        # Fits are slow, so the errors of the linear estimate are tested first.
+        # Fits are slow, so the linear estimate of the errors is tested first.
         near = selected.states[0].errors
         if declared.bent(seen, conditions, near, _BENT / 3) is None:
             break
@@ -263,7 +259,7 @@ def _errors(fit: MachineFit) -> NDArray:
 
 
 def _gross(campaign: Campaign, fit: MachineFit, used: NDArray) -> NDArray:
-    """Return a mask (R,) of fitted rows with gross outliers, to be omitted."""
+    """Return a mask (R,) of the fitted rows with gross blunders."""
     left = residual_of(campaign, fit.robot) / campaign.sigma
     left = np.where(campaign.cells & used[:, None], left, 0.0)
     count = np.maximum((campaign.cells & used[:, None]).sum(axis=1), 1)
@@ -272,15 +268,14 @@ def _gross(campaign: Campaign, fit: MachineFit, used: NDArray) -> NDArray:
 
 
 def _searched(columns: Columns, z: NDArray, cells: NDArray, update: Update) -> Selected:
-    """Return the search result; functions of time must improve the prediction."""
-    # Time is correlated with all slow changes and does not repeat on another day.  A
-    # function of time is accepted only if it predicts other periods clearly better.
-    # Without candidates, shared noise is not estimated, because it would absorb the
-    # effects.
+    """Select a model.  Functions of time must clearly improve the predictions."""
+    # Time is correlated with all slow changes.  A function of time is accepted only if
+    # it clearly improves predictions.  Without candidates, common noise is not
+    # estimated, because it could absorb effects.
     whole = select(columns, z, cells, update, None if columns.candidates else NONE)
     if not columns.has_clocks:
         return whole
-    common = whole.states[0].readings.common  # the models must have equal noise
+    common = whole.states[0].readings.common  # both models need the same noise
     timeless = select(columns.without_clocks(), z, cells, update, common)
     blocks = columns.block[cells]
     sure = prediction_gain(whole.states[0], timeless.states[0], blocks)
@@ -291,7 +286,7 @@ def _traced(
     campaign: Campaign, conditions: Conditions, fitted: NDArray, cells: NDArray,
     selected: Selected, columns: Columns,
 ) -> Traced:  # fmt: skip
-    """Return the identified effects, the estimated sigma and rows with blunders."""
+    """Return the search result with estimated noise and outliers."""
     weights = np.ones(len(columns.row))
     weights[cells] = cell_weights(selected.weights)
     sigma = campaign.sigma.copy()
@@ -302,8 +297,7 @@ def _traced(
         common = columns.motions * np.repeat(selected.noise.common, 3)
     good = np.ones(len(columns.row))
     good[cells] = selected.weights
-    # The whole row of a blunder is excluded, because its other readings are doubtful
-    # and errors are computed per row.
+    # A blunder in one reading excludes the whole row.
     blunders = np.bincount(columns.row, good < 0.5, minlength=len(campaign))
     outliers = (blunders > 0) | impossible_rows(campaign)
     return Traced(
@@ -317,20 +311,20 @@ def _traced(
 
 
 def _fitted(traced: Traced) -> MachineFit:
-    """Return the fitted machine, without effects that the readings do not support."""
+    """Return the fitted machine without effects that the readings do not support."""
     fit = fit_machine(traced.campaign, traced.unknowns, traced.used)
     while True:
         weak = [one for one in fit.unknowns.effects if not supported(fit, one)]
         if not weak:
             return fit
-        # The weakest effect is removed first, because two equivalent effects both have
-        # a large uncertainty.
+        # Effects are removed one by one, because two similar effects both have a large
+        # uncertainty.
 
         one = min(weak, key=lambda e: _size(fit, e))
         fit = fit_machine(traced.campaign, fit.unknowns.without(one), traced.used)
 
 
 def _size(fit: MachineFit, one: Acting) -> float:
-    """Return the squared change [sigma^2] of the fitted readings by an effect."""
+    """Return the sum of squared changes [sigma^2] of the readings by an effect."""
     x, _, slopes = fit.own(one)
     return float(np.sum((slopes @ x) ** 2))

@@ -1,8 +1,7 @@
-"""Define the unknown machine parameters and the robot with given parameters.
+"""Define the unknown machine parameters and compute the robot for given values.
 
-A diagnosis determines parameters that a robot file lacks: library effects, geometric
-errors, joint compliances and functions.  Together they form a vector x, and each x
-defines a robot that can be saved.
+The unknown parameters describe library effects, geometric errors, joint compliances and
+functions.  Together they form a vector x.  Each value of x defines a robot.
 """
 
 from collections.abc import Mapping
@@ -26,14 +25,14 @@ from forcefit.validation.diagnosis.responses import responses
 from forcefit.validation.diagnosis.sensitivities import Sensitivities
 from forcefit.validation.diagnosis.signatures import conditions_of
 
-# Ratio of prior standard deviation to plausible size of an effect's unknown.
+# Prior standard deviation of an unknown of an effect, relative to a plausible value.
 _WIDE = 1e3
-# Largest change of a function's shape parameter, and its prior standard deviation,
-# relative to its value.
+# Largest change of a shape parameter and its prior standard deviation, both relative to
+# its value.
 _BEND = 0.5
-# Standard deviation of an unknown fixed at its declared value, in plausible sizes.
+# Prior standard deviation of a fixed unknown, relative to a plausible value.
 _HELD = 1e-12
-STEP = 1e-4  # step of numerical derivatives relative to the size of a parameter
+STEP = 1e-4  # step of numerical derivatives, relative to the parameter
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +42,7 @@ class Small:
     Attributes:
         name: ``"geometry"`` or ``"springs"``.
         frame: (k,) index of the frame in the robot.
-        axis: (k,) component of the screw at the frame, 0 to 5.
+        axis: (k,) screw component at the frame, 0 to 5.
         std: (k,) [rad, m] or [rad/(N m), m/N] prior standard deviations about the
             declared values.
     """
@@ -58,21 +57,23 @@ class Small:
 
     @property
     def bounds(self) -> tuple[NDArray, NDArray]:
-        """(k,) lower and upper bounds; a joint can only become more compliant."""
+        """Lower bounds (k,) and upper bounds (k,).
+
+        The additional compliance of a joint cannot be negative.
+        """
         least = -np.inf if self.name == GEOMETRY else 0.0
         return np.full(len(self), least), np.full(len(self), np.inf)
 
 
 @dataclass(frozen=True, eq=False)
 class Acting:
-    """A library effect that acts in all rows or in one session.
+    """A library effect that acts in all sessions or in one session.
 
     Attributes:
         hypothesis: effect with its frames and unknowns.
         mean: (k,) prior means, which are also the start values of a fit.
         session: session in which the effect acts, None for all sessions.
-        device: whether the effect is the pose of a measuring frame, which is always
-            fitted.
+        device: whether the effect is the pose of a measuring frame.
     """
 
     hypothesis: Hypothesis
@@ -85,14 +86,14 @@ class Acting:
 
     @property
     def std(self) -> NDArray:
-        """(k,) prior standard deviations, so large that the prior is nearly flat."""
+        """Prior standard deviations (k,), which are very large."""
         unknowns = [slot.unknown for slot in self.hypothesis.slots]
         wide = [(_HELD if u.upper == u.lower else _WIDE) * u.scale for u in unknowns]
         return np.array(wide)
 
     @property
     def bounds(self) -> tuple[NDArray, NDArray]:
-        """(k,) lower and upper bounds, from the library."""
+        """Lower bounds (k,) and upper bounds (k,)."""
         return self.hypothesis.bounds
 
 
@@ -101,7 +102,7 @@ class LearnedFunction:
     """A learned function with unknown coefficients.
 
     Attributes:
-        candidate: places, variables and form of the function.
+        candidate: locations, variables and form of the function.
         coefficients: (m,) prior standard deviations of the coefficients.
     """
 
@@ -113,12 +114,12 @@ class LearnedFunction:
 
     @property
     def std(self) -> NDArray:
-        """(m,) or (m + 1,) prior standard deviations; the last belongs to the shape."""
+        """Prior standard deviations, (m,) or (m + 1,) with a shape parameter."""
         return np.concatenate([self.coefficients, _BEND * self.candidate.shape.bends])
 
     @property
     def bounds(self) -> tuple[NDArray, NDArray]:
-        """(m,) or (m + 1,) lower and upper bounds; the last belong to the shape."""
+        """Lower and upper bounds, each (m,) or (m + 1,) with a shape parameter."""
         upper = np.full(len(self), np.inf)
         upper[len(self.coefficients) :] = self.std[len(self.coefficients) :]
         return -upper, upper
@@ -132,11 +133,11 @@ class Unknowns:
     """The unknown parameters x of a robot, with their prior.
 
     Attributes:
-        robot: declared robot with the effects of its file.
-        effects: library effects, including the registration.
+        robot: robot as described in its file.
+        effects: library effects, including the pose of the measuring device.
         small: geometric errors and joint compliances.
         functions: learned functions.
-        sensitivities: derivatives by which functions are normalised; None without
+        sensitivities: derivatives with respect to functions.  None if there are no
             functions.
     """
 
@@ -151,7 +152,7 @@ class Unknowns:
 
     @cached_property
     def places(self) -> list[tuple[Part, slice]]:
-        """Parts of the parameter vector x and their slices, in the order of x."""
+        """Parts of the parameter vector x with their slices in x."""
         parts: list[Part] = [*self.effects, *self.small, *self.functions]
         ends = np.cumsum([len(part) for part in parts]).tolist()
         return [
@@ -164,18 +165,18 @@ class Unknowns:
 
     @property
     def mean(self) -> NDArray:
-        """(k,) prior means, which are also the start values of a fit."""
+        """Prior means (k,), which are also the start values of a fit."""
         zeros = np.zeros(len(self) - sum(len(one) for one in self.effects))
         return np.concatenate([*(one.mean for one in self.effects), zeros])
 
     @property
     def std(self) -> NDArray:
-        """(k,) prior standard deviations."""
+        """Prior standard deviations (k,)."""
         return np.concatenate([np.zeros(0), *(part.std for part, _ in self.places)])
 
     @property
     def bounds(self) -> tuple[NDArray, NDArray]:
-        """(k,) lower and upper bounds."""
+        """Lower bounds (k,) and upper bounds (k,)."""
         both = [np.zeros((2, 0)), *(np.array(part.bounds) for part, _ in self.places)]
         lower, upper = np.hstack(both)
         return lower, upper
@@ -199,7 +200,7 @@ class Unknowns:
         return robot
 
     def _effects_at(self, x: NDArray) -> dict[str | None, dict[str, dict[str, float]]]:
-        """Return the effects to add to the file, for all rows or a session."""
+        """Return the effects to add to the robot file, for each session."""
         found: dict[str | None, dict[str, dict[str, float]]] = {}
         for one in self.effects:
             values = one.hypothesis.public(
@@ -211,10 +212,11 @@ class Unknowns:
         return found
 
     def slopes(self, campaign: Campaign, x: NDArray) -> NDArray:
-        """Return the derivatives of the readings by x (k,) in the linear model.
+        """Return the derivatives of the readings with respect to x (k,).
 
         Returns:
-            (R, 6, k) [rad, m] per unit of x; zero in rows without a solution.
+            (R, 6, k) [rad, m] derivatives of the linear model, zero in rows without a
+            solution.
         """
         robot = self.robot_at(x)
         conditions = _linear(conditions_of(replace(campaign, robot=robot)))
@@ -249,13 +251,16 @@ class Unknowns:
         return np.nan_to_num(J, nan=0.0, posinf=0.0, neginf=0.0)
 
     def without(self, effect: Acting) -> "Unknowns":
-        """Remove the unknowns of one effect."""
+        """Return the unknowns without those of one effect."""
         kept = tuple(one for one in self.effects if one is not effect)
         return replace(self, effects=kept)
 
 
 def effects_in(robot: Robot, session: str | None) -> Mapping[str, Values]:
-    """Return a robot's effects for all rows, or for one session only."""
+    """Return the effects of a robot for one session.
+
+    If the session is None, return the effects that act in all sessions.
+    """
     if session is None:
         return robot.effects
     return robot.session_effects.get(session, {})
@@ -264,7 +269,10 @@ def effects_in(robot: Robot, session: str | None) -> Mapping[str, Values]:
 def with_effects_in(
     robot: Robot, session: str | None, effects: Mapping[str, Values]
 ) -> Robot:
-    """Replace a robot's effects for all rows, or for one session only."""
+    """Return a robot with other effects in one session.
+
+    If the session is None, the effects act in all sessions.
+    """
     if session is None:
         return replace(robot, effects=effects)
     sessions = {**robot.session_effects, session: effects}
@@ -272,7 +280,7 @@ def with_effects_in(
 
 
 def _linear(conditions: Conditions) -> Conditions:
-    """Return the linear model, in which clearances of closed chains are fixed."""
+    """Return conditions for the linear model, with fixed rest positions of joints."""
     conditions = replace(conditions, exact=False)
     loose = virtual_joints(conditions.robot).cones.shape[1]
     if loose and conditions.robot.closures and conditions.rest is None:
@@ -281,7 +289,7 @@ def _linear(conditions: Conditions) -> Conditions:
 
 
 def _resting_as(conditions: Conditions, held: Conditions) -> Conditions:
-    """Give conditions the rest positions of ``held``; new frames are at 0."""
+    """Copy the rest positions of joints from other conditions."""
     assert held.rest is not None
     rest = np.zeros_like(conditions.errors)
     for row, frame in enumerate(conditions.robot.frames):

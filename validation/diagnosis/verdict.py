@@ -11,18 +11,18 @@ from forcefit.validation.diagnosis.columns import FUNCTION
 from forcefit.validation.diagnosis.selected import Selected
 
 CLAIM = 0.9  # probability above which an effect is claimed
-RIVAL = 0.5  # probability above which an effect that is not claimed is a rival
+RIVAL = 0.5  # probability above which an unclaimed effect is a rival
 _LISTED = 0.02  # probability above which an alternative set of effects is listed
 
 Sets = tuple[tuple[tuple[str, ...], float], ...]
 
 
 def by_names(selected: Selected) -> Sets:
-    """Return the probabilities of sets of effects, the most probable first.
+    """Return the probabilities of sets of effects, most probable first.
 
     Returns:
-        The effect names and the probability of each set.  If a model contains a
-        function, its last name is ``"function"``.
+        The effect names and the probability of each set.  For a model with functions,
+        ``"function"`` is added to the names.
     """
     weights: dict[tuple[str, ...], float] = {}
     for model in selected.models:

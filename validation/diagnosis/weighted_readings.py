@@ -1,4 +1,4 @@
-"""Store weighted readings and columns of the fitted cells; cache inner products."""
+"""Store the weighted readings and columns of the fitted cells."""
 
 from collections.abc import Sequence
 
@@ -9,24 +9,24 @@ from forcefit.validation.diagnosis.columns import Columns
 from forcefit.validation.diagnosis.elements import Element
 from forcefit.validation.diagnosis.prior_sizes import Eigen
 
-NARROW = 50  # largest number of columns of an element whose fitted cells are cached
-_RANK = 1e-9  # relative singular value below which a column depends on others
-NONE = (0.0, 0.0)  # standard deviations if there is no shared noise
+NARROW = 50  # largest number of columns of an element that are cached
+_RANK = 1e-9  # relative singular value below which a column is linearly dependent
+NONE = (0.0, 0.0)  # standard deviations without common noise
 
 
 class WeightedReadings:
     """Weighted readings of the fitted cells, with the device pose projected out.
 
     Attributes:
-        columns: columns of all N cells.
+        columns: regression columns of all N cells.
         given: (n,) whitened residual of the fitted cells.
         cells: (N,) mask of the fitted cells.
         weights: (n,) relative precisions, 1 for a reading that is not a blunder.
-        common: [rad, m] standard deviations, divided by tau, of the random platform
-            motion that is common to the cells of a measurement.
+        common: [rad, m] standard deviations of the platform motion that is common to
+            the cells of a measurement, divided by tau.
         sampled: (n,) mask of the cells on which functions are scored first.
         whiten: transformation of the fitted cells to independent noise.
-        flat: (n, f) orthonormal columns of the measuring frame, which has a flat prior.
+        flat: (n, f) orthonormal columns for the pose of the measuring frame.
         z: (n,) whitened residual after projecting out the measuring frame.
         small: (n, k) columns of the nuisance parameters after projecting out the
             measuring frame.
@@ -38,7 +38,7 @@ class WeightedReadings:
         self, columns: Columns, z: NDArray, cells: NDArray, weights: NDArray,
         common: tuple[float, float] = NONE,
     ) -> None:  # fmt: skip
-        """Apply the weights, and project out the measuring frame."""
+        """Weight the readings, and project out the pose of the measuring frame."""
         self.columns, self.cells, self.weights = columns, cells, weights
         self.given, self.common = z, common
         self.sampled = columns.sampled[cells]
@@ -48,8 +48,7 @@ class WeightedReadings:
         norm = np.maximum(np.linalg.norm(flat, axis=0), 1e-300)
         left, size, _ = np.linalg.svd(flat / norm, full_matrices=False)
         self.flat = left[:, size > _RANK * size.max(initial=0.0)]
-        # Log determinants of the covariance of the noise, and of the likelihood after
-        # projecting out the frame.
+        # Log determinant of the noise covariance, including the projection.
 
         seen = np.append(norm, size[: self.flat.shape[1]])
         self.log_det = self.whiten.log_det + 2 * float(np.log(seen).sum())
@@ -73,7 +72,7 @@ class WeightedReadings:
         )
 
     def own(self, e: Element) -> NDArray:
-        """Return the (n, m) columns of an element in the fitted cells."""
+        """Return the columns (n, m) of an element in the fitted cells."""
         if e in self._own:
             return self._own[e]
         B = self._without_flat(self.whiten(e.columns[self.cells]))
@@ -82,7 +81,7 @@ class WeightedReadings:
         return B
 
     def products(self, elements: Sequence[Element]) -> tuple[NDArray, NDArray]:
-        """Return products of m columns with nuisance columns and themselves."""
+        """Return inner products of elements with nuisance columns and themselves."""
         for i, e in enumerate(elements):
             missing = [o for o in (None, *elements[: i + 1])
                        if (e, o) not in self._inner]  # fmt: skip

@@ -1,20 +1,20 @@
 r"""Whiten noise that is common to the points of a measurement.
 
 One measurement may contain several points of the platform.  The noise of its cells,
-divided by the declared sigma, is e + L n, where e is independent noise of variance 1/w
-and the k independent standard normal variables n are common to all cells of the
+divided by the declared sigma, is e + L n.  Here e is independent noise with variance
+1/w, and n contains k standard normal variables that are common to all cells of the
 measurement.
 
 ======  ===============  =======  ====================================================
 symbol  code             shape    meaning
 ======  ===============  =======  ====================================================
 w       ``root`` ** 2    (n,)     relative precisions
-L       ``loadings``     (n, k)   change of the cells over sigma per shared variable
+L       ``loadings``     (n, k)   change of the cells over sigma per common variable
 W       ``matrix``       (n, n)   block-diagonal, W (w^-1 + L L') W' = 1
 ======  ===============  =======  ====================================================
 
-Among all such W, this W is the nearest to w^1/2: W = (1 + K K')^-1/2 w^1/2 with K =
-w^1/2 L.  It is computed from the singular values of the blocks of K.
+The matrix is W = (1 + K K')^-1/2 w^1/2 with K = w^1/2 L. It is computed from the
+singular values of the blocks of K.
 """
 
 from collections.abc import Iterator
@@ -34,7 +34,7 @@ class Whitening:
 
     Attributes:
         root: (n,) square roots of the relative precisions.
-        matrix: (n, n) sparse matrix W; None if there is no shared noise.
+        matrix: (n, n) sparse matrix W, None without common noise.
         log_det: ln det (1 + K K').
     """
 
@@ -49,7 +49,7 @@ class Whitening:
         return values * (self.root if values.ndim == 1 else self.root[:, None])
 
     def inverse(self, values: NDArray) -> NDArray:
-        """Undo this transformation; return values (n,) divided by sigma."""
+        """Undo the transformation of values (n,)."""
         if self.matrix is not None:
             return np.asarray(spsolve(self.matrix, values))
         return values / self.root
@@ -58,10 +58,11 @@ class Whitening:
 def whitening(root: NDArray, loadings: NDArray | None, visit: NDArray) -> Whitening:
     """Return the whitening transformation of n cells.
 
-    ``root`` (n,) are the square roots of the relative precisions.  ``loadings`` (n, k)
-    are the changes of the cells, divided by sigma, per shared variable.  ``visit`` (n,)
-    is equal for all cells of a measurement.  The transformation is diagonal if
-    ``loadings`` is None.
+    Args:
+        root: (n,) square roots of the relative precisions.
+        loadings: (n, k) changes of the cells, divided by sigma, per common variable.
+            None without common noise.
+        visit: (n,) number of the measurement of each cell.
     """
     if loadings is None or not loadings.any():
         return Whitening(root)
@@ -82,7 +83,7 @@ def whitening(root: NDArray, loadings: NDArray | None, visit: NDArray) -> Whiten
 
 
 def _of_one_size(visit: NDArray) -> Iterator[NDArray]:
-    """Yield the cells (V, m) of all measurements with m cells, for every m."""
+    """Yield arrays (V, m) of the cells of all measurements with m cells, for each m."""
     order = np.argsort(visit, kind="stable")
     _, start, count = np.unique(visit[order], return_index=True, return_counts=True)
     for size in np.unique(count).tolist():
@@ -91,7 +92,7 @@ def _of_one_size(visit: NDArray) -> Iterator[NDArray]:
 
 
 def whitening_of(campaign: Campaign, cells: NDArray) -> Whitening:
-    """Return the whitening transformation of cells (R, 6) for a campaign's noise."""
+    """Return the whitening transformation of selected cells (R, 6) of a campaign."""
     row, _ = np.nonzero(cells)
     loadings = None
     if campaign.common is not None:
@@ -101,10 +102,9 @@ def whitening_of(campaign: Campaign, cells: NDArray) -> Whitening:
 
 
 def independent(campaign: Campaign, residual: NDArray) -> NDArray:
-    """Return the N whitened cells of a residual (R, 6) [rad, m].
+    """Return the whitened values (N,) of a residual (R, 6) [rad, m].
 
-    If the residual is noise, the result (N,) has unit variance.  Values that are
-    not finite count as zero.
+    Values that are not finite are replaced by zero.
     """
     cells = campaign.cells
     z = np.nan_to_num(residual[cells] / campaign.sigma[cells])
@@ -112,7 +112,7 @@ def independent(campaign: Campaign, residual: NDArray) -> NDArray:
 
 
 def size_of_noise(campaign: Campaign) -> NDArray:
-    """Return the standard deviations (R, 6) [rad, m] of readings with common noise."""
+    """Return the standard deviations (R, 6) [rad, m] including common noise."""
     if campaign.common is None:
         return campaign.sigma
     return np.sqrt(campaign.sigma**2 + np.sum(campaign.common**2, axis=2))
@@ -123,20 +123,20 @@ def platform_motions(campaign: Campaign, reading: NDArray) -> NDArray | None:
 
     Args:
         campaign: campaign of R rows.
-        reading: (R, 6, 6) change of the readings per unit screw of the platform at its
-            origin, base axes.
+        reading: (R, 6, 6) change of the readings per unit platform screw at the
+            platform origin, base axes.
 
     Returns:
         (R, 6, 6) [rad, m] change per unit rotation about the centre of the measured
-        points and per unit translation.  None if no measurement contains several
-        points.
+        points and per unit translation.  None if every measurement contains a single
+        point.
     """
     visit = campaign.measured_at_once[campaign.cells.any(axis=1)]
     if len(np.unique(visit)) == len(visit):
         return None
     centre = np.unique(campaign.targets, axis=0).mean(axis=0)
     place = campaign.transforms[:, campaign.robot.index(campaign.robot.platform)]
-    # Rows are screws and columns are motions.
+    # In these matrices, rows are screws and columns are motions.
     screws = np.tile(np.eye(6), (len(campaign), 1, 1))
     arm = place[:, :3, :3] @ centre
     screws[:, 3:, :3] = np.swapaxes(np.cross(np.eye(3), -arm[:, None]), 1, 2)
