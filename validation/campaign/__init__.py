@@ -1,4 +1,4 @@
 """Read measurement campaigns and check their content.
 
-Start with ``campaign.py``.  The file format is described in ``docs/campaigns.md``.
+Start with ``campaign.py``. The page ``docs/campaigns.md`` describes the file format.
 """

@@ -22,52 +22,49 @@ LOAD = ("mx", "my", "mz", "fx", "fy", "fz")
 
 @dataclass(frozen=True, eq=False)
 class Campaign:
-    """Measured pose deviations of a machine's platform, in file order.
+    """Measured pose deviations of a platform, in the order of the file.
 
-    A campaign of R measurements consists of R rows.  Its robot has n frames, and the
-    nominal robot must be able to reach every commanded configuration.
+    A campaign of R measurements has R rows, and its robot has n frames.  The nominal
+    robot must be able to reach every commanded configuration.
 
     Attributes:
         name: name of the campaign's folder.
         robot: the declared robot.
         ids: R unique labels.
-        coordinates: (R, n) [rad or m] coordinate of every joint of the nominal robot
-            with closed kinematic loops.
+        coordinates: (R, n) [rad or m] joint coordinates of the nominal robot.
         transforms: (R, n, 4, 4) poses of the frames in the base frame, without
             imperfections.
-        mismatch: (R,) [rad, m] closure error of the nominal robot that is caused by
-            rounded numbers in robot files.  It is neglected.
+        mismatch: (R,) [rad, m] error with which the nominal loops are closed, caused by
+            rounded numbers in robot files.
         commanded: how the file specifies commands, ``"joints"`` or ``"pose"``.
         loads: (R, 6) [N m, N] loads on the platform at the reference point, base axes.
         measured: (R, 6) [rad, m] measured deviations rx ry rz tx ty tz at the reference
-            point, base axes; NaN for components that were not measured.
-        sigma: (R, 6) [rad, m] standard deviation of each reading; NaN only for
-            components that were not measured and whose standard deviation is not
-            stated.
+            point, base axes, NaN if not measured.
+        sigma: (R, 6) [rad, m] standard deviations of the readings, NaN if unknown.  The
+            standard deviation of a measured component is always known.
         covariates: mapping from the name of each covariate, without ``cov.``, to (R,)
             values.
         reference_point: (3,) [m] measured point, platform axes.
         registration: ``"known"``, or ``"unknown"`` if the pose of the measuring device
             is unknown.
-        configuration: (R,) index of the commanded configuration, numbered from 0 in
-            order of first use.
-        repeat: (R,) index of the combination of configuration and load, numbered from 0
-            in order of first use; rows with the same index are repeats.
-        session: (R,) name of each row's session; None if the file has none.
-        motion_units: mapping from the name of each covariate that is a measured motion
-            to its unit, ``rad`` or ``m``.
+        configuration: (R,) index of the commanded configuration, from 0.
+        repeat: (R,) index of the configuration and load, from 0. Rows with the same
+            index are repeats.
+        session: (R,) name of the session of each row.  None without sessions.
+        motion_units: mapping from each covariate that is a measured motion to its unit,
+            ``rad`` or ``m``.
         points: mapping from the name of each additional measured point to its position
             (3,) [m], platform axes.
         per_session: names of additional effects that may differ between sessions.
-        partial: mapping from the name of each covariate that only some sessions
-            recorded to (R,) values; NaN in the other sessions.
-        point: (R,) name of the measured point, ``""`` for the reference point; None if
-            all rows measure the reference point.  A row of the file becomes one row for
-            each point.
-        common: (R, 6, k) [rad, m] correlated noise of the readings of one row of the
-            file, in addition to ``sigma``.  The noise is ``common`` times k independent
-            standard normal variables, drawn once for each row of the file.  None if
-            there is no correlated noise.
+        partial: mapping from each covariate that was recorded only in some sessions to
+            (R,) values, NaN in the other sessions.
+        point: (R,) name of the measured point, ``""`` for the reference point.  None if
+            only the reference point was measured.  If a row of the file contains
+            several points, the campaign contains a row for each of them.
+        common: (R, 6, k) [rad, m] factors of additional noise that is common to the
+            readings in one row of the file.  The noise is ``common`` times k standard
+            normal variables, which are the same for all readings in the row.  None
+            without common noise.
     """
 
     name: str
@@ -136,7 +133,7 @@ class Campaign:
         object.__setattr__(self, "covariates", covariates)
 
     def to_xarray(self) -> "xarray.Dataset":
-        """Convert to an xarray data set over ``row``; see :mod:`.tables`."""
+        """Convert to an xarray data set with the dimension ``row``."""
         from forcefit.validation.campaign.tables import campaign_dataset
 
         return campaign_dataset(self)
@@ -152,25 +149,25 @@ class Campaign:
 
     @property
     def cells(self) -> NDArray:
-        """(R, 6) bool, True where a component was measured."""
+        """Mask (R, 6), True where a component was measured."""
         return np.isfinite(self.measured)
 
     @property
     def not_measured(self) -> list[str]:
-        """Names of the components that were not measured in any row."""
+        """Names of the components that were never measured."""
         seen = zip(READING, self.cells.T, strict=True)
         return [name for name, cells in seen if not cells.any()]
 
     @property
     def sessions(self) -> tuple[str, ...]:
-        """Names of the sessions in order of first use; empty if there are none."""
+        """Names of the sessions in order of first use.  Empty without sessions."""
         return (
             () if self.session is None else tuple(dict.fromkeys(self.session.tolist()))
         )
 
     @property
     def targets(self) -> NDArray:
-        """(R, 3) [m] position of the measured point of each row, platform axes."""
+        """Position (R, 3) [m] of the measured point of each row, platform axes."""
         if self.point is None:
             return np.broadcast_to(self.reference_point, (len(self), 3))
         places = {**self.points, "": self.reference_point}
@@ -178,7 +175,10 @@ class Campaign:
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """R labels of the file's rows; all points of one row share a label."""
+        """Labels (R,) of the rows in the file.
+
+        All points measured in a row have the same label.
+        """
         if self.point is None:
             return self.ids
         pairs = zip(self.ids, self.point.tolist(), strict=True)
@@ -186,13 +186,16 @@ class Campaign:
 
     @property
     def measured_at_once(self) -> NDArray:
-        """(R,) int index of the file row, shared by all points measured in it."""
+        """Index (R,) of the file row in which each row was measured.
+
+        All points measured in a file row have the same index.
+        """
         number = dict[str, int]()
         rows = [number.setdefault(label, len(number)) for label in self.labels]
         return np.array(rows, dtype=int)
 
     def in_session(self, session: str | None) -> NDArray:
-        """Return a mask (R,) of the rows of a session; None selects all rows."""
+        """Return a mask (R,) of the rows of a session.  None selects all rows."""
         every = np.ones(len(self), dtype=bool)
         return every if session is None else np.asarray(self.session == session)
 
@@ -223,14 +226,14 @@ class Campaign:
 
 
 def number_rows(*columns: ArrayLike, step: float = 1e-9) -> NDArray:
-    """Number rows from 0 in order of first occurrence; equal rows share a number.
+    """Number rows from 0. Equal rows have the same number.
 
     Args:
-        columns: (R,) or (R, k) arrays to compare, where NaN equals NaN.
-        step: rounding step of the comparison, in the unit of the columns.
+        columns: (R,) or (R, k) arrays to compare.  NaN is equal to NaN.
+        step: difference below which values are treated as equal.
 
     Returns:
-        (R,) int, the number of each row.
+        (R,) number of each row, in order of first occurrence.
     """
     table = np.column_stack([np.asarray(c, dtype=float) for c in columns])
     table = np.round(table / step)
@@ -243,7 +246,10 @@ def number_rows(*columns: ArrayLike, step: float = 1e-9) -> NDArray:
 
 
 def _index(rows: ArrayLike) -> NDArray:
-    """Convert row indices or a mask to an index array; an empty list selects no row."""
+    """Return the index array of selected rows.
+
+    An empty list selects no row.
+    """
     index = np.asarray(rows)
     return index.astype(int) if index.size == 0 else index
 

@@ -1,4 +1,4 @@
-"""Read campaign folders, that is, ``campaign.toml`` and the table it names."""
+"""Read campaign folders, which contain ``campaign.toml`` and a measurement table."""
 
 import os.path
 from collections.abc import Sequence
@@ -42,14 +42,13 @@ from forcefit.validation.campaign.measurement_table import (
     read_table,
 )
 
-# [rad, m] Largest accepted closure error.  Rounded numbers in robot files cause such
-# errors.
+# [rad, m] Largest accepted error with which loops are closed.
 _CLOSED = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
 class _Declared:
-    """Content of ``campaign.toml``, or defaults for a table without this file."""
+    """Content of ``campaign.toml``, or default values without this file."""
 
     root: Table
     name: str
@@ -65,25 +64,21 @@ class _Declared:
 def read_campaign(
     folder: Path | str, robot: Robot | None = None, *, links: bool = True
 ) -> Campaign:
-    """Read a campaign from a folder, optionally with a different robot.
+    """Read a campaign from a folder.
 
     Args:
         folder: folder that contains ``campaign.toml``, or the path of this file.  If
-            ``robot`` is given, a single table with the same columns in SI units is also
-            accepted.
-        robot: robot that replaces the declared one, for example the identified robot.
-            Measurements may then be missing, and are NaN.  None for the robot that the
-            campaign declares.
-        links: whether to compute the stiffness of meshed links, which a diagnosis
-            requires.
+            ``robot`` is given, it may be the path of a measurement table in SI units.
+        robot: robot that replaces the robot of the campaign.  Missing measurements are
+            then accepted and become NaN. None for the robot of the campaign.
+        links: whether to compute the stiffness of links that are described by meshes.
 
     Returns:
         The campaign, with joint coordinates for every configuration.
 
     Raises:
-        BadInput: the folder does not follow the format, a value is implausible, or a
-            configuration is unreachable.  The message states the file, the location,
-            the value found and the value expected.
+        BadInput: a file has an invalid format, a value is implausible, or a
+            configuration is unreachable.
     """
     if robot is not None:
         return read_commands(folder, robot)
@@ -94,17 +89,16 @@ def read_campaign(
 
 
 def read_commands(source: Path | str, robot: Robot) -> Campaign:
-    """Read the commands of a machine as a campaign; measurements are optional.
+    """Return the commands of a machine as a campaign, with optional measurements.
 
     Args:
-        source: a campaign, or a single table with the same columns in SI units.  The
-            readings of a single table refer to the point for which the robot was
-            identified, or to the platform's origin if the robot file names no point.
-        robot: robot that replaces the robot of the campaign.
+        source: a campaign folder, or a measurement table in SI units.  The readings of
+            such a table refer to the reference point of the robot file, or to the
+            platform origin.
+        robot: robot that executes the commands.
 
     Returns:
-        A campaign with one row for each point of each row of the file.  Readings that
-        were not measured are NaN.
+        A campaign.  Readings that were not measured are NaN.
 
     Raises:
         BadInput: as for :func:`read_campaign`.
@@ -121,13 +115,13 @@ def read_commands(source: Path | str, robot: Robot) -> Campaign:
 
 
 def _declaration(folder: Path | str) -> Path:
-    """Return the path of ``campaign.toml``, given the folder or the file."""
+    """Return the path of ``campaign.toml`` in a folder or as given."""
     file = Path(folder)
     return file if os.path.isfile(file) else file / "campaign.toml"
 
 
 def _declared(root: Table) -> _Declared:
-    """Read the content of ``campaign.toml`` except for the robot."""
+    """Read the content of ``campaign.toml``, except for the robot."""
     folder = Path(root.file).parent
     declared = _Declared(
         root=root,
@@ -164,7 +158,7 @@ def _per_session(root: Table) -> tuple[str, ...]:
 
 
 def _table_names(root: Table) -> list[str]:
-    """Read the names of the tables: a single table, or one per session."""
+    """Read the file names of the measurement tables."""
     given = root.get("measurements")
     if not isinstance(given, list):
         return [root.text("measurements", expected="a CSV file")]
@@ -176,10 +170,10 @@ def _table_names(root: Table) -> list[str]:
 
 
 def _campaign(declared: _Declared, robot: Robot, *, measured: bool = True) -> Campaign:
-    """Build the campaign that a declaration describes.
+    """Return the campaign that ``campaign.toml`` describes.
 
     Args:
-        declared: content of the file.
+        declared: content of ``campaign.toml``.
         robot: robot that executes the commands.
         measured: whether every row must contain a measurement.
 
@@ -206,7 +200,7 @@ def _campaign(declared: _Declared, robot: Robot, *, measured: bool = True) -> Ca
     _check_points(declared, extent)
     if measured:
         check_measured(table, points)
-    # Readings and standard deviations of each measured point, reference point first.
+    # Map each measured point to its readings and their standard deviations.
     every: dict[str, tuple[NDArray, NDArray]] = {}
     for name, at in {"": point, **points}.items():
         every[name] = _readings(table, name, declared.noise)
@@ -214,7 +208,7 @@ def _campaign(declared: _Declared, robot: Robot, *, measured: bool = True) -> Ca
         check_readings(table, name, every[name][1], declared.registration, reach)
     row, which = _rows_of_points(every, measured)
     configuration = configuration[row]
-    loads = (table.stack("load", LOAD, 0.0) + 0.0)[row]  # replaces -0.0 by 0.0
+    loads = (table.stack("load", LOAD, 0.0) + 0.0)[row]  # replace -0.0 by 0.0
     session = np.array(table.sessions)[row] if table.sessions else None
     kinds = [which]
     if session is not None:
@@ -250,7 +244,7 @@ def _campaign(declared: _Declared, robot: Robot, *, measured: bool = True) -> Ca
 
 
 def _check_points(declared: _Declared, extent: float) -> None:
-    """Reject measured points that are far outside a robot of size ``extent`` [m]."""
+    """Reject measured points that are far away from the robot."""
     points = {f"points.{name}": at for name, at in declared.points.items()}
     for place, at in ({"reference_point": declared.point} | points).items():
         if np.linalg.norm(at) > 10 * extent:
@@ -265,7 +259,7 @@ def _check_points(declared: _Declared, extent: float) -> None:
 def _labels(
     ids: Sequence[str], points: Sequence[str], row: NDArray, which: NDArray
 ) -> tuple[str, ...]:
-    """Return a label for each row, composed of its label in the file and the point."""
+    """Return a label for each row, composed of its label in the file and its point."""
     return tuple(
         f"{ids[i]}:{points[k]}" if points[k] else ids[i]
         for i, k in zip(row, which, strict=True)
@@ -280,18 +274,17 @@ def _rows_of_points(
     Args:
         every: mapping from the name of each point to its readings (R, 6) and their
             sigma.
-        measured: whether to omit rows without a reading.  Otherwise such a row is
-            returned once for each declared point.
+        measured: whether to omit rows without a reading.
 
     Returns:
-        (C,) index of the row of the file, ascending, and (C,) index of the point.
+        Index (C,) of the row in the file, and index (C,) of the point.
     """
     taken = np.column_stack([
         np.isfinite(readings).any(axis=1) for readings, _ in every.values()
     ])
     if not measured:
-        # If additional points are declared but none has a reading, each command is
-        # repeated for every declared point, but not for the reference point.
+        # Without readings, each row is used for all additional points.  If there are no
+        # additional points, it is used for the reference point.
         alone = not taken.any() and len(every) > 1
         taken[~taken.any(axis=1)] = taken.any(axis=0) if taken.any() else True
         taken[:, 0] &= not alone
@@ -300,7 +293,7 @@ def _rows_of_points(
 
 
 def _read_points(root: Table) -> dict[str, NDArray]:
-    """Read ``[points]`` as a mapping from name to position (3,) [m], platform axes."""
+    """Read the position (3,) [m] of each additional point, platform axes."""
     if not root.has("points"):
         return {}
     table = root.table("points")
@@ -314,7 +307,7 @@ def _read_points(root: Table) -> dict[str, NDArray]:
 def _readings(
     table: MeasurementTable, point: str, noise: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Return the readings (R, 6) of a point and their standard deviations [rad, m]."""
+    """Return the readings (R, 6) [rad, m] of a point and their standard deviations."""
     at = f".{point}" if point else ""
     stated = table.stack(f"sigma{at}", READING, np.nan)
     sigma = np.where(np.isnan(stated), noise, stated)
@@ -322,7 +315,7 @@ def _readings(
 
 
 def _read_noise(root: Table) -> NDArray:
-    """Read the device's standard deviations (6,) [rad, m]; NaN if not stated."""
+    """Read the standard deviations (6,) [rad, m] of the measuring device, or NaN."""
     noise = np.full(6, np.nan)
     if root.has("noise"):
         table = root.table("noise")
@@ -335,7 +328,7 @@ def _read_noise(root: Table) -> NDArray:
 
 
 def _read_robot(root: Table, name: str, links: bool) -> Robot:
-    """Load the robot, which is built in or defined by a file in the folder."""
+    """Load a built-in robot or a robot file in the campaign folder."""
     if name in BUILT_IN:
         return BUILT_IN[name]()
     path = Path(root.file).parent / name
@@ -348,7 +341,7 @@ def _read_robot(root: Table, name: str, links: bool) -> Robot:
 
 
 def _commanded(table: MeasurementTable, robot: Robot) -> str:
-    """Return the names of the command columns: joints or pose components."""
+    """Return ``"joints"`` or ``"pose"``, depending on the columns of the table."""
     actuated = [f"q.{f.name}" for f in robot.frames if f.actuated]
     given = [name for name in table.columns if name.startswith("q.")]
     pose = [name for name in table.columns if name.startswith("pose.")]
@@ -374,7 +367,10 @@ def _commanded(table: MeasurementTable, robot: Robot) -> str:
 
 
 def _command(table: MeasurementTable, robot: Robot, commanded: str) -> NDArray:
-    """Return poses ``[t r]`` (R, 6) or joint coordinates (R, n); NaN where free."""
+    """Return commanded poses (R, 6) or joint coordinates (R, n).
+
+    Values that are not commanded are NaN.
+    """
     if commanded == "pose":
         return table.stack("pose", POSE, np.nan)
     return table.stack("q", tuple(f.name for f in robot.frames), np.nan)
@@ -382,7 +378,7 @@ def _command(table: MeasurementTable, robot: Robot, commanded: str) -> NDArray:
 
 def _place(table: MeasurementTable, robot: Robot, commanded: str,
            rows: NDArray) -> list[Posture]:  # fmt: skip
-    """Compute the posture of each row; raise BadInput if a row is unreachable."""
+    """Compute the postures of selected rows."""
     place = place_many if commanded == "pose" else place_many_joints
     postures, reasons = place(robot, _command(table, robot, commanded)[rows])
     placed = []

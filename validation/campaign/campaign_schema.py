@@ -1,4 +1,4 @@
-"""Define the JSON schema of ``campaign.toml``, which editors use for completion."""
+"""Define the JSON schema of ``campaign.toml``, which editors can use."""
 
 from forcefit.assembly.effects import LIBRARY
 from forcefit.results.quantities import number, text

@@ -1,7 +1,7 @@
 """Check that the values in a campaign are plausible.
 
-A value that is impossible for a real machine raises an error that names the likely
-mistake.  For example, a deviation of 153 m suggests a wrong unit.
+An impossible value raises an error whose message contains the likely mistake, such as a
+wrong unit.
 """
 
 from collections.abc import Iterable
@@ -14,34 +14,33 @@ from forcefit.assembly.model.robot import Robot
 from forcefit.validation.campaign.campaign import LOAD, READING
 from forcefit.validation.campaign.measurement_table import MeasurementTable
 
-# [rad] Largest accepted command of a revolute joint; a larger value is probably in
-# degrees.
+# [rad] Largest accepted command of a revolute joint.
 _TURNS = 8 * np.pi
-_FORCE = 1e7  # [N], [N m] largest accepted load, far above that of any platform
-# [K] Largest accepted temperature difference from calibration; a value such as 293 is
-# probably an absolute temperature.
+_FORCE = 1e7  # [N, N m] largest accepted load
+# [K] Largest accepted difference from the calibration temperature, which excludes
+# absolute temperatures.
 _WARMEST = 250.0
-_LATEST = 3e8  # [s] largest accepted time, ten years; larger numbers are dates
+_LATEST = 3e8  # [s] largest accepted time
 _ROOM = 1000.0  # [m] largest accepted distance between machine and measuring device
 _FINEST = 1e-15  # [rad, m] smallest accepted standard deviation of a reading
 _UNITS = "; declare other units in [units] of campaign.toml"
 
 
 def check_commands(table: MeasurementTable, robot: Robot) -> None:
-    """Reject impossible commands, loads and covariates.
+    """Reject impossible values of commands, loads and covariates.
 
     Args:
         table: the table in SI units.
         robot: robot of the campaign.
 
     Raises:
-        BadInput: a cell has an impossible value; the message names the likely mistake.
+        BadInput: a cell contains an impossible value.
     """
     reach = _body_length(robot)
     for name, values in table.columns.items():
         group, _, rest = name.partition(".")
         if group == "q" and robot.frame(rest).turns:
-            lead = abs(robot.frame(rest).lead)  # [m/rad] screws make many turns
+            lead = abs(robot.frame(rest).lead)  # [m/rad]
             largest = max(_TURNS, 10 * reach / lead) if lead else _TURNS
             _within(table, name, values, largest, f"an angle in rad{_UNITS}")
         elif group == "q":
@@ -57,7 +56,7 @@ def check_commands(table: MeasurementTable, robot: Robot) -> None:
 
 
 def _check_covariates(table: MeasurementTable) -> None:
-    """Check temperature, time and side of approach, the only restricted covariates."""
+    """Reject impossible values of temperature, time and side of approach."""
     columns = table.columns
     if "cov.temperature" in columns:
         what = "the deviation from the temperature of calibration, in K"
@@ -101,14 +100,13 @@ def check_readings(table: MeasurementTable, point: str, sigma: NDArray,
     Args:
         table: the table in SI units.
         point: name of the measured point, ``""`` for the reference point.
-        sigma: (R, 6) [rad, m] standard deviation of each reading; NaN if it is not
-            stated.
-        registration: ``"known"`` or ``"unknown"``.  For ``"unknown"``, deviations up to
-            the size of a room are accepted, because the pose of the device is unknown.
+        sigma: (R, 6) [rad, m] standard deviation of each reading, NaN if unknown.
+        registration: ``"known"`` or ``"unknown"``. If the pose of the measuring device
+            is unknown, larger deviations are accepted.
         extent: [m] size of the robot over all configurations.
 
     Raises:
-        BadInput: a reading is invalid; the message names the likely mistake.
+        BadInput: a reading is invalid.
     """
     at = f".{point}" if point else ""
     measured = table.stack(f"meas{at}", READING, np.nan)
@@ -139,7 +137,7 @@ def check_readings(table: MeasurementTable, point: str, sigma: NDArray,
 
 
 def extent_of(transforms: NDArray, reference_points: NDArray) -> float:
-    """Return the diagonal [m] of the bounding box of base, frames and measured points.
+    """Return the diagonal [m] of the bounding box of a robot in all configurations.
 
     Args:
         transforms: (k, n, 4, 4) poses of the frames in each configuration.
@@ -154,7 +152,7 @@ def extent_of(transforms: NDArray, reference_points: NDArray) -> float:
 
 
 def _body_length(robot: Robot) -> float:
-    """Return the total length [m] of all bodies, or a larger joint travel."""
+    """Return the total length [m] of all bodies, including the travel of slides."""
     lengths = np.linalg.norm(robot.fixed_transforms[:, :3, 3], axis=1).sum()
     slides = [abs(f.position) for f in robot.frames if f.joint == "prismatic"]
     return float(lengths + sum(slides)) or 1.0
@@ -162,7 +160,7 @@ def _body_length(robot: Robot) -> float:
 
 def _within(table: MeasurementTable, name: str, values: NDArray, largest: float,
             expected: str) -> None:  # fmt: skip
-    """Raise BadInput if the magnitude of any value exceeds a limit."""
+    """Raise BadInput if the magnitude of a value exceeds a limit."""
     for i in np.flatnonzero(np.abs(values) > largest * (1 + 1e-9))[:1]:
         message = f"found {values[i]:g}, expected {expected}"
         raise table.bad(int(i), name, message)

@@ -1,7 +1,7 @@
-"""Read the table format of a campaign: delimiter, decimal mark and units.
+"""Read the format of a measurement table: delimiter, decimal mark and units.
 
-The format is declared in ``campaign.toml``.  By default, cells are separated by commas,
-and numbers have a decimal point and SI units.
+The format is declared in ``campaign.toml``. By default, cells are separated by commas,
+numbers have a decimal point, and units are SI units.
 """
 
 import math
@@ -17,7 +17,8 @@ _ANGLES = {
     "rad": 1.0, "mrad": 1e-3, "urad": 1e-6, "deg": math.pi / 180,
     "arcsec": math.pi / 648000,
 }  # fmt: skip
-# Accepted units of each key in [units], with factors to the SI unit, which comes first.
+# Accepted units of each key in [units], with factors to the SI unit.  The first unit is
+# the SI unit.
 UNITS = {
     "position": _LENGTHS,
     "rotation": _ANGLES,
@@ -33,13 +34,13 @@ MOTIONS = _ANGLES | _LENGTHS
 
 @dataclass(frozen=True)
 class Dialect:
-    """Format of a table.
+    """Format of a measurement table.
 
     Attributes:
         delimiter: character between cells.
         decimal: the decimal mark.
-        units: mapping from each declared key to its unit; all other keys use SI units.
-        motions: unit of each covariate that is a measured motion, by name.
+        units: mapping from each key of ``[units]`` to its unit.
+        motions: mapping from each covariate that is a measured motion to its unit.
     """
 
     delimiter: str
@@ -48,16 +49,16 @@ class Dialect:
     motions: dict[str, str] = field(default_factory=dict)
 
     def unit(self, key: str) -> str:
-        """Return the unit that the table uses for a key."""
+        """Return the unit for a key of ``[units]``."""
         return self.units.get(key) or next(iter(UNITS[key]))
 
     def factor(self, key: str) -> float:
-        """Return the factor that converts a key's unit to the SI unit."""
+        """Return the factor from the unit of a key to the SI unit."""
         return UNITS[key][self.unit(key)]
 
     @property
     def motion_units(self) -> dict[str, str]:
-        """SI unit, ``rad`` or ``m``, of each covariate that is a measured motion."""
+        """Mapping from each covariate that is a measured motion to its SI unit."""
         return {n: "m" if u in _LENGTHS else "rad" for n, u in self.motions.items()}
 
 
@@ -72,7 +73,7 @@ def read_dialect(root: Table) -> Dialect:
         The format.
 
     Raises:
-        BadInput: an unknown value or unit.
+        BadInput: a value or unit is invalid.
     """
     delimiter, decimal, units = ",", ".", {}
     motions: dict[str, str] = {}
@@ -98,7 +99,7 @@ def read_dialect(root: Table) -> Dialect:
 
 
 def parse_number(cell: str, decimal: str) -> float:
-    """Parse the number in a cell; return NaN for text such as "nan" or "1_000"."""
+    """Return the number in a cell, or NaN if the cell contains no valid number."""
     if decimal != ".":
         cell = cell.replace(".", "?").replace(decimal, ".")
     return float(cell) if _NUMBER.fullmatch(cell) else math.nan

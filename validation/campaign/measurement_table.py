@@ -1,7 +1,7 @@
 """Read the measurement table of a campaign and check every cell.
 
-Delimiter, decimal mark and units are declared in ``campaign.toml``.  If the table has a
-different format, the error message names the key that declares it.
+Delimiter, decimal mark and units are declared in ``campaign.toml``. If the table has a
+different format, the error message contains the key to change.
 """
 
 import csv
@@ -41,14 +41,14 @@ class MeasurementTable:
     """Measurement table of a campaign, converted to SI units.
 
     Attributes:
-        file: name of the file, for messages.
+        file: path of the file.
         ids: unique label of each row.
-        lines: line number in the file at which each row ends, for messages.
-        columns: mapping from the name of each column except ``id`` to its (R,) values,
-            in the order of the file; an empty cell is NaN.
+        lines: line number at which each row ends in the file.
+        columns: mapping from the name of each numeric column to its (R,) values, NaN
+            for an empty cell.
         dialect: format of the table.
-        sessions: session name of each row; empty if the file contains no sessions.
-        files: file name of each row, if the campaign consists of several files.
+        sessions: session name of each row.  Empty if the file contains no sessions.
+        files: path of the file of each row.  Empty if there is only one file.
     """
 
     file: str
@@ -63,14 +63,17 @@ class MeasurementTable:
         return len(self.ids)
 
     def bad(self, row: int, column: str, message: str) -> BadInput:
-        """Return the error for a cell, which the caller raises."""
+        """Return an error about a cell."""
         place = f"line {self.lines[row]} (id {quoted(self.ids[row])})"
         where = f"{place}, {column}" if column else place
         file = self.files[row] if self.files else self.file
         return BadInput(f"{file}: {where}: {message}")
 
     def stack(self, prefix: str, names: tuple[str, ...], absent: float) -> NDArray:
-        """Stack columns ``prefix.name`` as (R, k); ``absent`` fills missing ones."""
+        """Return the columns ``prefix.name`` as an array (R, k).
+
+        Missing columns are filled with ``absent``.
+        """
         empty = np.full(len(self), absent)
         return np.column_stack([
             self.columns.get(f"{prefix}.{n}", empty) for n in names
@@ -84,7 +87,7 @@ def read_table(
 
     Args:
         path: a CSV file with a header.
-        robot: robot whose actuated joints may occur as columns.
+        robot: robot whose actuated joints are valid column names.
         dialect: format of the table.
         points: names of additional measured points.
 
@@ -92,7 +95,7 @@ def read_table(
         The table in SI units.
 
     Raises:
-        BadInput: the file is not a valid table; the message gives line and column.
+        BadInput: the file is not a valid table.
     """
     path = Path(path)
     lines, rows = _cells(path, dialect)
@@ -121,23 +124,23 @@ def read_table(
     for k, name in enumerate(header):
         if name not in _TEXTS:
             table.columns[name] = _numbers(table, robot, name, [row[k] for row in rows])
-    _check_labels(table)  # after the conversion, because that reports wrong formats
+    _check_labels(table)  # last, because a wrong format is reported first
     return table
 
 
 def join_tables(tables: Sequence[MeasurementTable]) -> MeasurementTable:
-    """Concatenate tables; a table without a column ``session`` forms one session.
+    """Concatenate measurement tables.
 
     Args:
-        tables: tables of one campaign, at least one.
+        tables: tables of one campaign.  A table without the column ``session`` is one
+            session.
 
     Returns:
-        The joined table.  If there are several tables, each label is prefixed with the
-        name of its file.
+        The joined table.  Each label is prefixed with the name of its file.  Missing
+        covariates and readings are NaN.
 
     Raises:
-        BadInput: a column other than a covariate is missing in one of the tables.
-            Missing covariates are filled with NaN.
+        BadInput: a column that must be in all tables is missing in one table.
     """
     if len(tables) == 1:
         return tables[0]
@@ -171,13 +174,13 @@ def join_tables(tables: Sequence[MeasurementTable]) -> MeasurementTable:
 
 
 def _cells(path: Path, dialect: Dialect) -> tuple[list[int], list[list[str]]]:
-    """Return the stripped cells of each row and the line number at which it ends."""
+    """Return the line number at which each row ends, and the cells of each row."""
     lines, rows = [], []
     text = io.StringIO(read_text(path), newline="")
     reader = csv.reader(text, delimiter=dialect.delimiter, strict=True)
     try:
         for row in reader:
-            if row:  # blank lines are skipped
+            if row:  # skip blank lines
                 lines.append(reader.line_num)
                 rows.append([cell.strip() for cell in row])
                 _check_printable(path, reader.line_num, rows)
@@ -187,7 +190,7 @@ def _cells(path: Path, dialect: Dialect) -> tuple[list[int], list[list[str]]]:
 
 
 def _check_printable(path: Path, line: int, rows: list[list[str]]) -> None:
-    """Reject control characters, including NUL, in the last row read."""
+    """Reject control characters in the last row."""
     header, row = rows[0], rows[-1]
     for k, cell in enumerate(row):
         if not cell.isprintable() and not printable(cell):
@@ -203,7 +206,7 @@ def _check_printable(path: Path, line: int, rows: list[list[str]]) -> None:
 def _header(
     path: Path, names: list[str], robot: Robot, points: tuple[str, ...]
 ) -> list[str]:
-    """Read the header and check that every name is a valid column name."""
+    """Return the column names after checking that all are valid."""
     q = [f"q.{f.name}" for f in robot.frames if f.actuated]
     groups: dict[str, tuple[str, ...]] = {
         "pose": POSE, "load": LOAD, "meas": READING, "sigma": READING,
@@ -213,7 +216,7 @@ def _header(
     known = [*_TEXTS, *q, *(f"{g}.{c}" for g, cs in groups.items() for c in cs)]
     known += ["cov.temperature", "cov.time", "cov.approach"]
     if not any(name in known or name.startswith("cov.") for name in names):
-        # The names are not printed, because the file may not be a table at all.
+        # The message does not contain the names, because the file may not be a table.
         raise BadInput(
             f"{path}: line 1: found no column of a table of "
             f"measurements{_other(names)}; expected id, q.<frame> or pose.tx "
@@ -238,7 +241,7 @@ def _header(
 
 
 def _passive(name: str, robot: Robot) -> str:
-    """Return why a joint cannot be commanded, or an empty text if it can."""
+    """Return why a joint cannot be commanded, or an empty text."""
     frames = {f"q.{f.name}": f for f in robot.frames}
     if name not in frames:
         return ""
@@ -247,7 +250,7 @@ def _passive(name: str, robot: Robot) -> str:
 
 
 def _other(names: list[str]) -> str:
-    """Return a hint if the header was read as a single cell."""
+    """Return a hint about a wrong delimiter if a row has only one cell."""
     for word, mark in DELIMITERS.items():
         if len(names) == 1 and mark in names[0]:
             return (f"; it contains {word}: if this separates the cells, set "
@@ -256,7 +259,7 @@ def _other(names: list[str]) -> str:
 
 
 def _dialect_hint(row: list[str], expected: int, dialect: Dialect) -> str:
-    """Return the likely cause if a row has the wrong number of cells."""
+    """Return a hint about a wrong delimiter if a row has too many cells."""
     if dialect.delimiter == "," and len(row) > expected:
         return (
             '; if the decimal mark is a comma, separate cells by ";" and set '
@@ -311,12 +314,12 @@ def _numbers(
 
 
 def _number_hint(name: str, cell: str, dialect: Dialect) -> str:
-    """Return the likely cause if a cell cannot be read as a number."""
+    """Return the likely mistake if a cell contains no valid number."""
     other = "," if dialect.decimal == "." else "."
     if other in cell and math.isfinite(parse_number(cell, other)):
         written = quoted(cell.replace(other, dialect.decimal))
         setting = f'decimal = "{other}" in campaign.toml'
-        # The decimal comma is written in quotes, because the delimiter is a comma too.
+        # The delimiter is also a comma.
         if other == dialect.delimiter:
             setting = f'delimiter = ";", {setting} and separate cells by ";"'
         return (
@@ -330,7 +333,7 @@ def _number_hint(name: str, cell: str, dialect: Dialect) -> str:
 
 
 def _unit_key(name: str, robot: Robot) -> str:
-    """Return the key of a column in ``[units]``; empty if it is dimensionless."""
+    """Return the key of a column in ``[units]``, or an empty text if it has no unit."""
     group, _, rest = name.partition(".")
     if group in {"meas", "sigma"}:
         turns = rest.rpartition(".")[2][0] == "r"

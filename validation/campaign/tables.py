@@ -1,6 +1,6 @@
 """Convert results for the rows of a campaign to labelled arrays.
 
-The arrays have the dimension ``row`` and are named after the columns of
+The arrays have the dimension ``row`` and the names of the columns in
 ``measurements.csv``.
 """
 
@@ -20,7 +20,7 @@ _UNITS = {"temperature": "K", "time": "s", "approach": "1"}
 
 
 def screw(words: str, meaning: str = "") -> Quantity:
-    """Describe a quantity whose values are small screws [rad, m]."""
+    """Describe a quantity whose values are small displacements [rad, m]."""
     return Quantity(words, "rad, m", ("screw",), meaning)
 
 
@@ -29,12 +29,12 @@ def row_dataset(
     values: Mapping[str, Any],
     labels: Mapping[str, Sequence[Any]] = NO_LABELS,
 ) -> "xarray.Dataset":
-    """Build a data set of arrays that contain one entry per row of a campaign.
+    """Return a data set of arrays with one entry for each row of a campaign.
 
     Args:
         campaign: campaign of R rows.
-        values: arrays as for :func:`forcefit.assembly.model.tables.labelled`; the first
-            axis of every array must have length R.
+        values: arrays as for :func:`forcefit.assembly.model.tables.labelled`. The first
+            axis of every array has length R.
         labels: labels of additional dimensions.
 
     Returns:
@@ -45,7 +45,7 @@ def row_dataset(
 
 
 def campaign_dataset(campaign: "Campaign") -> "xarray.Dataset":
-    """Convert a campaign's commands, loads, readings and covariates to a data set."""
+    """Convert commands, loads, readings and covariates to a data set."""
     moves = mobile(campaign.robot)
     units = _UNITS | dict(campaign.motion_units)
     at_point = "at the reference point, base axes"

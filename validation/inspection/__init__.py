@@ -1,4 +1,4 @@
-"""Determine which effects a campaign can reveal, before any diagnosis.
+"""Determine which effects can be detected with the design of a campaign.
 
 Start with ``inspection.py``.
 """

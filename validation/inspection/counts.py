@@ -7,13 +7,16 @@ from forcefit.validation.campaign.campaign import LOAD, READING, Campaign
 
 
 def row_counts(kinds: NDArray) -> dict:
-    """Return the number of kinds, and the minimum, median and maximum rows per kind."""
+    """Return the number of kinds of rows, and statistics of the rows per kind.
+
+    The statistics are the minimum, median and maximum number of rows.
+    """
     _, rows = np.unique(kinds, return_counts=True)
     return {"count": len(rows), "rows_each": [rows.min(), np.median(rows), rows.max()]}
 
 
 def load_counts(c: Campaign) -> dict:
-    """Summarise the levels, magnitudes and directions of the load."""
+    """Summarise the levels, magnitudes and components of the load."""
     force = np.linalg.norm(c.loads[:, 3:], axis=1)
     moment = np.linalg.norm(c.loads[:, :3], axis=1)
     pairs = np.unique(np.column_stack([c.configuration, c.repeat]), axis=0)
@@ -28,7 +31,7 @@ def load_counts(c: Campaign) -> dict:
 
 
 def reading_counts(c: Campaign) -> dict:
-    """Summarise the cells, deviations and sigma of each reading component."""
+    """Summarise the readings of each component and their sigma."""
     counts = {}
     for k, name in enumerate(READING):
         cells = c.cells[:, k]

@@ -1,4 +1,4 @@
-"""Write remarks about the effects that a campaign's design can and cannot reveal."""
+"""Write remarks about effects that cannot be detected with a campaign."""
 
 from itertools import combinations
 
@@ -14,23 +14,23 @@ from forcefit.validation.inspection.remark import CAREFUL, FINE, LOST, Remark
 from forcefit.validation.inspection.repeat_remarks import on_repeats
 from forcefit.validation.inspection.repeats import RepeatNoise
 
-# [1/K] Thermal expansion of aluminium; few engineering materials expand more.
+# [1/K] Thermal expansion coefficient of aluminium.
 _EXPANSION = 2.4e-5
 _TOGETHER = 0.9  # correlation above which two covariates cannot be distinguished
-# Larger deviations, relative to the robot's size, are unlikely manufacturing errors.
+# Largest plausible manufacturing error, relative to the size of the robot.
 _UNIT = 0.02
 
 
 def remarks_on(
     campaign: Campaign, repeats: Revisits, visits: Revisits, noise: RepeatNoise | None
 ) -> list[Remark]:
-    """Return all remarks about a campaign, beginning with those about lost information.
+    """Return all remarks about a campaign, those about lost information first.
 
     Args:
         campaign: campaign of R rows.
-        repeats: order of the repeats within the session.
-        visits: order of the configurations within the session.
-        noise: noise computed from the repeats; None without repeats.
+        repeats: measuring order of the repeats.
+        visits: measuring order of the configurations.
+        noise: noise computed from the repeats, None without repeats.
     """
     remarks = [
         *_on_readings(campaign), *_on_configurations(campaign, visits),
@@ -75,7 +75,7 @@ def _on_readings(campaign: Campaign) -> list[Remark]:
 
 
 def _on_configurations(campaign: Campaign, visits: Revisits) -> list[Remark]:
-    """Return remarks about joints that never move and about the measuring order."""
+    """Return remarks about joints that never move, and about the measuring order."""
     remarks = []
     robot = campaign.robot
     still = [
@@ -104,7 +104,7 @@ def _on_configurations(campaign: Campaign, visits: Revisits) -> list[Remark]:
 
 
 def _on_loads(campaign: Campaign) -> list[Remark]:
-    """Return remarks about load levels and about loads that depend on configuration."""
+    """Return remarks about the levels and directions of the load."""
     loads = campaign.loads
     if not loads.any():
         text = (
@@ -142,7 +142,7 @@ def _on_loads(campaign: Campaign) -> list[Remark]:
 
 
 def _on_temperature(campaign: Campaign) -> list[Remark]:
-    """Return remarks about whether thermal expansion can be detected."""
+    """Return remarks on whether thermal expansion can be detected."""
     temperature = campaign.covariates.get("temperature")
     if temperature is None:
         text = (
@@ -173,7 +173,7 @@ def _on_temperature(campaign: Campaign) -> list[Remark]:
 
 
 def _on_approach(campaign: Campaign) -> list[Remark]:
-    """Return remarks about whether friction can be detected."""
+    """Return remarks on whether friction can be detected."""
     side = campaign.covariates.get("approach")
     if side is None:
         text = "No cov.approach: friction can be neither found nor excluded."
@@ -194,7 +194,7 @@ def _on_approach(campaign: Campaign) -> list[Remark]:
 
 
 def _on_time(campaign: Campaign) -> list[Remark]:
-    """Return remarks about whether a drift can be detected."""
+    """Return remarks on whether a drift can be detected."""
     if np.ptp(campaign.covariates.get("time", np.zeros(1))) == 0.0:
         text = (
             "No cov.time, or the same in every row: a drift can be neither found nor "

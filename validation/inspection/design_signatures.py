@@ -1,4 +1,4 @@
-"""Compute how each library effect changes the readings of a campaign."""
+"""Compute how library effects change the readings of a campaign."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -20,22 +20,20 @@ from forcefit.validation.diagnosis.signatures import (
 )
 from forcefit.validation.inspection.repeats import slow_changes
 
-# Finite motions are omitted, because this effect has no unknowns and its exact model
-# takes seconds per row.
+# Finite motions are omitted, because their computation is slow.
 _NOT_COMPARED = tuple(name for name, effect in LIBRARY.items() if effect.finite)
 
 
 @dataclass(frozen=True, eq=False)
 class DesignSignatures:
-    """Changes of the readings caused by unknowns of plausible size, divided by sigma.
+    """Changes of the readings caused by plausible effects, divided by sigma.
 
     Attributes:
-        columns: mapping from each effect to (N, k) changes of the readings.  Each frame
-            has separate unknowns.  All joints have the same clearance, and the load
-            determines the position of each joint within its clearance.
-        nuisance: (N, p) changes caused by an unknown device pose (registration).
-        untestable: mapping from each effect without columns to the reason.
-        unregistered: reason why the registration cannot be estimated; empty if it can.
+        columns: mapping from each effect to the changes (N, k) caused by its unknowns.
+        nuisance: (N, p) changes caused by an unknown pose of the measuring device.
+        untestable: mapping from each effect that cannot be tested to the reason.
+        unregistered: reason why the pose of the device cannot be estimated, otherwise
+            empty.
     """
 
     columns: dict[str, NDArray]
@@ -49,8 +47,8 @@ def design_signatures(
 ) -> DesignSignatures:
     """Return the signatures of all library effects for a campaign.
 
-    Signatures are expressed in the axes of the measuring device, so an unknown device
-    pose is estimated first.  If it cannot be estimated, base axes are used instead.
+    Signatures are expressed in the axes of the measuring device.  An unknown pose of
+    the device is therefore estimated first.  If this is impossible, base axes are used.
 
     Args:
         campaign: campaign of N measured cells.
@@ -99,15 +97,16 @@ def design_signatures(
 def changes_between_repeats(
     campaign: Campaign, signatures: DesignSignatures
 ) -> dict[str, NDArray]:
-    """Return the columns of slow changes for :func:`.repeats.repeat_noise`.
+    """Return the changes that can occur between repeats.
 
     Args:
         campaign: campaign of N measured cells.
-        signatures: signatures of the library's effects for the campaign.
+        signatures: signatures of the library effects for the campaign.
 
     Returns:
-        The columns of :func:`forcefit.validation.inspection.repeats.slow_changes`, and
-        columns of thermal expansion and friction in each configuration.
+        Mapping from the name of each change to its columns.  The changes are those of
+        :func:`forcefit.validation.inspection.repeats.slow_changes`, thermal expansion
+        and friction.
     """
     slow = slow_changes(campaign)
     acts = {"temperature": "thermal_expansion", "approach": "friction_hysteresis"}
@@ -118,7 +117,10 @@ def changes_between_repeats(
 
 
 def _one_each(every: list[Hypothesis]) -> dict[str, Hypothesis]:
-    """Select one hypothesis per effect, the middle one of those with the most slots."""
+    """Return one hypothesis for each effect.
+
+    Among the hypotheses with the most parameters, the middle one is selected.
+    """
     hypotheses: dict[str, Hypothesis] = {}
     for name in dict.fromkeys(h.effect for h in every):
         of = [h for h in every if h.effect == name]
@@ -133,7 +135,7 @@ def _one_each(every: list[Hypothesis]) -> dict[str, Hypothesis]:
 
 
 def _at_plausible_sizes(tangents: Tangents, hypothesis: Hypothesis) -> NDArray:
-    """Return the changes (N, k) caused by each unknown at its plausible size."""
+    """Return the changes (N, k) caused by a plausible value of each unknown."""
     effect = LIBRARY[hypothesis.effect]
     shapes = {n: s.start for s in hypothesis.slots if s.shape for n in s.names}
     rest = {

@@ -1,4 +1,4 @@
-"""Inspect the content and the detectable effects of a campaign before a diagnosis."""
+"""Inspect the content of a campaign and its detectable effects."""
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
@@ -37,18 +37,17 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Inspection:
-    """Result of an inspection: the effects that a design can and cannot reveal.
+    """Result of the inspection of a campaign.
 
     Attributes:
         campaign: campaign of R rows.
         repeats: measuring order of rows with the same configuration and load.
         visits: measuring order of rows with the same configuration.
-        noise: noise computed from the repeats; None if no row was measured twice.
+        noise: noise computed from the repeats, None if no row was measured twice.
         signatures: signatures of the library effects.
-        separability: angles between the signatures.
-        remarks: remarks about the design, beginning with lost information.
-        open: (R,) bool, True for rows whose pose the declared clearances leave
-            undetermined.
+        separability: comparison of the signatures.
+        remarks: remarks about the design, those about lost information first.
+        open: (R,) mask of rows in which the pose is undetermined because of clearances.
     """
 
     campaign: Campaign
@@ -63,7 +62,7 @@ class Inspection:
     __repr__, _repr_html_ = short_repr, html_table
 
     def to_xarray(self) -> "xarray.Dataset":
-        """Convert to a data set over ``effect`` that states which are detectable."""
+        """Convert the detectability of each effect to a data set."""
         s, absent = self.separability, self.signatures.untestable
         no, unknown = [False] * len(absent), [np.nan] * len(absent)
         size = number("norm of the change of the readings, divided by sigma")
@@ -83,7 +82,7 @@ class Inspection:
         return frame_table(self.to_xarray(), "effect")
 
     def table(self) -> dict:
-        """Convert the inspection to plain values for JSON."""
+        """Convert to plain values for JSON."""
         c = self.campaign
         return {
             "campaign": c.name,
@@ -113,7 +112,7 @@ class Inspection:
         }  # fmt: skip
 
     def _effect_table(self) -> dict:
-        """Return the detectability of each effect as plain values."""
+        """Convert the detectability of each effect to plain values."""
         table: dict[str, dict] = {
             name: {"testable": False, "why": why}
             for name, why in self.signatures.untestable.items()
@@ -167,7 +166,7 @@ def inspect_campaign(
 
 
 def _noise_table(c: Campaign, noise: RepeatNoise | None) -> dict | None:
-    """Return the noise from repeats, the declared noise, and suspect readings."""
+    """Convert the noise estimated from repeats to plain values."""
     if noise is None:
         return None
     return {

@@ -1,8 +1,8 @@
-"""Determine when repeats were measured within a session.
+"""Determine the order in which repeats were measured.
 
 Repeats may be spread over the session or measured consecutively.  If the machine drifts
-slowly, consecutive repeats agree better with each other than with other rows.  Their
-scatter then underestimates the noise of the session, because it excludes the drift.
+slowly, consecutive repeats do not contain the drift.  Their scatter then underestimates
+the noise of the session.
 """
 
 from dataclasses import dataclass
@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from forcefit.validation.campaign.campaign import Campaign
 
-_FEW, _MOST = 0.2, 0.8  # limits of the fraction of consecutive repeats
-# Largest time span of a set that counts as consecutive, as a fraction of the session.
+_FEW, _MOST = 0.2, 0.8  # fractions of consecutive repeats that separate the orders
+# Smallest time span of interleaved repeats, as a fraction of the session.
 _SHORT = 0.1
 
 
@@ -22,13 +22,12 @@ class Revisits:
     """Measuring order of rows that were measured more than once.
 
     Attributes:
-        sets: number of sets.  A set consists of at least two rows of one kind, for
-            example all rows of one configuration.
+        sets: number of sets.  A set contains all rows of one kind, at least two.
         rows: number of rows in these sets.
         others: number of rows outside these sets.
         adjacent: fraction of repeats that directly follow a row of the same set.
         span: median time from the first to the last row of a set, as a fraction of the
-            duration of the session.
+            duration of the campaign.
     """
 
     sets: int
@@ -39,9 +38,10 @@ class Revisits:
 
     @property
     def order(self) -> str:
-        """``"interleaved"``, ``"back to back"``, ``"mixed"``, ``"all"``, ``"none"``.
+        """Order of the repeats as one word or phrase.
 
-        The value is ``"all"`` if the whole campaign is one set.
+        It is ``"interleaved"``, ``"back to back"``, ``"mixed"``, ``"all"`` if the whole
+        campaign is one set, or ``"none"`` without repeats.
         """
         if self.sets == 0:
             return "none"
@@ -59,10 +59,10 @@ def revisits(campaign: Campaign, kinds: NDArray) -> Revisits:
 
     Args:
         campaign: campaign of R rows, ordered by ``cov.time`` if it is recorded.
-        kinds: (R,) int, such as ``campaign.repeat`` or ``campaign.configuration``.
+        kinds: (R,) index of the kind of each row, such as ``campaign.repeat``.
     """
     clock = session_clock(campaign)
-    # All points of one measurement count as one row.
+    # All points of one measurement are treated as one row.
     visit = campaign.measured_at_once
     _, first = np.unique(np.column_stack([kinds, visit]), axis=0, return_index=True)
     kinds, clock, visit = kinds[first], clock[first], visit[first]
@@ -86,7 +86,7 @@ def revisits(campaign: Campaign, kinds: NDArray) -> Revisits:
 
 
 def session_clock(campaign: Campaign) -> NDArray:
-    """Return relative times (R,), from 0 at the first to 1 at the last measurement.
+    """Return relative times (R,), from 0 at the first to 1 at the last row.
 
     Args:
         campaign: campaign of R rows.  If ``cov.time`` is absent or constant, rows are

@@ -1,15 +1,15 @@
 r"""Plan a measurement campaign that discriminates between effects.
 
-An exchange algorithm selects rows from a pool of candidates so as to maximise
+An exchange algorithm selects rows from a set of candidate rows to maximise
 
     sum over e, f of ln(1 + l_ef),
-    l_ef = tr(S_ee - S_ef (S_ff + I)^-1 S_fe) / k_e,
+    l_ef = tr(S_ee - S_ef (S_ff + I)^-1 S_fe) / k_e.
 
-Here l_ef is the mean non-centrality of effect e if effect f is fitted instead.  This is
-the criterion of Atkinson and Fedorov, averaged over a normal prior.  The matrices S
-contain products of signatures, summed over the rows.  In each step, rows with the
-smallest derivative of the criterion with respect to their weight are exchanged for rows
-with the largest derivative.
+Here l_ef is the mean non-centrality of effect e with k_e unknowns if effect f is fitted
+instead.  This is the criterion of Atkinson and Fedorov, averaged over a normal prior.
+The matrices S contain inner products of signatures.  In each step, rows with a small
+derivative of the criterion with respect to their weight are exchanged for rows with a
+large derivative.
 
 Sources:
     Atkinson, Fedorov (1975), The design of experiments for discriminating between two
@@ -39,14 +39,14 @@ from forcefit.validation.synthetic.design import (
 )
 from forcefit.validation.synthetic.generator import Synthetic
 
-_POOL = 600  # number of candidate rows, of which some are chosen
-# Number of rows at either end of the ranking by derivative that exchanges involve.
+_POOL = 600  # smallest number of candidate rows
+# Number of rows to remove and of rows to add that are tried in each step.
 _TRIED = 4
-_BETTER = 1e-3  # smallest increase of the criterion for which rows are exchanged
-_AVERAGE = 20  # number of random plans for comparison
+_BETTER = 1e-3  # smallest increase of the criterion for an exchange of rows
+_AVERAGE = 20  # number of random plans with which the plan is compared
 _PACE = 60.0  # [s] assumed time to measure one row
-_SWING = 2400.0  # [s] assumed period of the temperature of a machine
-_FEWEST = 8  # minimum number of rows and configurations for held-out rows
+_SWING = 2400.0  # [s] assumed period of temperature changes
+_FEWEST = 8  # smallest number of rows of a plan
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,8 +59,8 @@ class Planned:
         design: varied quantities and their ranges.
         sigma: [rad, m] noise of the measuring device.
         effects: names of the compared effects.
-        apart: (e, e) [-] mean non-centrality of the row's effect if the column's effect
-            is fitted instead.  Each effect is scaled to an rms change of one sigma.
+        apart: (e, e) [-] mean non-centrality of effect i if effect j is fitted instead,
+            in element [i, j]. Each effect is scaled to an rms change of one sigma.
         random: (e, e) mean of ``apart`` over random plans of the same size.
     """
 
@@ -83,7 +83,7 @@ def plan_rows(
     Args:
         robot: declared robot.
         rows: number of rows to choose.
-        design: varied quantities, their ranges, and the configurations.
+        design: varied quantities and their ranges.
         sigma: [rad, m] noise of the measuring device.
         seed: random seed of the candidate rows.
         progress: function called with the number of finished effects and the total
@@ -93,16 +93,15 @@ def plan_rows(
         The plan.
 
     Raises:
-        BadInput: there are too few rows, the loops can be closed in hardly any
-            configuration, or no effect changes the readings.
+        BadInput: there are too few rows, the loops can be closed in too few
+            configurations, or no effect changes the readings.
     """
     if rows < _FEWEST:
         raise BadInput(f"--rows: found {rows}, expected at least {_FEWEST}")
     rng = np.random.default_rng(seed)
     count = max(_POOL, 4 * rows)
     pool = _pool(robot, replace(design, rows=count, corners=True), rows, rng)
-    # Clearances are omitted: computing the pose within them is slow and has little
-    # effect here.
+    # Clearances are omitted, because they hardly affect the plan.
     tight = without_joint_clearances(robot)
     campaign = rows_as_campaign(tight, pool, design, sigma)
     columns = {
@@ -134,8 +133,8 @@ def plan_rows(
 def _pool(
     robot: Robot, design: CampaignDesign, wanted: int, rng: np.random.Generator
 ) -> CampaignPlan:
-    """Return the candidate rows, spread over the expected duration of the campaign."""
-    # The temperature changes slowly, so rows at equal times have equal temperatures.
+    """Return the candidate rows with times and temperatures."""
+    # The temperature is a slow function of time.
     plan = plan_campaign(robot, design, rng)
     time = np.array([row.covariates["time"] for row in plan.rows])
     time = (time % (_PACE * wanted)).round(1)
@@ -155,7 +154,7 @@ def rows_as_campaign(
     robot: Robot, plan: CampaignPlan, design: CampaignDesign,
     sigma: tuple[float, float],
 ) -> Campaign:  # fmt: skip
-    """Return a plan as a campaign in which all readings are zero.
+    """Return a plan as a campaign with zero readings.
 
     Args:
         robot: declared robot.
@@ -183,7 +182,7 @@ def rows_as_campaign(
 
 
 def _alike(columns: NDArray) -> NDArray:
-    """Scale the columns of an effect to an rms of one sigma per reading."""
+    """Scale the columns of an effect to an rms of one sigma."""
     size = np.sqrt(np.mean(np.sum(columns**2, axis=1)))
     return columns / size
 
@@ -199,7 +198,7 @@ def _ordered(plan: CampaignPlan, chosen: NDArray) -> CampaignPlan:
 
 
 class _Criterion:
-    """Design criterion, and its derivatives with respect to the row weights."""
+    """Design criterion and its derivatives with respect to the row weights."""
 
     def __init__(self, blocks: list[NDArray], rows: int) -> None:
         begin = np.cumsum([0, *(X.shape[1] for X in blocks)])
@@ -211,7 +210,7 @@ class _Criterion:
         return self._value(chosen)[0]
 
     def _value(self, chosen: NDArray) -> tuple[NDArray, NDArray]:
-        """Return ``apart`` and the derivatives (rows,) with respect to the weights."""
+        """Return ``apart`` and the derivatives (rows,) of the criterion."""
         X = self._X[chosen].reshape(-1, self._X.shape[2])
         S = X.T @ X
         G, apart = np.zeros_like(S), np.full((len(self._own),) * 2, np.nan)
@@ -232,7 +231,7 @@ class _Criterion:
         return apart, slope
 
     def exchanged(self, start: NDArray) -> NDArray:
-        """Exchange single rows as long as the criterion increases."""
+        """Exchange rows one by one until the criterion no longer increases."""
         chosen = start.copy()
         apart, slope = self._value(chosen)
         best, going = _told(apart), True
@@ -253,7 +252,7 @@ class _Criterion:
 
 
 def _told(apart: NDArray) -> float:
-    """Return the criterion, the sum of ln(1 + l_ef), for given non-centralities."""
+    """Return the criterion for given non-centralities."""
     return float(np.nansum(np.log1p(apart)))
 
 

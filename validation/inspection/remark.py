@@ -1,7 +1,7 @@
-"""Define remarks about a campaign and their importance.
+"""Define remarks about a campaign.
 
-A remark has one of three levels: ``lost`` for information that no analysis can recover,
-``careful`` for a warning, and ``fine`` for an adequate aspect of the design.
+A remark has one of three levels.  ``lost`` means that no analysis can recover some
+information, ``careful`` is a warning, and ``fine`` means that the design is adequate.
 """
 
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ class Remark:
 
     Attributes:
         about: subject of the remark.
-        weight: ``"lost"``, ``"careful"`` or ``"fine"``.
+        weight: level of the remark, ``"lost"``, ``"careful"`` or ``"fine"``.
         text: the remark as a sentence.
     """
 

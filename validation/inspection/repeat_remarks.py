@@ -9,8 +9,8 @@ from forcefit.validation.inspection.measuring_order import Revisits, session_clo
 from forcefit.validation.inspection.remark import CAREFUL, FINE, LOST, Remark
 from forcefit.validation.inspection.repeats import MOST, RepeatNoise
 
-_FEW = 20  # degrees of freedom below which the uncertainty of the noise exceeds 30 %
-_SEVERAL = 4  # smallest number of suspect readings that suggests a common cause
+_FEW = 20  # degrees of freedom below which the estimated noise is uncertain
+_SEVERAL = 4  # smallest number of suspect readings that cause a remark
 
 
 def on_repeats(
@@ -20,8 +20,8 @@ def on_repeats(
 
     Args:
         campaign: campaign of R rows.
-        repeats: order of the repeats within the session.
-        noise: noise computed from the repeats; None without repeats.
+        repeats: measuring order of the repeats.
+        noise: noise computed from the repeats, None without repeats.
     """
     if noise is None:
         text = (
@@ -70,7 +70,7 @@ def on_repeats(
 
 
 def _on_suspects(campaign: Campaign, noise: RepeatNoise) -> list[Remark]:
-    """Return a remark about readings that deviate too much from their repeats."""
+    """Return remarks about readings that deviate too much from their repeats."""
     suspects = noise.suspects
     if len(suspects) < _SEVERAL:
         return []

@@ -1,9 +1,8 @@
 """Estimate the noise of machine and measuring device from repeated measurements.
 
-Rows of the same configuration and load form a set.  Residuals about the mean of a set
-contain noise and changes between the rows.  Changes with time, temperature and side of
-approach are fitted to all sets together and subtracted, so that drift does not count as
-noise.
+Rows with the same configuration and load form a set.  Deviations from the mean of a set
+contain noise and slow changes.  Changes with time, temperature and side of approach are
+fitted to all sets together and subtracted.
 
 ======  ============  ======  ========================================================
 symbol  code          shape   meaning
@@ -11,14 +10,14 @@ symbol  code          shape   meaning
 z       ``whitened``  (N,)    readings / declared sigma, measured cells by row
 B       ``slow``      (N, p)  columns of slow changes / sigma
 x                     (p,)    coefficients of the slow changes
-e       ``rest``      (N,)    z minus the mean of its set and the fitted B x
-h       ``leverage``  (N,)    weight of a cell in its fitted value
+e       ``rest``      (N,)    z minus the mean of the set and minus the fitted B x
+h       ``leverage``  (N,)    weight of a reading in its fitted value
 ======  ============  ======  ========================================================
 
 Sources:
-    Cook, Weisberg (1982), Residuals and influence in regression: the deleted residual e
-    / (s sqrt(1 - h)), with s computed without the cell, has Student's t distribution;
-    the largest of N is judged by Bonferroni's bound.
+    Cook, Weisberg (1982), Residuals and influence in regression.  The deleted residual
+    e / (s sqrt(1 - h)), with s computed without the cell, has Student's t distribution.
+    The largest of N residuals is tested with Bonferroni's bound.
 """
 
 from collections.abc import Iterable, Mapping
@@ -33,7 +32,7 @@ from forcefit.validation.campaign.campaign import READING, Campaign
 from forcefit.validation.diagnosis.separability import orthonormal_basis
 from forcefit.validation.inspection.measuring_order import session_clock
 
-_LEVEL = 0.01  # probability of a false alarm in data without blunders
+_LEVEL = 0.01  # probability of a false suspect in a campaign without blunders
 MOST = 20  # largest number of suspects
 
 
@@ -42,12 +41,11 @@ class Suspect:
     """A reading that deviates too much from its repeats.
 
     Attributes:
-        rows: row of the reading.  If the set consists of two rows, both are listed,
-            because either reading may be wrong.
+        rows: row of the reading.  In a set of two rows, both are suspect.
         component: component of the reading.
         size: [-] deleted residual (Student's t).
-        chance: probability that noise alone causes a residual this large anywhere in
-            the campaign.
+        chance: probability that noise alone causes such a large residual in the
+            campaign.
     """
 
     rows: tuple[int, ...]
@@ -65,15 +63,15 @@ class RepeatNoise:
             components.
         degrees: degrees of freedom of the ratio.
         interval: confidence interval of the ratio.
-        plain: the ratio before subtraction of slow changes.
-        taken_out: subtracted slow changes by name, each with the probability that noise
-            alone causes a change this large.
-        component: (6,) [rad, m] standard deviations; NaN for components without
+        plain: the ratio before slow changes are subtracted.
+        taken_out: mapping from each slow change to the probability that noise alone
+            causes such a large change.
+        component: (6,) [rad, m] standard deviations, NaN for components without
             repeats.
         component_degrees: (6,) degrees of freedom.
         component_interval: (6, 2) [rad, m] confidence intervals.
         suspects: readings that deviate too much from their repeats.  They are excluded
-            from all values above.
+            from all estimates.
     """
 
     ratio: float
@@ -90,15 +88,14 @@ class RepeatNoise:
 def repeat_noise(
     campaign: Campaign, slow: Mapping[str, NDArray] | None = None
 ) -> RepeatNoise | None:
-    """Return the noise estimated from repeats; None if no row was measured twice.
+    """Return the noise estimated from repeats, or None without repeats.
 
-    Slow changes are subtracted unless their fit would use up more than half of the
-    degrees of freedom.
+    Slow changes are subtracted if enough degrees of freedom remain.
 
     Args:
         campaign: campaign of N measured cells.
         slow: mapping from the name of each slow change to its columns (N, p), divided
-            by sigma; by default the result of :func:`slow_changes`.
+            by sigma.  None for the result of :func:`slow_changes`.
     """
     slow = slow_changes(campaign) if slow is None else slow
     suspects: list[Suspect] = []
@@ -116,16 +113,16 @@ def repeat_noise(
 
 
 def slow_changes(campaign: Campaign) -> dict[str, NDArray]:
-    """Return the columns of slow changes that are the same in every configuration.
+    """Return the columns of slow changes that do not depend on the configuration.
 
     Args:
         campaign: campaign of N measured cells.
 
     Returns:
-        Mapping from the name of each change to its columns (N, p), divided by sigma and
-        separate for each component.  The changes are an exponential settling and a
-        cubic function of time, and, where these vary, shifts with temperature and side
-        of approach.  If no time was recorded, rows are assumed to be equally spaced.
+        Mapping from the name of each change to its columns (N, p), divided by sigma.
+        Changes with time are an exponential and a cubic polynomial.  Changes with
+        temperature and side of approach are linear.  If no time was recorded, rows are
+        assumed to be equally spaced in time.
     """
     clock = 2 * session_clock(campaign) - 1
     shapes = {
@@ -142,7 +139,7 @@ def slow_changes(campaign: Campaign) -> dict[str, NDArray]:
 
 
 def for_each_component(campaign: Campaign, shapes: NDArray) -> NDArray:
-    """Return columns (N, 6 p), divided by sigma, with separate changes per component.
+    """Return columns (N, 6 p), divided by sigma, with a change of each component.
 
     Args:
         campaign: campaign of R rows and N measured cells.
@@ -155,13 +152,13 @@ def for_each_component(campaign: Campaign, shapes: NDArray) -> NDArray:
 
 
 def _sets(campaign: Campaign) -> NDArray:
-    """Return the set of repeats (N,) to which each measured cell belongs."""
+    """Return the index (N,) of the set of repeats of each measured cell."""
     row, component = np.nonzero(campaign.cells)
     return campaign.repeat[row] * 6 + component
 
 
 def _repeated_cells(campaign: Campaign, out: set[int]) -> NDArray:
-    """Return a mask (N,) of cells that are repeated in rows that are not excluded."""
+    """Return a mask (N,) of repeated cells, without the rows in ``out``."""
     row, _ = np.nonzero(campaign.cells)
     kept = ~np.isin(row, list(out))
     sets = _sets(campaign)
@@ -170,7 +167,7 @@ def _repeated_cells(campaign: Campaign, out: set[int]) -> NDArray:
 
 
 class _RepeatFit:
-    """Least-squares fit of set means and slow changes to repeated cells."""
+    """Least-squares fit of set means and slow changes to repeated readings."""
 
     def __init__(
         self, campaign: Campaign, cells: NDArray, slow: Mapping[str, NDArray]
@@ -201,7 +198,7 @@ class _RepeatFit:
         return columns - (sums / self.count[:, None])[self.set]
 
     def suspect(self) -> Suspect | None:
-        """Return the most deviating reading, or None if noise explains it."""
+        """Return the reading with the largest deviation, or None if it is plausible."""
         if self.degrees < 2 or self.rss == 0.0:
             return None
         free = np.maximum(1 - self.leverage, 1e-12)
@@ -218,7 +215,7 @@ class _RepeatFit:
         )
 
     def noise(self, suspects: list[Suspect]) -> RepeatNoise:
-        """Return the noise estimated from the repeats without suspect readings."""
+        """Return the noise estimated from the repeats."""
         free, rest = 1 - self.leverage, self.rest**2
         degrees = np.bincount(self.component, free, 6)
         cells = np.maximum(np.bincount(self.component, minlength=6), 1)
@@ -245,7 +242,7 @@ class _RepeatFit:
         )
 
     def _chance(self, name: str) -> float:
-        """Return the probability that noise alone causes a slow change this large."""
+        """Return the p-value of a slow change."""
         others = [B for key, B in self.slow.items() if key != name]
         basis = _basis(others, len(self.z))
         rest = self.z - basis @ (basis.T @ self.z)

@@ -62,7 +62,7 @@ def _texts(inspection: Inspection, weight: str) -> list[str]:
 
 
 def _verdict(inspection: Inspection) -> str:
-    """Summarise the detectable effects, the losses and the warnings in one sentence."""
+    """Summarise the inspection in one sentence."""
     seen, count = int(inspection.separability.visible.sum()), _library(inspection)
     text = f"The design can reveal {seen} of {count} library effects"
     counts = {
@@ -78,12 +78,12 @@ def _verdict(inspection: Inspection) -> str:
 
 
 def _library(inspection: Inspection) -> int:
-    """Return the total number of library effects."""
+    """Return the number of library effects."""
     return len(inspection.separability.names) + len(inspection.signatures.untestable)
 
 
 def _good(inspection: Inspection) -> bool | None:
-    """Return True, None if there are warnings, or False if no diagnosis is possible."""
+    """Return True for a good design, None for warnings, False for a useless design."""
     unregistered = bool(inspection.signatures.unregistered)
     if unregistered or not inspection.separability.visible.any():
         return False
@@ -91,7 +91,7 @@ def _good(inspection: Inspection) -> bool | None:
 
 
 def _tiles(inspection: Inspection) -> list[Tile]:
-    """Return tiles for the number of rows, the noise and the effects."""
+    """Return tiles about the rows, the noise and the effects."""
     s, noise = inspection.separability, inspection.noise
     tiles = [
         Tile("Rows", [str(len(inspection.campaign))],
@@ -141,7 +141,7 @@ def _effects(inspection: Inspection) -> str:
 
 
 def _distinguished(inspection: Inspection) -> str:
-    """Chart which effects imitate each other, and list indistinguishable effects."""
+    """Show in a chart and a list which effects can imitate each other."""
     s = inspection.separability
     texts = [f"{', '.join(group)} cannot be distinguished." for group in s.classes()]
     texts += [f"{b} can reproduce every effect of {a}." for a, b in s.imitated()]
@@ -152,7 +152,7 @@ def _distinguished(inspection: Inspection) -> str:
 
 
 def _readings(inspection: Inspection) -> str:
-    """Tabulate the size, declared sigma and noise of each measured component."""
+    """Tabulate the rms, declared sigma and noise of each measured component."""
     rows: Cells = []
     for k, one in enumerate(reading_counts(inspection.campaign).values()):
         if not one["measured"]:

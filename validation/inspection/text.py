@@ -40,7 +40,7 @@ def inspection_text(inspection: Inspection) -> str:
 
 
 def _separability_lines(inspection: Inspection) -> list[str]:
-    """Return lines about detectable and about indistinguishable effects."""
+    """Return lines about detectable effects and indistinguishable effects."""
     s = inspection.separability
     lines = ["Effects, at plausible sizes, in this design:"]
     shown = [n for n, seen in zip(s.names, s.visible, strict=True) if seen]
@@ -95,7 +95,7 @@ def _load_lines(c: Campaign) -> list[str]:
 
 
 def _covariate_lines(c: Campaign) -> list[str]:
-    """Return one line for each covariate, with its range."""
+    """Return one line with the range of each covariate."""
     return [
         f"{name}: {t['range'][0]:.4g} ... {t['range'][1]:.4g}, {t['levels']} levels"
         for name, t in covariate_counts(c).items()
@@ -103,7 +103,7 @@ def _covariate_lines(c: Campaign) -> list[str]:
 
 
 def _noise_lines(c: Campaign, noise: RepeatNoise | None) -> list[str]:
-    """Return lines about the noise from repeats and about suspect readings."""
+    """Return lines about the noise and about suspect readings."""
     if noise is None:
         return []
     low, high = noise.interval
