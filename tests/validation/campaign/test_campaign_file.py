@@ -1,4 +1,4 @@
-"""Reading of valid campaign folders and one-line errors for invalid ones."""
+"""Test the reading of valid and invalid campaign folders."""
 
 import math
 import re
@@ -13,8 +13,8 @@ from forcefit.validation.campaign.campaign_file import read_campaign
 from tests.campaigns_for_tests import ARM, HEAD, NOISE, ROWS, write_campaign
 
 
-def test_campaign_has_the_values_of_its_files(tmp_path):
-    """For two arms, x = cos q1 + 0.8 cos(q1 + q2), and y likewise."""
+def test_campaign_contains_the_values_of_its_files(tmp_path):
+    """The tool position of the planar arm is calculated by hand."""
     campaign = read_campaign(write_campaign(tmp_path / "first"))
     assert campaign.name == "first"
     assert campaign.ids == ("m1", "m2", "m3", "m4")
@@ -35,7 +35,7 @@ def test_campaign_has_the_values_of_its_files(tmp_path):
     assert not campaign.measured.flags.writeable
 
 
-def test_table_of_a_campaign_has_the_columns_of_its_file(tmp_path):
+def test_campaign_table_has_the_columns_of_the_file(tmp_path):
     pytest.importorskip("xarray")
     table = read_campaign(write_campaign(tmp_path)).to_pandas()
     assert list(table.index) == ["m1", "m2", "m3", "m4"]
@@ -51,7 +51,7 @@ def test_table_of_a_campaign_has_the_columns_of_its_file(tmp_path):
     assert (units["cov.time"], units["reading"]) == ("s", "rad, m")
 
 
-def test_selected_rows_keep_the_requested_order_and_their_configuration_numbers(
+def test_selected_rows_have_the_requested_order(
     tmp_path,
 ):
     campaign = read_campaign(write_campaign(tmp_path))
@@ -64,8 +64,8 @@ def test_selected_rows_keep_the_requested_order_and_their_configuration_numbers(
     assert len(campaign.take([])) == 0
 
 
-def test_commanded_poses_are_converted_to_the_commanded_joint_coordinates(tmp_path):
-    """The rows command the tool poses that result from the same joint values."""
+def test_commanded_poses_are_converted_to_joint_coordinates(tmp_path):
+    """The poses are computed from known joint coordinates."""
     joints = read_campaign(write_campaign(tmp_path / "joints"))
     tool = joints.transforms[:, joints.robot.index("tool")]
     rows = [
@@ -79,7 +79,7 @@ def test_commanded_poses_are_converted_to_the_commanded_joint_coordinates(tmp_pa
     np.testing.assert_array_equal(poses.configuration, joints.configuration)
 
 
-def test_campaign_of_a_machine_without_drives_has_one_configuration(tmp_path):
+def test_machine_without_drives_has_one_configuration(tmp_path):
     robot = 'name = "post"\nplatform = "top"\n[[frame]]\nname = "top"\n'
     robot += 'parent = "base"\ntranslation = [0, 0, 2]\n'
     folder = write_campaign(tmp_path, robot=robot, head="id,meas.tz,cov.temperature",
@@ -89,14 +89,14 @@ def test_campaign_of_a_machine_without_drives_has_one_configuration(tmp_path):
     np.testing.assert_array_equal(campaign.repeat, [0, 0])
 
 
-def test_labels_with_spaces_and_letters_of_any_script_are_read(tmp_path):
+def test_labels_may_contain_spaces_and_non_latin_letters(tmp_path):
     """Only control characters are rejected."""
     rows = [r.replace(f"m{k}", f"Übung\u00a0{k} é٣") for k, r in enumerate(ROWS, 1)]
     assert read_campaign(write_campaign(tmp_path, rows=rows)).ids[0].startswith("Ü")
 
 
-def test_declared_semicolons_decimal_commas_and_units_are_read(tmp_path):
-    """The same numbers in a different notation define the same campaign."""
+def test_declared_table_format_and_units_are_read(tmp_path):
+    """The same campaign is written with semicolons, decimal commas and other units."""
     plain = read_campaign(write_campaign(tmp_path / "plain"))
     in_mm = [
         "m1;5,729577951308232;11,459155902616464;0;0;0,01;0,02;0,03;1,5;0;1",
@@ -117,11 +117,11 @@ def test_declared_semicolons_decimal_commas_and_units_are_read(tmp_path):
         other.covariates["time"], plain.covariates["time"], rtol=1e-12
     )
     np.testing.assert_array_equal(other.repeat, plain.repeat)
-    np.testing.assert_array_equal(other.sigma, plain.sigma)  # [noise] is always SI
+    np.testing.assert_array_equal(other.sigma, plain.sigma)  # [noise] has SI units
 
 
 def test_measured_motion_is_converted_to_si_units(tmp_path):
-    """An inclinometer in urad, a distance in mm; other covariates keep their unit."""
+    """The motions are in urad and mm.  Other covariates are not converted."""
     head, extra = f"{HEAD},cov.tilt,cov.gap,cov.bed", "[units]\ncov.tilt = 'urad'\n"
     rows = [f"{row},3,{k},5" for k, row in enumerate(ROWS)]
     folder = write_campaign(tmp_path, head, rows, extra=f"{extra}cov.gap = 'mm'\n")
@@ -133,7 +133,7 @@ def test_measured_motion_is_converted_to_si_units(tmp_path):
     assert campaign.take([0]).motion_units == campaign.motion_units
 
 
-def test_byte_order_mark_and_carriage_returns_are_accepted(tmp_path):
+def test_table_may_have_byte_order_mark_and_carriage_returns(tmp_path):
     folder = write_campaign(tmp_path)
     table = folder / "measurements.csv"
     text = table.read_text().replace("\n", "\r\n") + "\r\n\r\n"
@@ -142,14 +142,14 @@ def test_byte_order_mark_and_carriage_returns_are_accepted(tmp_path):
     assert len(read_campaign(folder / "campaign.toml")) == 4
 
 
-def test_sigma_of_a_row_replaces_the_sigma_of_the_device(tmp_path):
+def test_sigma_column_replaces_sigma_of_the_device(tmp_path):
     rows = ["a,0,0,1e-5,2e-5,3e-6,", "b,0,0,1e-5,,,"]
     head = "id,q.one,q.two,meas.tx,meas.ty,sigma.tx,sigma.ty"
     sigma = read_campaign(write_campaign(tmp_path, head=head, rows=rows)).sigma
     np.testing.assert_array_equal(sigma[:, 3:5], [[3e-6, 5e-6], [5e-6, 5e-6]])
 
 
-def test_unknown_registration_allows_large_positions_but_not_rotations(tmp_path):
+def test_unknown_device_pose_permits_large_positions(tmp_path):
     rows = ["a,0,0,1,2,3,-5.5,10,2,0,0,1"]
     head = "id,q.one,q.two,meas.rx,meas.ry,meas.rz,meas.tx,meas.ty,meas.tz,"
     head += "cov.temperature,cov.time,cov.approach"
@@ -281,7 +281,7 @@ def test_invalid_campaign_file_is_rejected_in_one_line(case, tmp_path):
     assert "\n" not in str(caught.value)
 
 
-def test_message_about_a_file_of_another_kind_does_not_print_its_content(tmp_path):
+def test_message_about_another_kind_of_file_omits_its_content(tmp_path):
     folder = write_campaign(tmp_path)
     (folder / "measurements.csv").write_text("root:secret:0:0\nother:words\n")
     with pytest.raises(BadInput, match="found no column") as caught:
@@ -294,15 +294,14 @@ def test_missing_folder_is_rejected(tmp_path):
         read_campaign(tmp_path / "gone")
 
 
-def test_invalid_robot_file_of_a_campaign_is_rejected_by_name(tmp_path):
+def test_invalid_robot_file_of_a_campaign_is_rejected(tmp_path):
     folder = write_campaign(tmp_path, robot=ARM.replace("one", "base", 1))
     with pytest.raises(BadInput, match=r"robot.toml: frame"):
         read_campaign(folder)
 
 
-def test_campaign_files_of_the_docs_are_read(tmp_path):
-    """Combine all blocks of the page: irsbot2 at 100 mm, with 10 N written as 0,01
-    kN."""
+def test_examples_in_the_documentation_are_read(tmp_path):
+    """All examples on the page are combined to one file."""
     docs = Path(__file__).parents[3] / "docs" / "campaigns.md"
     blocks = re.findall(r"```toml\n(.*?)```", docs.read_text("utf-8"), flags=re.S)
     assert len(blocks) == 3
@@ -325,8 +324,8 @@ def test_campaign_files_of_the_docs_are_read(tmp_path):
 POINTS = "[points]\nA = [0.1, 0, 0]\nB = [0, 0.2, 0]\n"
 
 
-def test_row_of_several_points_becomes_a_row_for_each_point(tmp_path):
-    """A point on the tool moves with it, so its nominal position follows by hand."""
+def test_campaign_has_a_row_for_each_measured_point(tmp_path):
+    """The nominal positions of the points are calculated by hand."""
     head = "id,q.one,q.two,session,meas.A.tx,meas.A.ty,meas.B.tx,meas.tz"
     rows = ["m1,0.1,0.2,a,1e-5,2e-5,3e-5,4e-5", "m2,0.1,0.2,b,,,5e-5,"]
     campaign = read_campaign(write_campaign(tmp_path, head, rows, extra=POINTS))
@@ -342,13 +341,13 @@ def test_row_of_several_points_becomes_a_row_for_each_point(tmp_path):
         [0, 0.2, 0],
         [0, 0.2, 0],
     ]
-    # another point, another session: no repeat
+    # Rows with different points or sessions are not repeats.
     assert campaign.repeat.tolist() == [0, 1, 2, 3]
     assert campaign.configuration.tolist() == [0, 0, 0, 0]
     assert campaign.take([3]).targets.tolist() == [[0, 0.2, 0]]
 
 
-def test_each_of_several_tables_becomes_a_session(tmp_path):
+def test_each_of_several_tables_is_a_session(tmp_path):
     folder = write_campaign(tmp_path, toml={"measurements": '["a.csv", "b.csv"]'})
     (folder / "a.csv").write_text(f"{HEAD}\n{ROWS[0]}\n")
     (folder / "b.csv").write_text(f"{HEAD}\n{ROWS[1]}\n{ROWS[2]}\n")

@@ -1,7 +1,7 @@
-"""Damaged campaign files are either read or rejected in one line.
+"""Test that damaged campaign files are read or rejected with one line of text.
 
-Every run uses the same hundred cases of each kind; see ``benchmarks/fuzz.py`` for
-thousands.
+Each test uses 100 or 200 random cases.  The script ``benchmarks/fuzz.py`` tests more
+cases.
 """
 
 import numpy as np
@@ -46,7 +46,7 @@ TOML = (
 
 
 def assert_one_line(error, folder):
-    """Check that the message is one line and names a file of the folder."""
+    """Check that the message is one line that begins with the path of the folder."""
     text = str(error)
     assert text.startswith(str(folder))
     assert all(c >= " " for c in text)
@@ -54,7 +54,7 @@ def assert_one_line(error, folder):
 
 
 def assert_read_or_says_why(folder):
-    """Read a campaign and check its arrays, or check the message."""
+    """Check the arrays of a campaign, or the message if it cannot be read."""
     try:
         campaign = read_campaign(folder)
     except BadInput as error:
@@ -75,9 +75,7 @@ def assert_read_or_says_why(folder):
     ),
     registration=st.sampled_from(["known", "unknown"]),
 )
-def test_table_with_unusual_cells_is_read_or_rejected_in_one_line(
-    changes, registration, tmp_path
-):
+def test_table_with_unusual_cells_is_read_or_rejected(changes, registration, tmp_path):
     table = [line.split(",") for line in TEXT.splitlines()]
     for row, column, cell in changes:
         table[row][column] = cell
@@ -90,7 +88,7 @@ def test_table_with_unusual_cells_is_read_or_rejected_in_one_line(
 
 @st.composite
 def garbled(draw, text):
-    """Return the bytes of a file with some of them removed, repeated or replaced."""
+    """Return the bytes of a file, with random bytes removed, repeated or replaced."""
     content = text.encode()
     for _ in range(draw(st.integers(1, 4))):
         start = draw(st.integers(0, max(0, len(content) - 1)))
@@ -110,9 +108,7 @@ def garbled(draw, text):
     file=st.sampled_from([("measurements.csv", TEXT), ("campaign.toml", TOML)]),
     data=st.data(),
 )
-def test_garbled_bytes_of_a_campaign_are_read_or_rejected_in_one_line(
-    file, data, tmp_path
-):
+def test_damaged_campaign_file_is_read_or_rejected(file, data, tmp_path):
     name, text = file
     folder = write_campaign(tmp_path)
     (folder / name).write_bytes(data.draw(garbled(text)))
@@ -120,7 +116,7 @@ def test_garbled_bytes_of_a_campaign_are_read_or_rejected_in_one_line(
 
 
 def test_undamaged_campaign_is_read(tmp_path):
-    """This ensures that the damaged files have no other defect."""
+    """The file that other tests damage is valid."""
     folder = write_campaign(tmp_path)
     (folder / "campaign.toml").write_text(TOML)
     assert len(read_campaign(folder)) == 4

@@ -1,4 +1,4 @@
-"""Candidate functions: columns, parameters and variables."""
+"""Test candidate functions and the variables on which they can depend."""
 
 from dataclasses import replace
 
@@ -27,8 +27,8 @@ def one_at(components):
     return Candidate((part,), "screw", LINE)
 
 
-def test_components_below_their_deviation_are_omitted():
-    """Parameters of a single component have no prefix."""
+def test_fitted_function_omits_components_without_influence():
+    """The names of its parameters have no prefix if one component remains."""
     conditions = conditions_of(bar())
     s = Sensitivities(conditions, responses(conditions))
     _, mixed = s.basis(("q.drive",), LINE)
@@ -44,9 +44,8 @@ def test_components_below_their_deviation_are_omitted():
 
 
 @pytest.mark.parametrize("axis", range(6))
-def test_sensitivity_of_a_component_depends_on_its_place(axis):
-    """A base rotates the tip about its origin, and a spring deforms under its
-    wrench."""
+def test_sensitivities_agree_with_hand_calculation(axis):
+    """The locations are the base, the reading and the drive of a loaded bar."""
     campaign = bar([0.3, -0.2, 3.0, 1.0, 5.0, -2.0], link=BEAM)
     conditions = conditions_of(campaign)
     response = responses(conditions)
@@ -57,7 +56,7 @@ def test_sensitivity_of_a_component_depends_on_its_place(axis):
     np.testing.assert_allclose(s.sensitivity("base", name, "screw"), unit, atol=1e-8)
     read = s.sensitivity("reading", name, "screw")
     assert read.tolist() == np.tile(np.eye(6)[axis], (8, 1)).tolist()
-    # The drive is at the base origin, in base axes.
+    # The drive frame coincides with the base frame.
     np.testing.assert_allclose(s.sensitivity("drive", name, "screw"), unit, atol=1e-8)
     load = np.tile(campaign.loads[0], (8, 1))
     load[:, :3] += np.cross(place, load[:, 3:])
@@ -65,8 +64,8 @@ def test_sensitivity_of_a_component_depends_on_its_place(axis):
     np.testing.assert_allclose(soft, load[:, axis, None] * unit, atol=1e-7)
 
 
-def test_variables_vary_and_are_known_in_every_row():
-    """Constant loads, incomplete temperatures and zero times are not variables."""
+def test_constant_or_incomplete_quantities_are_not_variables():
+    """A function can depend only on quantities that vary and are always known."""
     varying = np.linspace(-1.0, 0.5, 8)
     lacking = np.where(np.arange(8) == 3, np.nan, varying)
     conditions = conditions_of(bar(
@@ -100,8 +99,8 @@ rotation = [0.0, -1.5707963267948966, 0.0]
 """
 
 
-def test_positions_and_loads_that_vary_by_round_off_are_not_variables(tmp_path):
-    """A slide is rotated by pi / 2, whose cosine is 6e-17 in floating point."""
+def test_quantities_that_vary_only_by_round_off_are_not_variables(tmp_path):
+    """The slide is rotated by pi/2, whose cosine is 6e-17 in floating point."""
     (tmp_path / "slide.toml").write_text(SLIDE)
     x = np.linspace(0.0, 0.5, 9).round(3)
     lines = [f"m{i},{a},{5 * a},{1e-17 * a}" for i, a in enumerate(x)]

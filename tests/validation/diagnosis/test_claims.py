@@ -1,4 +1,4 @@
-"""Effects that the readings support, compared with closed forms for a bar."""
+"""Test which effects are claimed, with analytical solutions for a bar."""
 
 from dataclasses import replace
 
@@ -29,7 +29,7 @@ from tests.planar_arm_for_tests import SIGMA
 
 SURE = norm.isf(
     0.5e-3
-)  # standard deviations exceeded by chance once in a thousand cases
+)  # quantile of the normal distribution for a two-sided p-value of 0.001
 
 
 def first(fit):
@@ -38,10 +38,8 @@ def first(fit):
 
 @pytest.mark.parametrize(("times", "claimed"), [(0.98, False), (1.02, True)])
 @pytest.mark.parametrize("sign", [1, -1])
-def test_length_error_is_reported_at_a_significance_of_one_in_a_thousand(
-    times, claimed, sign
-):
-    """Its standard deviation is sigma / sqrt(8), from eight readings along the bar."""
+def test_length_error_is_claimed_for_p_values_below_0_001(times, claimed, sign):
+    """The length is the mean of eight readings, so its std is sigma / sqrt(8)."""
     length = sign * times * SURE * SIGMA[3] / np.sqrt(8)
     plain = bar(link=BEAM)
     fit = machine(bar(link=BEAM, measured=fit_of(plain, length)), LONGER)
@@ -49,8 +47,8 @@ def test_length_error_is_reported_at_a_significance_of_one_in_a_thousand(
     assert first(fit) == claimed
 
 
-def test_drive_that_rotates_against_its_load_has_no_identified_compliance():
-    """The compliance is at its lower bound, zero, and no parameter is reported."""
+def test_negative_drive_compliance_is_not_claimed():
+    """A drive that rotates against its load has a compliance at the bound of zero."""
     seen = np.tile([0, 0, -3e-4, 0, 0, 0], (8, 1))
     fit = machine(bar([0, 0, 30.0, 0, 0, 0], seen), SOFTER, start=1e-6)
     assert fit.x == pytest.approx([0.0], abs=1e-9)
@@ -61,7 +59,7 @@ def test_drive_that_rotates_against_its_load_has_no_identified_compliance():
 
 
 def test_effect_at_its_bound_is_not_supported():
-    """The bound is 5e-4 per kelvin, which no material reaches."""
+    """The upper bound of thermal expansion is 5e-4 per kelvin."""
     heat = {"temperature": np.full(8, 5.0)}
     plain = bar(link=BEAM, **heat)
     most = 5e-4 * LENGTH * 5.0
@@ -74,7 +72,7 @@ def test_effect_at_its_bound_is_not_supported():
 
 @pytest.mark.parametrize(("value", "claimed"), [(1.5, True), (1.05, False)])
 def test_exponent_at_its_bound_is_not_supported(value, claimed):
-    """The exponent is that of a contact."""
+    """The effect is a contact law whose exponent is a shape parameter."""
     slots = (
         Slot(("drive.give",), Unknown("give", 1e-6, 0.0, 1.0), 0.0),
         Slot(("drive.exponent",), Unknown("exponent", 0.5, 1.05, 6.0), 1.5, True),
@@ -88,7 +86,7 @@ def test_exponent_at_its_bound_is_not_supported(value, claimed):
     assert supported(fit, one) == claimed
 
 
-def test_parameterless_effects_and_device_frames_are_always_supported():
+def test_device_pose_and_effects_without_parameters_are_always_supported():
     fit = machine(bar(link=BEAM), LONGER)
     assert not first(fit)
     finite = Acting(Hypothesis("geometric_stiffening", (), ()), np.zeros(0))
@@ -97,7 +95,7 @@ def test_parameterless_effects_and_device_frames_are_always_supported():
 
 
 def softer(robot, x, variance):
-    """Return a fit of 1 / factor - 1 for the link's modulus."""
+    """Return a fit of a modulus factor with the fitted unknown x = 1 / factor - 1."""
     one = hypothesis("modulus_scale", "tip", "tip.softer", Unknown("softer", 0.1))
     unknowns = Unknowns(robot, (Acting(one, np.zeros(1)),))
     C, nothing = np.array([[variance]]), np.zeros((0, 1))
@@ -105,15 +103,12 @@ def softer(robot, x, variance):
 
 
 @pytest.mark.parametrize(("declared", "value", "std"), [
-    # 0.9 of a factor of 0.8 is 0.72, with 0.8 times the uncertainty.
+    # The declared factor of 0.8 is multiplied by the identified factor of 0.9.
     (0.8, 0.72, 0.8 * 0.81 * 1e-3),
     (None, 0.9, 0.81 * 1e-3),
 ])  # fmt: skip
-def test_stated_deviation_is_that_of_the_factor_instead_of_the_fitted_unknown(
-    declared, value, std
-):
-    """The fitted unknown is 1 / factor - 1, so the deviation of a factor f is f^2 times
-    that of the unknown."""
+def test_standard_deviation_of_a_modulus_factor_is_transformed(declared, value, std):
+    """For x = 1 / f - 1, the standard deviation of f is f^2 times that of x."""
     robot = bar(link=BEAM).robot
     if declared is not None:
         robot = replace(robot, effects={"modulus_scale": {"tip": declared}})
@@ -123,16 +118,16 @@ def test_stated_deviation_is_that_of_the_factor_instead_of_the_fitted_unknown(
     assert sigma == pytest.approx(std, rel=1e-6)
 
 
-def test_parameter_without_readings_is_not_reported():
-    """Its standard deviation is that of the prior."""
+def test_parameter_that_readings_do_not_determine_is_not_reported():
+    """The posterior standard deviation of such a parameter equals that of the prior."""
     robot = bar(link=BEAM).robot
     prior = softer(robot, 0.0, 1.0).unknowns.std[0] ** 2
     assert numbers(softer(robot, 0.0, prior)) == []
     assert len(numbers(softer(robot, 0.0, 0.5 * prior))) == 1
 
 
-def test_negative_compliance_is_bounded_at_zero():
-    """A drive that rotates against its moment has zero compliance."""
+def test_fitted_spring_compliance_is_not_negative():
+    """The drive rotates against its moment."""
     M = 30.0
     seen = np.tile([0, 0, -M / 1e5, 0, 0, 0], (8, 1))
     campaign = bar(
@@ -147,8 +142,8 @@ def test_negative_compliance_is_bounded_at_zero():
     assert np.array_equal(declared, found)
 
 
-def test_nuisance_parameters_equal_ridge_regression():
-    """The estimate is the mean of eight readings along the bar, shrunk by the prior."""
+def test_geometric_error_agrees_with_ridge_regression():
+    """The estimate is the mean of eight readings, multiplied by a shrinkage factor."""
     size, std = 3e-6, 2e-6
     plain = bar(link=BEAM)
     campaign = bar(link=BEAM, measured=fit_of(plain, size))

@@ -1,4 +1,4 @@
-"""The command ``validation diagnose``: output files and error messages."""
+"""Test the output files and error messages of ``validation diagnose``."""
 
 import json
 
@@ -16,7 +16,7 @@ from tests.planar_arm_for_tests import measure
 
 @pytest.fixture(scope="module")
 def small(tmp_path_factory):
-    """A folder with an offset of 5e-5 rad, in which only positions were measured."""
+    """Campaign with an encoder offset of 5e-5 rad and measured positions."""
     folder = tmp_path_factory.mktemp("small") / "campaign"
     measure(folder, configurations=10, passes=3, offset=(0, 8e-5))
     path = folder / "measurements.csv"
@@ -27,7 +27,7 @@ def small(tmp_path_factory):
     return folder
 
 
-def test_diagnose_writes_results_report_and_robot(small, tmp_path, run):
+def test_diagnose_writes_results_a_report_and_a_robot(small, tmp_path, run):
     out = {name: tmp_path / name for name in ("d.json", "d.html", "robot.toml")}
     status, printed, err = run(
         "validation", "diagnose", small, "--json", out["d.json"],
@@ -59,11 +59,11 @@ def test_diagnose_writes_results_report_and_robot(small, tmp_path, run):
     placed = place_robot(campaign.robot, joints={"one": q[0], "two": q[1]})
     declared = as_declared(placed, campaign.loads[0])
     fitted = predict(apply_effects(declared, {effect: values})).deviation[0]
-    assert solved == pytest.approx(fitted, abs=1e-9)  # the reading turns finitely
+    assert solved == pytest.approx(fitted, abs=1e-9)  # second-order rotations differ
     assert np.abs(fitted - predict(declared).deviation[0]).max() > 1e-5
 
 
-def test_diagnose_does_not_save_a_robot_if_no_effect_is_identified(tmp_path, run):
+def test_diagnose_saves_no_robot_without_identified_effects(tmp_path, run):
     folder = measure(tmp_path / "campaign", configurations=8, passes=3)
     status, _, err = run(
         "validation", "diagnose", folder, "--save", tmp_path / "r.toml"
@@ -73,7 +73,7 @@ def test_diagnose_does_not_save_a_robot_if_no_effect_is_identified(tmp_path, run
     assert not (tmp_path / "r.toml").exists()
 
 
-def test_diagnose_rejects_invalid_outputs_before_any_computation(tmp_path, small, run):
+def test_diagnose_rejects_invalid_output_paths_before_computing(tmp_path, small, run):
     folder = tmp_path / "folder.toml"
     folder.mkdir()
     for words, told in (

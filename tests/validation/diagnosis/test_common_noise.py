@@ -1,4 +1,4 @@
-"""Diagnosis with noise common to the points of one measurement."""
+"""Test diagnoses with noise that is common to the points of one measurement."""
 
 from dataclasses import replace
 
@@ -26,7 +26,7 @@ DESIGN = CampaignDesign(
 
 
 def three_points(visits=VISITS, **covariates):
-    """The bar with three points of its tip measured together, noise of 5 um each."""
+    """Return a campaign in which three points of a bar are measured together."""
     rows = 3 * visits
     single = bar(link=BEAM, rows=visits, spread=6.0)
     measured = np.zeros((rows, 6))
@@ -50,7 +50,7 @@ def columns():
 
 
 def moved(campaign, sizes, rng):
-    """Return readings (R, 6) [m] with a random platform motion in each measurement."""
+    """Return readings (R, 6) [m] of a random platform motion in each measurement."""
     turn, shift = (
         size * rng.normal(size=(len(campaign), 3))[campaign.measured_at_once]
         for size in sizes
@@ -68,7 +68,7 @@ def found(columns, readings, seed, device=DEVICE):
     return select(columns, z, np.ones(len(z), dtype=bool))
 
 
-# Device 0.5 um, machine 5 um, stated 5 um: all of the noise is common to the points.
+# Small device noise means that nearly all noise is common to the points.
 @pytest.mark.parametrize(("device", "sizes"), [
     (DEVICE, (2e-4, 2e-5)), (DEVICE, (0.0, 0.0)),
     pytest.param(0.1 * DEVICE, (5e-5, 5e-6), marks=pytest.mark.slow),
@@ -79,14 +79,13 @@ def found(columns, readings, seed, device=DEVICE):
 def test_common_noise_is_identified_with_its_standard_deviations(
     columns, device, sizes
 ):
-    """60 measurements of three components determine a standard deviation to 5 %; the
-    tolerance is 25 %."""
+    """The standard error from 60 measurements is about 5 %."""
     rng = np.random.default_rng([7, 1])
     selected = found(columns, moved(CAMPAIGN, sizes, rng), 7, device)
     assert selected.hypotheses == selected.functions == ()
     for seen, true in zip(selected.noise.common, sizes, strict=True):
         assert seen == pytest.approx(true, rel=0.25)
-    # The prior of the stated sigma counts as 20 of 540 cells.
+    # The prior of tau has the weight of 20 of the 540 cells.
     assert device / DEVICE - 0.2 < selected.noise.tau < device / DEVICE + 0.25
     told = [s for s in selected.noise.findings if "common to the points" in s]
     assert len(told) == any(sizes)
@@ -94,8 +93,8 @@ def test_common_noise_is_identified_with_its_standard_deviations(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
-def test_length_error_is_identified_in_the_presence_of_common_noise(columns, seed):
-    """Its uncertainty is that of the mean of 60 measurements instead of 180 points."""
+def test_length_error_is_identified_despite_common_noise(columns, seed):
+    """Its uncertainty follows from the mean of 60 measurements."""
     true = 2e-5
     rng = np.random.default_rng([seed, 2])
     readings = moved(CAMPAIGN, (0.0, 2e-5), rng)
@@ -106,9 +105,8 @@ def test_length_error_is_identified_in_the_presence_of_common_noise(columns, see
     assert selected.values[0] == pytest.approx(true, abs=3.5 * std)
 
 
-def test_fit_counts_common_noise_once_per_measurement():
-    """The variance of a length is (c^2 + sigma^2 / 3) / measurements,
-    for a common shift c."""
+def test_variance_of_a_length_includes_common_noise():
+    """For common noise c of three points, it is (c^2 + sigma^2 / 3) / measurements."""
     c = 3 * DEVICE
     common = np.zeros((len(CAMPAIGN), 6, 3))
     common[:, 3:] = c * np.eye(3)
@@ -120,8 +118,8 @@ def test_fit_counts_common_noise_once_per_measurement():
 
 
 @pytest.mark.parametrize("repeats", [True, False])
-def test_deviation_common_to_all_repeats_is_a_lack_of_fit(repeats):
-    """The deviation is a motion that is equal in all repeats of a command."""
+def test_motion_that_repeats_with_the_command_is_lack_of_fit(repeats):
+    """A platform motion that differs between repeats is noise."""
     rng = np.random.default_rng(3)
     campaign = three_points(80)
     visit = campaign.measured_at_once
@@ -138,7 +136,7 @@ def test_deviation_common_to_all_repeats_is_a_lack_of_fit(repeats):
     assert lack.significant == repeats
 
 
-# Complete diagnoses of machines simulated by a different program.
+# The following tests diagnose machines that were simulated with another program.
 
 
 def diagnosed(robot, wanted, seed, folder):
@@ -148,15 +146,14 @@ def diagnosed(robot, wanted, seed, folder):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(10))
-def test_poor_repeatability_alone_does_not_lead_to_a_reported_effect(seed, tmp_path):
+def test_poor_repeatability_is_not_reported_as_an_effect(seed, tmp_path):
     robot = with_errors(arm()) if seed % 2 else without_clearance(three_rrr())
     _, diagnosis = diagnosed(robot, {}, seed, tmp_path)
     assert diagnosis.verdict == "none_needed"
     assert diagnosis.claimed == ()
     assert not diagnosis.fit.unknowns.functions
     sizes = table(diagnosis)["noise_scale"]["common"]
-    # 96 measurements of three components determine each to 4 %; tolerance four times
-    # that.
+    # The standard errors are about 4 %.
     assert sizes["rotation"] == pytest.approx(MACHINE[0], rel=0.2)
     assert sizes["translation"] == pytest.approx(MACHINE[3], rel=0.2)
     assert "noise common to the points of a row" in diagnosis.summary()
@@ -164,9 +161,8 @@ def test_poor_repeatability_alone_does_not_lead_to_a_reported_effect(seed, tmp_p
 
 
 @pytest.mark.slow
-def test_intervals_cover_the_true_values_in_the_presence_of_common_noise(tmp_path):
-    """For an encoder offset in twelve campaigns, at least 8 of the 90 % intervals cover
-    it."""
+def test_confidence_intervals_include_the_true_value_despite_common_noise(tmp_path):
+    """At least 8 of 12 intervals with a confidence of 90 % include the true value."""
     covers, hidden = 0, [(Hidden("encoder_offset", {"j2": 1e-4}), 5.0)]
     for seed in range(12):
         made, diagnosis = diagnosed(

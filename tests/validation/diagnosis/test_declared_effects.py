@@ -1,4 +1,4 @@
-"""Effects declared with wrong parameters, for which the true ones are saved."""
+"""Test diagnoses of robots whose files contain effects with wrong parameters."""
 
 import json
 from dataclasses import replace
@@ -22,7 +22,7 @@ from tests.planar_arm_for_tests import SIGMA, measured
 
 LOADS = ("mx", "my", "mz", "fx", "fy", "fz")
 ROWS = 12
-# Declared effects, and those of the machine.
+# Parameters in the robot file, and true parameters.
 WRONG = {
     "self_weight": ({"g.z": -5.0}, {"g.x": 1.0, "g.y": 0.5, "g.z": -9.81}),
     "thermal_expansion": ({"j2": 2.34e-5}, {"j2": 1.2e-5}),
@@ -51,7 +51,7 @@ WRONG = {
          "tool.moment.z": 0.01},
     ),
     "modulus_scale": ({"j2": 0.8}, {"j2": 0.64}),
-    # a joint declared with a clearance keeps it; another may have one
+    # The true machine has an additional joint with clearance.
     "joint_clearance": (
         {"j1.radial": 1e-5},
         {"j1.radial": 1e-5, "j2.radial": 3e-5, "j2.axial": 2e-5, "j2.tilt": 1e-4},
@@ -79,7 +79,7 @@ WRONG = {
 
 
 def widest(campaign, name, true):
-    """Return the hypothesis of an effect with the most unknowns, at the true frames."""
+    """Return the hypothesis with the most unknowns among those with the true frames."""
     listed = with_declared(hypotheses(conditions_of(campaign), LOADS), campaign.robot)
     bare = campaign.robot.without_effects()
     here = [
@@ -90,9 +90,8 @@ def widest(campaign, name, true):
 
 
 @pytest.mark.parametrize("name", WRONG)
-def test_fit_recovers_the_machine_in_spite_of_a_wrong_declared_effect(name):
-    """From noise-free readings, the fit recovers the parameters and readings of a
-    machine that is softer or stiffer, longer or shorter than declared."""
+def test_fit_corrects_wrong_parameters_of_a_declared_effect(name):
+    """From readings without noise, the fit identifies the true parameters."""
     declared, true = WRONG[name]
     campaign = commanded(arm(**{name: declared}))
     weight = {"gravity.z": np.full(ROWS, -9.81)} if name == "body_mass" else {}
@@ -116,7 +115,7 @@ def test_fit_recovers_the_machine_in_spite_of_a_wrong_declared_effect(name):
         assert found == pytest.approx(true, rel=2e-2)
 
 
-def test_every_effect_with_parameters_is_tested():
+def test_cases_cover_every_effect_with_parameters():
     assert WRONG.keys() | {"geometric_stiffening"} == LIBRARY.keys()
 
 
@@ -133,8 +132,8 @@ PLANAR_CASES = {
 
 
 @pytest.mark.parametrize("name", PLANAR_CASES)
-def test_difference_from_a_declared_effect_is_identified_and_saved(name, tmp_path):
-    """Drives and beams of a plane; the saved parameters are the machine's."""
+def test_diagnosis_corrects_and_saves_a_declared_effect(name, tmp_path):
+    """The saved parameters are the true parameters of a planar arm."""
     declared, true, machine = PLANAR_CASES[name]
     campaign = measured(tmp_path / name, seed=4, configurations=12, passes=3, **machine)
     robot = replace(campaign.robot, effects={name: declared})

@@ -1,7 +1,7 @@
-"""Complete diagnoses of data that do not come from the model under test.
+"""Test complete diagnoses of data that do not come from the tested model.
 
-Quick tests use a planar arm calculated by hand, slow ones simulated campaigns of this
-project and, if available, of another program.
+Quick tests use a planar arm whose readings are calculated by hand.  Slow tests use
+simulated campaigns.
 """
 
 import html
@@ -46,7 +46,7 @@ CASES = {
 
 @pytest.fixture(scope="module")
 def diagnosed(tmp_path_factory):
-    """Return a function that diagnoses each case once."""
+    """Return a function that diagnoses each case and caches the result."""
 
     @cache
     def find(name):
@@ -57,13 +57,13 @@ def diagnosed(tmp_path_factory):
 
 
 def numbers(found, effect):
-    """Values and standard deviations of an effect's parameters."""
+    """Return values and standard deviations of the parameters of an effect."""
     (one,) = [e for e in effects(found) if e["name"] == effect]
     return {p["name"]: (p["value"], p["std"]) for p in one["parameters"]}
 
 
 def assert_within(found, effect, truth):
-    """Check values within three standard deviations, at most a fifth of the truth."""
+    """Check that errors are at most three standard deviations and these are small."""
     values = numbers(found, effect)
     assert values.keys() == truth.keys()
     for name, (value, std) in values.items():
@@ -72,13 +72,13 @@ def assert_within(found, effect, truth):
 
 
 def left_by_the_truth(name, found, folder):
-    """[-] rms of the noise of the held-out rows."""
+    """Return the rms of the noise of the held-out rows, divided by sigma."""
     exact = measured(folder, seed=1, noise=0.0, **CASES[name])
     z = (found.campaign.measured - exact.measured) / SIGMA
     return float(np.sqrt(np.nanmean(z[found.held.rows] ** 2)))
 
 
-def test_single_effect_is_identified_with_its_value(diagnosed, tmp_path):
+def test_diagnosis_identifies_a_single_effect(diagnosed, tmp_path):
     found = diagnosed("one")
     assert (found.verdict, found.claimed) == ("explained", ("drive_compliance",))
     assert found.probability["drive_compliance"] > 0.9
@@ -90,8 +90,8 @@ def test_single_effect_is_identified_with_its_value(diagnosed, tmp_path):
 
 
 @pytest.mark.slow
-def test_wrong_readings_of_held_out_rows_do_not_change_the_selected_model(tmp_path):
-    """The result states that the fitted rows contain only noise."""
+def test_selected_model_does_not_depend_on_held_out_readings(tmp_path):
+    """If the held-out readings are wrong, the model is not confirmed."""
     campaign = measured(tmp_path, seed=1, configurations=60, passes=1, **CASES["one"])
     held = hold_out(campaign).rows
     wrong = np.where(held[:, None], 30.0, 0.0) * SIGMA
@@ -105,8 +105,8 @@ def test_wrong_readings_of_held_out_rows_do_not_change_the_selected_model(tmp_pa
 
 
 @pytest.mark.slow
-def test_function_that_fails_on_held_out_rows_is_not_reported(tmp_path):
-    """The held-out rows deviate in the opposite direction."""
+def test_function_with_wrong_predictions_is_not_reported(tmp_path):
+    """The readings of the held-out rows have the opposite sign."""
     campaign = measured(
         tmp_path, seed=1, configurations=60, passes=1, **CASES["outside"]
     )
@@ -119,8 +119,8 @@ def test_function_that_fails_on_held_out_rows_is_not_reported(tmp_path):
     assert "learned:" not in text(found)
 
 
-def test_correlated_noise_widens_standard_deviations(diagnosed, tmp_path):
-    """Four fifths of the noise have a time constant of 200 s."""
+def test_noise_that_is_correlated_in_time_is_reported(diagnosed, tmp_path):
+    """The correlated fraction of the variance is 0.8, with a time constant of 200 s."""
     exact = measured(tmp_path, seed=1, noise=0.0, **CASES["one"])
     time = exact.covariates["time"]
     R = 0.8 * np.exp(-np.abs(time[:, None] - time) / 200.0) + 0.2 * np.eye(len(time))
@@ -137,28 +137,26 @@ def test_correlated_noise_widens_standard_deviations(diagnosed, tmp_path):
     assert abs(value - 3e5) < 3 * std
 
 
-def test_noise_above_sigma_is_reported_without_a_cause(diagnosed, tmp_path):
-    """The noise is three times the stated sigma, which is the unit of reported
-    errors."""
+def test_large_noise_is_reported_without_an_effect(diagnosed, tmp_path):
+    """The noise is three times the declared sigma."""
     exact = measured(tmp_path, noise=0.0, force=0.0, temperature=0.0)
     noise = 3.0 * SIGMA * np.random.default_rng(6).normal(size=(len(exact), 6))
     found = diagnose(replace(exact, measured=exact.measured + noise))
     assert (found.verdict, found.claimed) == ("none_needed", ())
-    # Standard error of the rms of 384 cells.
+    # The tolerance is four standard errors of the rms of 384 cells.
     assert found.after.normalised == pytest.approx(3.0, rel=4 / np.sqrt(2 * 384))
     assert np.array_equal(found.campaign.sigma, exact.sigma)
     value, std = found.noise_scale
     assert abs(value - 3.0) < 4 * std < 0.6
-    # 48 rows repeat one of 16 configurations under the same conditions
+    # Of the 48 rows, 36 are repeats with six components each.
     assert found.lack.repeats == pytest.approx(3.0, rel=4 / np.sqrt(2 * 6 * 36))
     assert "not repeatable" in text(found)
     assert "not repeatable" not in text(diagnosed("none"))
 
 
 @pytest.mark.parametrize("name", ["none", "one", "pair"])
-def test_model_sequence_leads_from_the_declared_to_the_fitted_model(name, diagnosed):
-    """It contains only the steps of this machine, and its last row is the error after
-    the fit."""
+def test_model_sequence_begins_with_the_declared_model(name, diagnosed):
+    """It ends with the fitted model."""
     found = diagnosed(name)
     terms = {"none": []}.get(name, ["library effects"])
     assert [step.term for step in found.sequence] == ["declared", *terms]
@@ -182,7 +180,7 @@ def test_diagnosis_does_not_change_a_correct_model(diagnosed):
     assert "suffices" in sentence(found)
 
 
-def test_two_effects_are_identified_together_with_their_values(diagnosed, tmp_path):
+def test_diagnosis_identifies_two_effects_together(diagnosed, tmp_path):
     found = diagnosed("pair")
     assert found.verdict == "explained"
     assert set(found.claimed) == {"encoder_offset", "thermal_expansion"}
@@ -191,9 +189,8 @@ def test_two_effects_are_identified_together_with_their_values(diagnosed, tmp_pa
     assert found.after.normalised <= 1.05 * left_by_the_truth("pair", found, tmp_path)
 
 
-def test_constant_temperature_makes_expansion_and_length_ambiguous(diagnosed):
-    """The result names the equivalent effects and the temperature that separates
-    them."""
+def test_expansion_and_length_are_ambiguous_at_constant_temperature(diagnosed):
+    """The next measurement is at another temperature."""
     found = diagnosed("confounded")
     assert (found.verdict, found.claimed) == ("ambiguous", ())
     best = {names for names, p in found.alternatives if p > 0.3}
@@ -205,9 +202,8 @@ def test_constant_temperature_makes_expansion_and_length_ambiguous(diagnosed):
 
 
 @pytest.mark.slow
-def test_unknown_registration_with_outliers_and_gaps_is_explained(diagnosed):
-    """The offset of the first drive is part of the device frame; that of the second is
-    found."""
+def test_diagnosis_accepts_unknown_device_pose_outliers_and_missing_readings(diagnosed):
+    """An offset of the first drive would be equivalent to a device rotation."""
     found = diagnosed("device")
     assert (found.verdict, found.claimed) == ("explained", ("encoder_offset",))
     value, std = numbers(found, "encoder_offset")["two"]
@@ -219,8 +215,8 @@ def test_unknown_registration_with_outliers_and_gaps_is_explained(diagnosed):
 
 
 @pytest.mark.slow
-def test_model_selected_on_a_subset_is_fitted_to_all_rows(tmp_path, monkeypatch):
-    """Parameters are more accurate than from the subset, and all outliers are found."""
+def test_model_selected_from_a_subset_is_fitted_to_all_rows(tmp_path, monkeypatch):
+    """All rows determine the parameters more accurately than the subset."""
     campaign = measured(tmp_path / "device", seed=1, **CASES["device"])
     monkeypatch.setattr(trace, "_SEARCHED", 30)
     found = diagnose(campaign)
@@ -235,11 +231,11 @@ def test_model_selected_on_a_subset_is_fitted_to_all_rows(tmp_path, monkeypatch)
     assert std < numbers(alone, "encoder_offset")["two"][1] / 1.2
 
 
-ODD = ("$x^{<b>&_\\$", "a$b_ \\frac{<i>")  # a formula and a tag to other programs
+ODD = ("$x^{<b>&_\\$", "a$b_ \\frac{<i>")  # names with LaTeX commands and HTML tags
 
 
 def test_diagnosis_report_shows_unusual_names_unchanged(diagnosed):
-    """The names of a frame, a covariate and an outlier look like formulas and tags."""
+    """The names contain LaTeX commands and HTML tags."""
     found = diagnosed("none")
     first, *others = found.campaign.robot.frames
     named = (
@@ -266,19 +262,19 @@ def test_diagnosis_report_shows_unusual_names_unchanged(diagnosed):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(TRUTH))
-def test_simulated_campaigns_get_an_accepted_verdict(name):
-    """The verdict and effects are among those that the truth accepts."""
+def test_verdict_on_simulated_campaigns_is_correct(name):
+    """Each campaign has a list of correct verdicts and effects."""
     truth = TRUTH[name]
     found = diagnose(read_campaign(CAMPAIGNS / name))
     accepted = set(truth["accept_verdicts"])
-    if "outside_library" in accepted:  # learned functions are not library effects
+    if "outside_library" in accepted:  # functions may describe effects outside it
         accepted.add("learned")
     assert found.verdict in accepted
     sets = [tuple(sorted(names)) for names in truth["accept_effects"]]
     if found.verdict == "explained":
         assert tuple(sorted(found.claimed)) in sets
         kept = 6 * int((found.held.rows & ~found.outliers).sum())
-        # Noise alone: three standard deviations of the rms of that many cells.
+        # The tolerance is three standard errors of the rms of the noise.
         assert found.after.normalised < 1 + 3 / np.sqrt(2 * kept)
     if found.verdict == "ambiguous":
         listed = [names for names, _ in found.alternatives]
@@ -286,11 +282,12 @@ def test_simulated_campaigns_get_an_accepted_verdict(name):
 
 
 @pytest.mark.slow
-def test_practice_campaigns_of_another_program_score_without_error(tmp_path):
-    """The program that came with the campaigns computes the score: parameters must be
-    within 3 standard deviations.  The error after the diagnosis is at most 1.15 times
-    that of a perfect model, which is 2.6 standard deviations of the rms of 25 rows of
-    noise."""
+def test_practice_campaigns_have_a_perfect_score(tmp_path):
+    """The external program that simulated the campaigns computes the score.
+
+    Parameters must be within 3 standard deviations.  The error after diagnosis is at
+    most 1.15 times that of a perfect model, which is 2.6 standard errors for 25 rows.
+    """
     try:
         practice = data_folder("practice")
     except BadInput as error:
@@ -299,7 +296,7 @@ def test_practice_campaigns_of_another_program_score_without_error(tmp_path):
     truth = json.loads(path.read_text())
     for name in truth:
         found = table(diagnose(read_campaign(practice / name)))
-        if found["verdict"] == "learned":  # that score knows the library alone
+        if found["verdict"] == "learned":  # the score does not support functions
             found |= {"verdict": "outside_library", "effects": []}
         (tmp_path / f"{name}.json").write_text(json.dumps(plain(found)))
     out = tmp_path / "score.out"

@@ -1,4 +1,4 @@
-"""Diagnosis of difficult campaigns, compared with known facts about their machines."""
+"""Test diagnoses of difficult campaigns of machines with known errors."""
 
 from dataclasses import replace
 from functools import cache
@@ -25,7 +25,7 @@ FOLDERS = [CASES / name for name in (
 
 @pytest.fixture(scope="module")
 def diagnosed():
-    """Return a function that diagnoses each folder once."""
+    """Return a function that diagnoses each campaign and caches the result."""
 
     @cache
     def find(folder):
@@ -37,16 +37,14 @@ def diagnosed():
 
 
 def effect(found, name):
-    """Return an effect's parameters by name."""
+    """Return the parameters of an effect by name."""
     (one,) = [e for e in table(found)["effects"] if e["name"] == name]
     return {p["name"]: p for p in one["parameters"]}
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("folder", FOLDERS, ids=lambda folder: folder.name)
-def test_saved_robot_predicts_the_printed_error_which_is_below_the_declared(
-    folder, diagnosed, tmp_path
-):
+def test_saved_robot_predicts_with_the_reported_error(folder, diagnosed, tmp_path):
     found = diagnosed(folder)
     if not found.better:
         assert found.verdict != "explained"
@@ -60,8 +58,8 @@ def test_saved_robot_predicts_the_printed_error_which_is_below_the_declared(
 
 
 @pytest.mark.slow
-def test_expansion_of_a_printer_is_recovered(diagnosed, tmp_path):
-    """The declared coefficient is 23.4e-6 per kelvin, the true one 12e-6."""
+def test_wrong_declared_expansion_of_a_printer_is_corrected(diagnosed, tmp_path):
+    """The declared coefficient is 23.4e-6 per kelvin, and the true one is 12e-6."""
     found = diagnosed(CASES / "declared_effect")
     assert (found.verdict, found.claimed) == ("explained", ("thermal_expansion",))
     one = effect(found, "thermal_expansion")["frame"]
@@ -73,7 +71,7 @@ def test_expansion_of_a_printer_is_recovered(diagnosed, tmp_path):
 
 
 @pytest.mark.slow
-def test_clearance_in_a_leg_is_explained_as_clearance(diagnosed):
+def test_clearance_in_a_leg_is_identified(diagnosed):
     found = diagnosed(CASES / "hx_play")
     assert (found.verdict, found.claimed) == ("explained", ("joint_clearance",))
     springs = table(found)["springs"] or {"parameters": []}
@@ -83,8 +81,7 @@ def test_clearance_in_a_leg_is_explained_as_clearance(diagnosed):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["fb_wear", "fb_gear"])
 def test_effects_outside_the_library_are_learned_as_functions(name, diagnosed):
-    """A rod that grows with time and the harmonics of a gear are learned down to the
-    noise."""
+    """The length of a rod increases with time, or a gear has harmonic errors."""
     found = diagnosed(CASES / name)
     assert (found.verdict, found.claimed) == ("learned", ())
     assert found.after.normalised < 1.2
@@ -92,7 +89,6 @@ def test_effects_outside_the_library_are_learned_as_functions(name, diagnosed):
 
 @pytest.mark.slow
 def test_scatter_of_repeats_is_not_reported_as_drift(diagnosed):
-    """Errors are in units of the stated sigma, and hysteresis is not reported as
-    drift."""
+    """The machine has hysteresis."""
     found = diagnosed(CASES / "hyst")
     assert not set(found.claimed) & {"drift", "encoder_eccentricity"}

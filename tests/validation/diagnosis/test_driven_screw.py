@@ -1,4 +1,7 @@
-"""Functions along the thread of a driven screw, by hand: [0 0 1 0 0 h] per radian."""
+"""Test functions that act along the thread of a helical joint.
+
+The expected motion of the joint per radian is [0 0 1 0 0 h], where h is the lead.
+"""
 
 import numpy as np
 import pytest
@@ -31,7 +34,7 @@ COMPONENTS = ("rx", "ry", "rz", "tx", "ty", "tz")
 
 
 def deviation(q, turn):
-    """(R, 6) of the tool if the spindle turns by more than commanded."""
+    """Return the tool deviation (R, 6) for an additional rotation of the spindle."""
     zero = np.zeros_like(q)
     across = ARM * turn * np.array([-np.sin(q), np.cos(q)])
     return np.stack([zero, zero, turn, *across, LEAD * turn], axis=1)
@@ -47,9 +50,9 @@ def with_function(tmp_path, components, kind, variables, value):
     return read_robot(file)
 
 
-@pytest.mark.slow  # the diagnosis of 80 rows
-def test_error_along_a_driven_thread_is_identified_there(tmp_path):
-    """A wave of three periods in a turn: one function along the thread explains it."""
+@pytest.mark.slow  # diagnosis of 80 rows
+def test_error_of_a_driven_screw_is_identified_along_its_thread(tmp_path):
+    """The error has three periods in each turn."""
     rng = np.random.default_rng(3)
     q, size, noise = rng.uniform(-3, 3, 80), 3e-4, 1e-6
     measured = deviation(q, size * np.sin(3 * q)) + noise * rng.normal(size=(80, 6))
@@ -68,7 +71,7 @@ def test_error_along_a_driven_thread_is_identified_there(tmp_path):
     assert found.after.normalised < 1.3
 
 
-def test_function_along_a_thread_turns_and_shifts(tmp_path):
+def test_function_along_a_thread_rotates_and_translates_the_tool(tmp_path):
     robot = with_function(tmp_path, "rs", "screw", "q.spindle", 2e-4)
     posture = place_robot(robot, joints={"spindle": 0.7})
     applied = apply_robot_effects(posture)
@@ -77,8 +80,8 @@ def test_function_along_a_thread_turns_and_shifts(tmp_path):
     np.testing.assert_allclose(found, expected, atol=1e-18)
 
 
-def test_compliance_along_a_thread_is_under_the_moment_and_the_force(tmp_path):
-    """The wrench does the work mz + h fz on a turn of 1 rad."""
+def test_compliance_along_a_thread_responds_to_moment_and_force(tmp_path):
+    """The generalised load of the joint is mz + h fz."""
     robot = with_function(tmp_path, "rs", "compliance", "q.spindle", 1e-5)
     posture = place_robot(robot, joints={"spindle": 0.7})
     load = np.array([0.0, 0.0, 0.4, 0.0, 0.0, 25.0])  # [N m, N] at the tool
@@ -89,7 +92,7 @@ def test_compliance_along_a_thread_is_under_the_moment_and_the_force(tmp_path):
     np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-18)
 
 
-def test_only_a_helical_joint_has_a_component_along_its_thread(tmp_path):
+def test_component_along_a_thread_requires_a_helical_joint(tmp_path):
     file = tmp_path / "press.toml"
     with_function(tmp_path, "rs", "screw", "q.spindle", 2e-4)
     text = file.read_text().replace('where = "spindle"', 'where = "tool"')

@@ -1,4 +1,4 @@
-"""With too few rows, a diagnosis claims nothing and states the number required."""
+"""Test that a diagnosis with too few rows reports the required number of rows."""
 
 from dataclasses import replace
 
@@ -15,7 +15,7 @@ from tests.planar_arm_for_tests import SIGMA
 
 
 def seen(rows, seed, unlike=0.0):
-    """Positions of an arm with errors of frames, and random deviations [sigma]."""
+    """Return positions of an arm with geometric errors and random deviations."""
     rng = np.random.default_rng(seed)
     errors = rng.normal(size=(4, 6)) * np.repeat([1e-3, 5e-4], 3)
     campaign = commanded(arm(), rows, seed)
@@ -29,8 +29,8 @@ def seen(rows, seed, unlike=0.0):
 @pytest.mark.parametrize(
     "seed", [1, *(pytest.param(k, marks=pytest.mark.slow) for k in (2, 3))]
 )
-def test_eight_rows_of_a_target_are_reported_as_too_few(seed):
-    """There are 24 readings and twenty geometric unknowns."""
+def test_eight_measured_positions_are_reported_as_too_few(seed):
+    """There are 24 readings and 20 geometric unknowns."""
     found = diagnose(seen(8, seed))
     assert found.verdict == NOT_ENOUGH_ROWS
     assert found.claimed == ()
@@ -44,7 +44,7 @@ def test_eight_rows_of_a_target_are_reported_as_too_few(seed):
 
 
 @pytest.mark.slow
-def test_diagnosis_with_the_requested_number_of_rows_finds_the_effect():
+def test_effect_is_identified_with_the_required_number_of_rows():
     found = diagnose(seen(8, 1))
     wanted = int(found.needed.split("about ")[1].split()[0])
     again = diagnose(seen(wanted, 1))
@@ -55,7 +55,7 @@ def test_diagnosis_with_the_requested_number_of_rows_finds_the_effect():
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [4, 5])
 def test_random_readings_are_not_explained(seed):
-    """8 or 16 rows contain random readings of a hundred sigma."""
+    """The 8 or 16 rows contain random readings of 100 sigma."""
     for rows in (8, 16):
         found = diagnose(seen(rows, seed, unlike=100.0))
         assert found.verdict in {NOT_ENOUGH_ROWS, "outside_library"}
@@ -63,8 +63,8 @@ def test_random_readings_are_not_explained(seed):
 
 
 @pytest.mark.parametrize("rows", [2, 3])
-def test_no_effect_is_reported_from_very_few_rows(rows):
-    """Functions have at most as many columns as there are rows."""
+def test_very_few_rows_do_not_lead_to_an_effect(rows):
+    """The number of columns of a function cannot exceed the number of rows."""
     campaign = seen(rows, 1)
     time = np.linspace(0.0, 600.0, rows)
     found = diagnose(replace(campaign, covariates={"time": time}))

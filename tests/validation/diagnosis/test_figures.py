@@ -1,4 +1,4 @@
-"""Drawing of the robot on a diagnosis page, compared with its readings."""
+"""Test the 3-D view of the robot on the report page of a diagnosis."""
 
 from dataclasses import replace
 
@@ -12,14 +12,13 @@ from tests.planar_arm_for_tests import SIGMA, measured
 
 @pytest.fixture(scope="module")
 def diagnosed(tmp_path_factory):
-    """A soft drive: the arm sags under its loads."""
+    """Diagnosis of an arm with a compliant drive."""
     folder = tmp_path_factory.mktemp("soft") / "soft"
     return diagnose(measured(folder, seed=1, stiffness=(np.inf, 7e4)))
 
 
-def test_drawn_robot_is_at_its_measured_pose(diagnosed):
-    """It is within five sigma of the reading, whereas the declared model is off by
-    twenty."""
+def test_robot_in_the_report_has_its_measured_pose(diagnosed):
+    """The error is below five sigma, compared with 20 sigma before diagnosis."""
     row, name = worst_row(diagnosed)
     assert name == "position"
     aside = diagnosed.held.rows & ~diagnosed.outliers
@@ -34,14 +33,14 @@ def test_drawn_robot_is_at_its_measured_pose(diagnosed):
     assert np.abs(diagnosed.residual_before[row][known] / sigma).max() > 20
 
 
-def test_page_names_the_drawn_row_and_effect(diagnosed):
+def test_view_of_the_robot_names_row_and_effect(diagnosed):
     row, _ = worst_row(diagnosed)
     drawn = worst_robot(diagnosed)
     assert f"Row {diagnosed.campaign.ids[row]}, held out" in drawn
     assert "drive compliance" in drawn
 
 
-def test_robot_is_not_drawn_without_held_out_rows(diagnosed):
+def test_report_has_no_view_of_the_robot_without_held_out_rows(diagnosed):
     no_rows = np.zeros(len(diagnosed.campaign), bool)
     none = replace(diagnosed, held=replace(diagnosed.held, folds=(no_rows,)))
     assert worst_row(none) == (-1, "")

@@ -1,7 +1,7 @@
-"""An arm with frame errors so large that second-order terms are visible.
+"""Test the diagnosis of geometric errors with visible second-order terms.
 
-Its readings are products of homogeneous transforms, SciPy's; 1e-2 rad and 2 mm squared
-are ten times the noise.
+The readings are calculated from products of homogeneous transforms.  The second-order
+terms are about ten times the noise.
 """
 
 import numpy as np
@@ -29,7 +29,7 @@ def moved(rotation, shift=(0.0, 0.0, 0.0)):
 
 
 def tool_of(angles, errors):
-    """Pose of the tool: the product of each frame, its joint and its error."""
+    """Return the pose of the tool as a product of frames, joints and errors."""
     T = RigidTransform.identity()
     for frame, angle, error in zip(ARM.frames, (*angles, 0.0), errors, strict=True):
         T = T * moved(frame.rotation, frame.translation) * moved([0, 0, angle])
@@ -60,8 +60,8 @@ def found():
     return diagnose(campaign)
 
 
-def test_large_errors_of_frames_are_explained_as_finite_motions(found):
-    """The error of held-out rows is noise; first-order errors would leave 1.5 sigma."""
+def test_large_geometric_errors_are_identified_to_second_order(found):
+    """A first-order model would have an error of 1.5 sigma."""
     assert (found.verdict, found.claimed) == ("explained", ())
     assert found.before.normalised > 500
     assert found.after.normalised == pytest.approx(1.0, abs=0.3)
@@ -70,8 +70,8 @@ def test_large_errors_of_frames_are_explained_as_finite_motions(found):
     assert part.name == "geometry"
 
 
-def test_errors_are_root_mean_squares_over_measured_cells(found):
-    """By hand, for one held-out row of 3, 4 and 0 um."""
+def test_reported_error_is_the_rms_of_measured_components(found):
+    """For one held-out row, the expected values are calculated by hand."""
     campaign = found.campaign
     left = np.zeros((12, 6))
     left[2] = [1e-5, -2e-5, 3e-5, 3e-6, 4e-6, 0.0]

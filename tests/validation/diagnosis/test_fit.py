@@ -1,4 +1,4 @@
-"""Joint fit of robot parameters, compared with closed forms for a bar."""
+"""Test the fit of robot parameters with analytical solutions for a bar."""
 
 import numpy as np
 import pytest
@@ -23,8 +23,8 @@ from tests.planar_arm_for_tests import SIGMA
 
 
 @pytest.mark.parametrize("start", [0.0, 1e-19, -1e-3])
-def test_fitted_length_is_the_mean_of_the_readings_along_the_bar(start):
-    """Its standard deviation is sigma / sqrt(R): rotations do not depend on it."""
+def test_fitted_length_equals_the_mean_of_the_readings(start):
+    """The standard deviation of the mean is sigma / sqrt(R)."""
     plain = bar(link=BEAM)
     noise = np.random.default_rng(4).normal(size=(8, 6)) * SIGMA
     seen = noise + np.hstack([np.zeros((8, 3)), 3e-4 * along(plain)])
@@ -39,23 +39,22 @@ def test_fitted_length_is_the_mean_of_the_readings_along_the_bar(start):
     assert fit.residual @ fit.residual == pytest.approx(np.sum(left**2))
 
 
-def test_uncertainty_of_a_stiffness_follows_from_that_of_its_compliance():
-    """Every row reads the rotation M / k and the shift M L / k; std k = k^2 std(1 /
-    k)."""
+def test_standard_deviation_of_a_stiffness_equals_analytical_value():
+    """For readings M / k and M L / k, std(k) is k^2 std(1 / k)."""
     M, k = 30.0, 2e5
     campaign = gives_way(M, k)
     fit = machine(campaign, SOFTER, start=1e-6)
     ((name, value, std),) = numbers(fit)
     assert name == "drive"
-    assert value == pytest.approx(k, rel=1e-4)  # arcs are chords to first order
+    assert value == pytest.approx(k, rel=1e-4)  # tolerance for second-order terms
     J = 8 * ((M / SIGMA[2]) ** 2 + (M * LENGTH / SIGMA[3]) ** 2)
     assert std == pytest.approx(k**2 / np.sqrt(J), rel=1e-3)
 
 
-def test_standard_deviation_follows_from_the_slopes_at_the_fitted_value():
-    """Only x is read: L (cos(q + e) - cos q), of slope -L sin(q + e) per radian.
+def test_standard_deviation_follows_from_derivatives_at_the_fitted_value():
+    """The reading L (cos(q + e) - cos q) has the derivative -L sin(q + e).
 
-    Slopes are the linear model's at the robot reached, off by e to first order.
+    The derivatives of the linear model have a relative error of e.
     """
     e, plain = 0.02, bar()
     q = plain.coordinates[:, 0]
@@ -68,8 +67,8 @@ def test_standard_deviation_follows_from_the_slopes_at_the_fitted_value():
     assert abs(value - e) < 0.05 * std
 
 
-def test_intervals_cover_the_true_value_at_the_stated_rate():
-    """In 68 % of 60 campaigns, the true value is within one standard deviation."""
+def test_68_per_cent_of_true_values_are_within_one_std():
+    """The test uses 60 random campaigns."""
     rng = np.random.default_rng(8)
     inside = 0
     shape = fit_of(bar(link=BEAM), 2e-5)
@@ -81,7 +80,11 @@ def test_intervals_cover_the_true_value_at_the_stated_rate():
 
 
 def deflected(e, noise):
-    """A bar under a force F, whose drive turns by a: K (a - e) = F L cos(q + a)."""
+    """Return a campaign of a bar whose compliant drive is deflected by a force F.
+
+    The deflection a satisfies K (a - e) = F L cos(q + a), where e is the encoder
+    offset.
+    """
     K, F, rows = 2e3, 150.0, len(noise)
     spring = np.diag([np.inf, np.inf, K, np.inf, np.inf, np.inf])
     q = bar(rows=rows).coordinates[:, 0]
@@ -104,7 +107,7 @@ def test_fitted_offset_is_exact_for_a_large_deflection():
 
 
 def test_finite_model_needs_no_geometric_stiffening():
-    """The lever arm of the load rotates so far that first order is insufficient."""
+    """For the large rotations in this test, the linear model is not accurate."""
     noise = np.random.default_rng(5).normal(size=(20, 6)) * SIGMA
     campaign = deflected(0.0, noise)
     linear, finite = diagnose(campaign), diagnose(campaign, finite=True)

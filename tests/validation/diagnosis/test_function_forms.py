@@ -1,4 +1,4 @@
-"""Forms of functions and their prior probabilities."""
+"""Test forms of functions and their prior probabilities."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ def test_prior_probabilities_of_all_forms_sum_to_one(name):
     assert np.exp(forms.log_priors(found)).sum() == pytest.approx(1.0)
 
 
-def test_products_have_a_form_that_a_robot_file_can_store():
+def test_forms_of_two_variables_can_be_stored_in_robot_files():
     from forcefit.assembly.effects.forms import FORMS
 
     pairs = [("q.drive", "time"), ("approach", "load.fz"), ("time", "position.x")]

@@ -1,4 +1,4 @@
-"""Algebra of the Gaussian model, compared with the normal density."""
+"""Test the Gaussian linear model against probability densities from SciPy."""
 
 import numpy as np
 import pytest
@@ -15,13 +15,13 @@ from forcefit.validation.diagnosis.gaussian import (
 
 @pytest.fixture
 def draw():
-    """Columns (40, 7), prior std (7,), readings (40,)."""
+    """Random columns (40, 7), prior standard deviations (7,) and readings (40,)."""
     rng = np.random.default_rng(3)
     X = rng.normal(size=(40, 7)) * 10 ** rng.uniform(-2, 2, 7)
     return X, 10 ** rng.uniform(-2, 1, 7), rng.normal(size=40)
 
 
-def test_leave_block_out_equals_refits(draw):
+def test_leave_block_out_errors_equal_those_of_refits(draw):
     X, std, z = draw
     blocks = np.repeat(np.arange(8), 5)
     marginal = marginalise(X, std, z, np.zeros((40, 0)))
@@ -36,7 +36,7 @@ def test_leave_block_out_equals_refits(draw):
         assert densities[k] == pytest.approx(expected, rel=1e-8)
 
 
-def test_columns_with_a_flat_prior_are_projected_out_exactly(draw):
+def test_projection_equals_a_model_with_very_wide_priors(draw):
     X, std, z = draw
     flat = np.linalg.qr(np.random.default_rng(0).normal(size=(40, 3)))[0]
     without = np.eye(40) - flat @ flat.T
@@ -52,7 +52,7 @@ def test_columns_with_a_flat_prior_are_projected_out_exactly(draw):
 
 
 @pytest.mark.parametrize("columns", [1, 3])
-def test_evidence_gain_is_averaged_over_prior_sizes(draw, columns):
+def test_evidence_gain_equals_average_over_prior_deviations(draw, columns):
     X, std, z = draw
     rng = np.random.default_rng(5)
     B = np.linalg.qr(rng.normal(size=(40, columns)))[0]
@@ -74,9 +74,9 @@ def test_evidence_gain_is_averaged_over_prior_sizes(draw, columns):
     assert found[0] == pytest.approx(expected, rel=1e-9)
 
 
-def test_evidence_gain_of_a_bounded_unknown_is_the_ratio_over_the_half_axis():
-    # quadrature over the half axis: p(z | x > 0) against p(z | x = 0); of so many
-    # readings of rms 1 tau is known
+def test_evidence_gain_of_a_positive_unknown_equals_quadrature():
+    # The expected ratio p(z | x > 0) / p(z | x = 0) is computed by quadrature.  The
+    # large number of readings determines tau.
     b, n = 0.8, 1_000_000
     z = np.where(np.arange(n) % 2, 1.0, -1.0)
     marginal = marginalise(np.zeros((n, 0)), np.zeros(0), z, np.zeros((n, 0)))

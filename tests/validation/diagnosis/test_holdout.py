@@ -1,4 +1,4 @@
-"""Selection of the rows that are held out."""
+"""Test the choice of the held-out rows."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from tests.campaigns_for_tests import campaign_of
 
 
 def held_in(campaign):
-    """Rows held out, fold by fold."""
+    """Return the held-out rows of each fold."""
     return [np.flatnonzero(fold).tolist() for fold in hold_out(campaign).folds]
 
 
@@ -17,8 +17,10 @@ def held_in(campaign):
     (59, "folds", 59), (9, "folds", 9),
 ])  # fmt: skip
 def test_whole_configurations_are_held_out(configurations, how, judge):
-    """A quarter, but at most 60, or a tenth of many;
-    all of them, in folds, if there are few."""
+    """One quarter is held out, and a smaller fraction of many configurations.
+
+    Few configurations are all held out in folds.
+    """
     repeat = np.random.default_rng(0).permutation(np.repeat(range(configurations), 2))
     campaign = campaign_of(np.ones((len(repeat), 6)), repeat=repeat)
     held = hold_out(campaign)
@@ -32,8 +34,8 @@ def test_whole_configurations_are_held_out(configurations, how, judge):
     assert all(map(np.array_equal, again.folds, held.folds))
 
 
-def test_few_configurations_are_held_out_by_spans_of_time():
-    """Sixteen spans of three rows in the order of time, each in one fold."""
+def test_time_spans_are_held_out_if_there_are_few_configurations():
+    """Each of 16 time spans contains three rows and is held out in one fold."""
     order = np.random.default_rng(0).permutation(48)
     campaign = campaign_of(
         np.ones((48, 6)), repeat=np.arange(48) % 3, time=60.0 * order
@@ -46,7 +48,7 @@ def test_few_configurations_are_held_out_by_spans_of_time():
 
 
 @pytest.mark.parametrize(("rows", "folds"), [(1, 1), (2, 2), (3, 3), (7, 5)])
-def test_every_row_of_a_small_campaign_is_held_out_exactly_once(rows, folds):
+def test_small_campaign_holds_out_every_row_once(rows, folds):
     campaign = campaign_of(np.ones((rows, 6)), time=60.0 * np.arange(rows))
     parts = held_in(campaign)
     assert len(parts) == folds
@@ -54,7 +56,7 @@ def test_every_row_of_a_small_campaign_is_held_out_exactly_once(rows, folds):
     assert (hold_out(campaign).how == "none") == (rows == 1)
 
 
-def test_held_out_rows_keep_their_commands_but_have_no_readings():
+def test_held_out_rows_have_commands_but_no_readings():
     campaign = campaign_of(np.ones((4, 6)), loads=np.arange(24.0).reshape(4, 6))
     rows = np.array([True, False, False, True])
     there = hidden(campaign, rows)

@@ -1,4 +1,4 @@
-"""Hypotheses that a campaign can test, listed by hand."""
+"""Test the list of hypotheses for a campaign."""
 
 from dataclasses import replace
 
@@ -13,7 +13,7 @@ TIME = 60.0 * np.arange(8)
 
 
 def named(conditions, loads=()):
-    """Hypotheses by effect: names that each slot sets."""
+    """Return for each effect the names of the unknowns in each slot."""
     found: dict[str, list] = {}
     for one in hypotheses(conditions, loads):
         own = [slot.names for slot in one.slots]
@@ -30,10 +30,10 @@ def named(conditions, loads=()):
     ("time", "drift", TIME, True), ("time", "drift", np.full(8, 60.0), False),
     ("time", "drift", np.zeros(8), False),
 ])  # fmt: skip
-def test_effect_is_tested_only_if_its_covariate_is_complete_and_not_zero(
+def test_effect_requires_a_complete_and_nonzero_covariate(
     covariate, effect, values, told
 ):
-    """An effect that settles also needs times that differ."""
+    """A drift also requires different times."""
     conditions = conditions_of(bar(link=BEAM))
     given = replace(conditions, **{covariate: values})
     assert (effect in named(given)) is told
@@ -41,8 +41,8 @@ def test_effect_is_tested_only_if_its_covariate_is_complete_and_not_zero(
     assert others == ({effect} if told else set())
 
 
-def test_load_gain_is_tested_in_recorded_directions_only():
-    """The factor and the offsets of recorded directions, together or alone."""
+def test_load_offsets_are_tested_only_in_recorded_directions():
+    """The factor and the offsets are tested together and separately."""
     found = named(conditions_of(bar(link=BEAM)), ["fy", "mz"])["load_gain"]
     assert found == [
         [("factor",), ("offset.mz",), ("offset.fy",)], [("factor",)],

@@ -1,7 +1,7 @@
-"""Effects of real machines that are hidden in simulated ones and must be identified.
+"""Test that effects of simulated machines are identified.
 
-The simulation shares no code with the effects. Fresh rows belong to the same machine at
-configurations unknown to the diagnosis.
+The simulation shares no code with the library effects.  Each saved robot is also tested
+in new configurations.
 """
 
 from dataclasses import replace
@@ -26,12 +26,12 @@ pytestmark = pytest.mark.slow
 SLIDE = np.diag([np.inf] * 5 + [3e6])
 POINT = (0.02, 0.05, 0.03)
 DESIGN = CampaignDesign(24, 116, load=40.0, reach=0.8, reference_point=POINT)
-LONG = replace(DESIGN, reach=1.0, size=0.1)  # slides of 0.2 m
-NEAR = 3.0  # standard deviations within which a value counts as correct
+LONG = replace(DESIGN, reach=1.0, size=0.1)  # slides with a travel of 0.2 m
+NEAR = 3.0  # largest accepted error in standard deviations
 
 
 def longer_arm():
-    """Four drives and bodies with mass."""
+    """Return an arm with four drives and bodies with mass."""
     j1, *others = arm().frames
     j2, j3, tool = (replace(frame, mass=0.8) for frame in others)
     j4 = replace(
@@ -43,7 +43,7 @@ def longer_arm():
 
 
 def gantry():
-    """Three slides and a turning head."""
+    """Return a gantry with three slides and a rotating head."""
     sliding = {"joint": "prismatic", "actuated": True, "joint_stiffness": SLIDE}
     turning = {"joint": "revolute", "actuated": True, "joint_stiffness": SPRING}
     return Robot("gantry", "tool", (
@@ -57,8 +57,11 @@ def gantry():
 
 @pytest.fixture
 def hidden(tmp_path):
-    """Return the diagnosis of a machine with an effect five times the noise, and the
-    truth."""
+    """Return a function that simulates and diagnoses a machine with one effect.
+
+    The effect is five times the noise.  The function returns the diagnosis and the true
+    parameters.
+    """
 
     def find(robot, name, parameters, design=DESIGN, units=""):
         robot, effect = with_errors(robot), Hidden(name, parameters)
@@ -88,7 +91,7 @@ def hidden(tmp_path):
 
 
 def only(learned, *, where, form, of):
-    """Return the parameters of the single learned function, at an equivalent place."""
+    """Return the parameters of the single learned function."""
     (one,) = learned["learned"]
     others = [same[0]["where"] for same in one["equivalent_places"]]
     assert where in [one["where"], *others]
@@ -106,8 +109,7 @@ LEAD = {"y.amplitude": 1e-5, "y.phase": 0.7, "y.period": 0.012}
 
 
 def test_lead_error_of_a_screw_is_identified_with_its_period(hidden):
-    """The period is found within 1 %, and a sin(2 pi y/p + f) as a sine and a
-    cosine."""
+    """The error a sin(2 pi y / p + f) is identified as a sine and a cosine."""
     found, true = hidden(gantry(), "_lead", LEAD, LONG)
     values, std = only(found, where="y", form="waves", of=["q.y"])
     assert values["period"] == pytest.approx(0.012, rel=0.01)
@@ -116,7 +118,7 @@ def test_lead_error_of_a_screw_is_identified_with_its_period(hidden):
     assert_near(values, std, {"period": 0.012} | parts)
 
 
-def test_backlash_that_varies_over_a_turn_of_a_screw_is_identified(hidden):
+def test_backlash_that_varies_with_the_screw_angle_is_identified(hidden):
     found, true = hidden(gantry(), "_lead_backlash", LEAD, LONG)
     values, std = only(found, where="y", form="reversal_waves", of=["approach", "q.y"])
     assert values["period"] == pytest.approx(0.012, rel=0.01)
@@ -126,9 +128,7 @@ def test_backlash_that_varies_over_a_turn_of_a_screw_is_identified(hidden):
 
 
 @pytest.mark.parametrize(("below", "above"), [(1e-5, 2e-6), (2e-6, 1e-5)])
-def test_joint_with_two_compliances_is_identified_with_the_load_at_which_they_change(
-    hidden, below, above
-):
+def test_joint_with_two_compliances_is_identified(hidden, below, above):
     given = {"j2.below": below, "j2.above": above, "j2.knee": 4.0}
     found, true = hidden(arm(), "_two_steps", given)
     values, std = only(found, where="j2", form="knee", of=["wrench.j2.mz"])
@@ -136,22 +136,22 @@ def test_joint_with_two_compliances_is_identified_with_the_load_at_which_they_ch
     assert_near(values, std, {k: true[f"j2.{v}"] for k, v in truth.items()})
 
 
-def test_backlash_whose_side_follows_the_load_is_identified_with_its_size(hidden):
+def test_backlash_that_depends_on_the_load_sign_is_identified(hidden):
     found, true = hidden(arm(), "_torque_backlash", {"j2": 5e-5})
     values, std = only(found, where="j2", form="knee", of=["wrench.j2.mz"])
     assert_near(values, std, {"size": true["j2"]})
 
 
 def claimed(found, name, where):
-    """Parameters and standard deviations of the only effect claimed."""
+    """Return parameters and standard deviations of the only claimed effect."""
     (one,) = found["effects"]
     assert (found["verdict"], one["name"], one["where"]) == ("explained", name, where)
     rows = one["parameters"]
     return ({p["name"]: p[key] for p in rows} for key in ("value", "std"))
 
 
-def test_heavier_body_is_identified_with_its_mass_and_moments_of_inertia(hidden):
-    """The centre of mass follows from the first moments."""
+def test_mass_and_first_moments_of_a_body_are_identified(hidden):
+    """The first moments determine the centre of mass."""
     given = {"j4.mass": 0.5, "j4.moment.x": 0.05, "j4.moment.y": 0.03}
     weighed = replace(DESIGN, gravity=9.81)
     found, true = hidden(longer_arm(), "body_mass", given, weighed)
@@ -161,9 +161,7 @@ def test_heavier_body_is_identified_with_its_mass_and_moments_of_inertia(hidden)
 @pytest.mark.parametrize(("name", "where"), [
     ("thermal_expansion", ["j2", "j3", "tool"]), ("link_length", ["j3"])
 ])  # fmt: skip
-def test_thermal_expansion_of_bodies_without_beams_is_identified_with_its_rate(
-    hidden, name, where
-):
+def test_expansion_and_length_of_rigid_bodies_are_identified(hidden, name, where):
     found, true = hidden(arm(link=None), name, dict.fromkeys(where, 2e-5))
     assert_near(*claimed(found, name, where), true)
 

@@ -1,4 +1,4 @@
-"""Geometric errors and learned functions, found and saved."""
+"""Test the diagnosis of geometric errors and of effects outside the library."""
 
 from dataclasses import replace
 from functools import cache
@@ -26,7 +26,7 @@ SPATIAL = Robot("arm", "tool", (
 
 @pytest.fixture(scope="module")
 def inaccurate(tmp_path_factory):
-    """An arm whose frames are all off, measured by the program of springs."""
+    """Diagnosis of a simulated arm with errors of all frames."""
     folder = tmp_path_factory.mktemp("arm") / "campaign"
     errors = np.random.default_rng(3).normal(size=(4, 6)) * np.repeat([4e-4, 2e-4], 3)
     design = CampaignDesign(configurations=20, rows=40, load=20.0, reach=1.2)
@@ -38,10 +38,10 @@ def inaccurate(tmp_path_factory):
 
 
 def test_geometric_errors_are_not_reported_as_effects(inaccurate):
-    """No effect of the library is claimed for errors of all frames.
+    """No library effect is claimed.
 
-    After: 40 rows of 6 readings, each in one of five folds; their noise's rms has a
-    standard error of 0.046, and what some twenty unknowns leave open adds a little.
+    The standard error of the rms of the held-out noise is 0.046. The uncertainty of
+    about 20 unknowns increases the held-out error slightly.
     """
     found = inaccurate
     assert (found.verdict, found.claimed) == ("explained", ())
@@ -61,7 +61,7 @@ def test_geometric_errors_are_not_reported_as_effects(inaccurate):
 
 @pytest.fixture(scope="module")
 def diagnosed(tmp_path_factory):
-    """The planar arm, with changes to what was read; each once."""
+    """Return a function that diagnoses a planar arm with changed readings."""
 
     @cache
     def find(name):
@@ -79,9 +79,9 @@ def diagnosed(tmp_path_factory):
 
 
 def test_effect_outside_the_library_is_learned_as_a_function(diagnosed):
-    """The stand deforms with the square of the load: 6 sigma at 30 N.
+    """The stand deforms with the square of the load, by 6 sigma at 30 N.
 
-    Bodies of a planar arm that move with the load are equivalent.
+    The function may act at any body of the planar arm.
     """
     found = diagnosed("stand")
     assert (found.verdict, found.claimed) == ("learned", ())
@@ -105,8 +105,8 @@ def test_effect_outside_the_library_is_learned_as_a_function(diagnosed):
 
 
 @pytest.mark.slow
-def test_equivalent_places_of_a_learned_function_are_listed(diagnosed):
-    """In a planar arm any body that moves out of the plane is equivalent."""
+def test_learned_function_lists_equivalent_locations(diagnosed):
+    """In a planar arm, all motions perpendicular to the plane are equivalent."""
     found = diagnosed("sag")
     assert found.verdict == "learned"
     (one,) = table(found)["learned"]
@@ -117,7 +117,7 @@ def test_equivalent_places_of_a_learned_function_are_listed(diagnosed):
 
 @pytest.mark.slow
 def test_scatter_is_not_learned_as_a_function(diagnosed):
-    """Three times the stated noise, without repeats."""
+    """The noise is three times the declared sigma, and there are no repeats."""
     found = diagnosed("scatter")
     assert found.verdict == "outside_library"
     assert table(found)["learned"] == []

@@ -1,4 +1,4 @@
-"""The next measurement, on a bar with closed forms."""
+"""Test the choice of the next measurement with analytical solutions for a bar."""
 
 from dataclasses import replace
 
@@ -24,11 +24,11 @@ from tests.bar_for_tests import (
 from tests.planar_arm_for_tests import SIGMA
 
 
-def test_measurement_at_another_temperature_separates_expansion_from_length():
-    """d'(I + J C J')^-1 d by hand, where d = alpha L 10 K / sigma along the bar.
+def test_next_measurement_at_other_temperature_separates_expansion_from_length():
+    """The non-centrality d'(I + J C J')^-1 d is calculated by hand.
 
-    R readings at T leave the length sigma^2 / R and the expansion that much over
-    (L T)^2; at T + 10 K the latter is open by ((T + 10) / T)^2 / R.
+    The difference along the bar is d = alpha L 10 K / sigma.  The predicted expansion
+    at T + 10 K has the variance ((T + 10) / T)^2 / R from R readings at T.
     """
     R, T, alpha = 8, 5.0, 2e-5
     heat = {"temperature": np.full(R, T)}
@@ -36,7 +36,7 @@ def test_measurement_at_another_temperature_separates_expansion_from_length():
     campaign = bar(link=BEAM, measured=fit_of(plain, alpha * LENGTH * T), **heat)
     here = conditions_of(campaign)
     longer, warmer = machine(campaign, LONGER), machine(campaign, WARMER)
-    # a rival that is the fit itself, or nothing else, cannot be told from it
+    # The first rival is equal to the fit, so the second one is used.
     found = next_measurement(campaign, here, longer, [longer, warmer])
     assert found.covariates == {"temperature": T + 10}
     d = alpha * LENGTH * 10 / SIGMA[3]
@@ -45,11 +45,11 @@ def test_measurement_at_another_temperature_separates_expansion_from_length():
     assert "link_length and thermal_expansion" in found.why
 
 
-def test_next_configuration_lies_between_the_measured_ones():
-    """An encoder offset and an eccentricity are equal at 0 and at 2 pi: e = e cos q.
+def test_next_configuration_is_between_measured_configurations():
+    """An encoder offset e and an eccentricity e cos q are equal at 0 and 2 pi.
 
-    Between, they differ by e (1 - cos q) in the direction of either, of information
-    I = 1 / sr^2 + L^2 / st^2 a reading; the offset is open by 1 / (2 I).
+    Elsewhere they differ by e (1 - cos q). The information of one reading is I = 1 /
+    sr^2 + L^2 / st^2, and the variance of the offset is 1 / (2 I).
     """
     e = 3e-4
     seen = np.tile([0, 0, e, 0, LENGTH * e, 0], (2, 1))
@@ -75,9 +75,8 @@ def test_next_configuration_lies_between_the_measured_ones():
     )
 
 
-def test_next_temperature_exceeds_the_range_by_half():
-    """For 20 to 60 K the candidates are low,
-    middle and 20 + 1.5 times 40, the most distant."""
+def test_next_temperature_exceeds_the_measured_range_by_half():
+    """The range is 20 K to 60 K, so the highest candidate is 80 K."""
     heat = {"temperature": np.linspace(20.0, 60.0, 8)}
     plain = bar(link=BEAM, **heat)
     seen = fit_of(plain, 2e-6 * LENGTH) * heat["temperature"][:, None]
@@ -89,13 +88,12 @@ def test_next_temperature_exceeds_the_range_by_half():
         assert found.covariates == {"temperature": 80.0}
 
 
-def test_next_load_is_one_and_a_half_times_the_largest():
-    """A compliant drive under M against a drive with an offset:
-    1.5 M or -1.5 M separates them."""
+def test_next_load_is_1_5_times_the_largest_load():
+    """The models are a compliant drive under a moment M and an encoder offset."""
     M, k = 30.0, 2e5
     campaign = gives_way(M, k)
     here = conditions_of(campaign)
     softer, turned = machine(campaign, SOFTER, start=1e-6), machine(campaign, TURNED)
     found = next_measurement(campaign, here, softer, [turned])
     assert np.abs(found.load) == pytest.approx([0, 0, 1.5 * M, 0, 0, 0])
-    assert found.load[2] < 0  # against it they are farther apart
+    assert found.load[2] < 0  # the models differ most for the opposite load

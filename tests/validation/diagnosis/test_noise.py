@@ -1,4 +1,4 @@
-"""Scale of the noise, and outliers."""
+"""Test the estimated scale of the noise and the detection of outliers."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ from forcefit.validation.diagnosis.noise import (
 )
 
 
-def test_outliers_are_distinguished_from_noise():
+def test_outliers_are_detected():
     rng = np.random.default_rng(0)
     z = rng.normal(size=600)
     z[[5, 77, 300]] += [40.0, -25.0, 12.0]
@@ -19,12 +19,12 @@ def test_outliers_are_distinguished_from_noise():
     assert set(np.flatnonzero(good < 0.5)) == {5, 77, 300}
 
 
-def test_noise_alone_has_outliers_at_the_expected_rate():
+def test_pure_noise_has_few_outliers():
     rng = np.random.default_rng(1)
     called = [
         (probability_good(rng.normal(size=600) ** 2) < 0.5).any() for _ in range(300)
     ]
-    # beyond 4.4 sigma lies one reading in 80 000: one campaign of 600 in 130
+    # About one campaign in 130 contains a reading above the threshold of 4.4 sigma.
     assert np.mean(called) < 0.03
 
 
@@ -35,14 +35,14 @@ def test_many_large_residuals_are_not_outliers():
 
 
 @pytest.mark.parametrize("true", [0.5, 1.0, 3.0])
-def test_noise_scale_equals_that_of_the_residual(true):
+def test_estimated_noise_scale_equals_the_true_scale(true):
     z = true * np.random.default_rng(3).normal(size=2000)
     tau, std = scale(float(z @ z), 2000)
     assert tau == pytest.approx(true, rel=0.05)
     assert abs(tau - true) < 4 * std
 
 
-def test_repeat_scatter_is_about_the_mean_of_each_set():
+def test_repeat_scatter_agrees_with_hand_calculation():
     z = np.array([1.0, 3.0, 10.0, 10.0, 7.0])
     rms, freedom = repeat_scatter(z, np.array([4, 4, 2, 2, 9]))
     assert freedom == 2
@@ -54,7 +54,7 @@ def test_repeat_scatter_is_about_the_mean_of_each_set():
     (0.4, (0.5, 40), ["residual"]),
     (1.0, (2.0, 40), ["repeatable"]), (1.0, (2.0, 2), []),
 ])  # fmt: skip
-def test_noise_that_differs_from_the_stated_sigma_is_reported(tau, repeats, told):
+def test_noise_that_differs_from_sigma_is_reported(tau, repeats, told):
     found = findings(tau, 0.03, repeats, memory=False)
     assert len(found) == len(told)
     assert all(word in one for word, one in zip(told, found, strict=True))
@@ -63,7 +63,7 @@ def test_noise_that_differs_from_the_stated_sigma_is_reported(tau, repeats, told
 @pytest.mark.parametrize(("common", "words"), [
     ((1.2e-5, 5e-6), "5 um, 12 urad"), ((0.0, 2.54e-5), "25.4 um"), ((0.0, 0.0), ""),
 ])  # fmt: skip
-def test_common_noise_is_reported_with_its_sizes(common, words):
+def test_common_noise_is_reported_with_standard_deviations(common, words):
     told = findings(1.0, 0.03, (1.0, 40), memory=False, common=common)
     head = "noise common to the points of a row: "
     assert told == ((head + words,) if words else ())

@@ -1,4 +1,4 @@
-"""Noise of an Ornstein-Uhlenbeck process, drawn from its covariance as defined."""
+"""Test the estimate of noise that follows an Ornstein-Uhlenbeck process."""
 
 from types import SimpleNamespace
 
@@ -16,7 +16,7 @@ WITHIN_90 = 1.645
 
 
 def session(rows=ROWS, columns=(3, 4), sessions=None):
-    """Rows at equal steps of time, with the attributes of a campaign that are used."""
+    """Return an object with the required attributes of a campaign."""
     cells = np.zeros((rows, 6), dtype=bool)
     cells[:, columns] = True
     time = STEP * np.arange(rows)
@@ -29,7 +29,7 @@ def session(rows=ROWS, columns=(3, 4), sessions=None):
 
 
 def covariance_of(campaign, share=SHARE, constant=CONSTANT):
-    """(N, N) by its definition, cell against cell."""
+    """Return the covariance matrix (N, N) of the process."""
     rows, columns = np.nonzero(campaign.cells)
     time = campaign.covariates["time"][rows]
     own = [columns]
@@ -41,7 +41,7 @@ def covariance_of(campaign, share=SHARE, constant=CONSTANT):
 
 
 def design(campaign, rng):
-    """Slopes that vary slowly: a constant, a ramp, a wave and a half."""
+    """Return three slowly varying columns, which are a constant, a ramp and a wave."""
     rows, columns = np.nonzero(campaign.cells)
     time = campaign.covariates["time"][rows] / (ROWS * STEP)
     wave = np.sin(2 * np.pi * 1.5 * time + columns)
@@ -49,11 +49,11 @@ def design(campaign, rng):
 
 
 @pytest.mark.parametrize("sessions", [None, np.repeat([0, 1], ROWS // 2)])
-def test_covariance_is_that_of_least_squares_under_known_noise(sessions, rng):
-    """H G'R G H with the full R;
-    generalised least squares would have a smaller covariance.
+def test_covariance_under_correlated_noise_equals_matrix_formula(sessions, rng):
+    """The covariance of the least-squares estimate is H G'R G H.
 
-    (Gauss-Markov.)  With R = 1 the covariance is unchanged.
+    By the Gauss-Markov theorem, generalised least squares has a smaller covariance.
+    For R = 1, the covariance is H.
     """
     campaign = session(sessions=sessions)
     campaign.covariates["time"] = np.cumsum(rng.uniform(0, 2 * STEP, ROWS))
@@ -68,8 +68,8 @@ def test_covariance_is_that_of_least_squares_under_known_noise(sessions, rng):
     assert np.array_equal(white, H)
 
 
-def test_mean_of_an_ornstein_uhlenbeck_process_has_the_textbook_variance():
-    """(1 + f)/(1 - f) - 2 f (1 - f^n)/(n (1 - f)^2), over n; f = exp(-step/tau)."""
+def test_variance_of_an_ornstein_uhlenbeck_mean_equals_formula():
+    """[(1 + f)/(1 - f) - 2 f (1 - f^n)/(n (1 - f)^2)] / n with f = exp(-step/tau)."""
     campaign = session(columns=(3,))
     f, n = np.exp(-STEP / CONSTANT), ROWS
     expected = ((1 + f) / (1 - f) - 2 * f * (1 - f**n) / (n * (1 - f) ** 2)) / n
@@ -79,11 +79,11 @@ def test_mean_of_an_ornstein_uhlenbeck_process_has_the_textbook_variance():
 
 
 @pytest.mark.slow
-def test_intervals_of_90_per_cent_cover_the_true_value_under_correlated_noise(rng):
-    """The share and the time constant are estimated; intervals for white noise would
-    cover little more than half. For 200 campaigns of three independent unknowns the
-    rate is 0.9 +- 0.012. The fit removes part of the correlation, so that a slightly
-    lower rate is expected.
+def test_90_per_cent_intervals_are_valid_under_correlated_noise(rng):
+    """Most intervals include the true value, unlike intervals for white noise.
+
+    For 200 campaigns with three unknowns, the expected rate is 0.9 +- 0.012. It is
+    slightly lower because the fit removes part of the correlation.
     """
     campaign = session()
     G = design(campaign, rng)
@@ -104,21 +104,21 @@ def test_intervals_of_90_per_cent_cover_the_true_value_under_correlated_noise(rn
 
 
 @pytest.mark.parametrize("covariates", [{}, {"time": np.zeros(ROWS)}])
-def test_noise_in_time_is_none_without_different_times(covariates, rng):
+def test_noise_in_time_is_none_without_recorded_times(covariates, rng):
     campaign = session()
     z = np.linalg.cholesky(covariance_of(campaign)) @ rng.normal(size=2 * ROWS)
     campaign.covariates = covariates
     assert noise_in_time(campaign, z) is None
 
 
-def test_white_noise_is_not_correlated(rng):
+def test_white_noise_is_not_reported_as_correlated(rng):
     campaign = session()
     drawn = rng.normal(size=(100, int(campaign.cells.sum())))
     assert not any(noise_in_time(campaign, 0.3 * z) for z in drawn)
 
 
 def by_definition(campaign, z):
-    """Share, constant and probability from the likelihood of every R written out."""
+    """Return the estimate that maximises the likelihood with the full matrix R."""
     times = campaign.covariates["time"]
     sessions = np.zeros(len(campaign)) if campaign.session is None else campaign.session
     each = [np.sort(times[sessions == s]) for s in np.unique(sessions)]
@@ -132,12 +132,12 @@ def by_definition(campaign, z):
             squares = z @ np.linalg.solve(R, z)
             gain = len(z) * np.log(z @ z / squares) - np.linalg.slogdet(R)[1]
             best = max(best, (gain, share, constant))
-    return best[1], best[2], np.exp(-best[0] / 2)  # of two degrees of freedom
+    return best[1], best[2], np.exp(-best[0] / 2)  # chi-square with two degrees
 
 
 @pytest.mark.parametrize("sessions", [None, np.repeat([0, 1, 1], 12)])
-def test_likelihood_equals_that_of_the_full_covariance_matrix(sessions, rng):
-    """Rows in any order, at unequal steps of time."""
+def test_noise_in_time_equals_estimate_from_the_full_matrix(sessions, rng):
+    """The rows are not in the order of time, and the time steps differ."""
     campaign = session(36, (1, 3), sessions)
     campaign.covariates["time"] = rng.permutation(np.cumsum(rng.integers(0, 40, 36)))
     z = (
@@ -151,7 +151,7 @@ def test_likelihood_equals_that_of_the_full_covariance_matrix(sessions, rng):
 
 
 def test_noise_in_time_is_independent_between_points(rng):
-    """Two points that are read alternately are two independent series."""
+    """Two points that are measured alternately are two independent series."""
     one, both = session(40), session(80)
     both.point = np.tile(["p", "q"], 40)
     both.covariates["time"] = np.repeat(one.covariates["time"], 2)

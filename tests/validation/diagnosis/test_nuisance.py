@@ -1,4 +1,4 @@
-"""Nuisance parameters of a loaded bar, by hand."""
+"""Test geometric errors and springs as nuisance parameters of a loaded bar."""
 
 from dataclasses import replace
 
@@ -23,28 +23,28 @@ def loaded():
 
 
 def of_both_kinds(campaign, conditions, response):
-    """Return geometric errors and springs that are not library effects."""
+    """Return the geometric errors and the springs."""
     small = nuisance(
         campaign, conditions, response, np.zeros((campaign.cells.sum(), 0))
     )
     return small.take(~small.spring), small.take(small.spring)
 
 
-def test_nuisance_parameters_are_the_visible_geometry_and_springs_with_bounds(loaded):
-    """A force of 30 N along z at the end of the bar bends it about x and y."""
+def test_nuisance_parameters_of_a_loaded_bar_equal_expected_list(loaded):
+    """A force of 30 N along z at the end of the bar bends the bar about x and y."""
     campaign, conditions, response = loaded
     geometry, springs = of_both_kinds(campaign, conditions, response)
     assert not geometry.declared
     assert not springs.declared
-    # 0.2 rad and a tenth of the longest body
+    # The bounds are 0.2 rad and one tenth of the length.
     assert geometry.most == pytest.approx([*[0.2] * 3, *[0.1 * LENGTH] * 3] * 2)
     assert (springs.most == np.inf).all()
-    # The platform has no spring; the drive carries 4 N m about z.
+    # The platform has no spring.  The drive is loaded by 4 N m about z.
     assert set(springs.frame.tolist()) == {0}
     assert set(springs.axis.tolist()) == {0, 1, 2, 5}
 
 
-def test_tolerances_set_prior_sizes_and_zero_excludes_a_direction(loaded):
+def test_tolerances_are_prior_deviations_and_zero_excludes_an_error(loaded):
     campaign, _, _ = loaded
     tolerance = np.array([1e-3, 0, 1e-3, 2e-4, 0, 1e-4])
     frames = (replace(campaign.robot.frames[0], tolerance=tolerance),
@@ -62,8 +62,8 @@ def test_tolerances_set_prior_sizes_and_zero_excludes_a_direction(loaded):
     assert geometry.take(own).columns.shape == (48, 4)
 
 
-def test_unloaded_or_unread_directions_have_no_unknowns():
-    """Without load there are no springs; only directions that move x have unknowns."""
+def test_directions_without_load_or_reading_have_no_unknowns():
+    """Without a load, there are no springs.  Only x is measured."""
     seen = np.full((8, 6), np.nan)
     seen[:, 3] = 0.0
     campaign = bar(measured=seen)
@@ -75,8 +75,8 @@ def test_unloaded_or_unread_directions_have_no_unknowns():
     assert geometry.columns.shape == (8, 4)
 
 
-def test_nuisance_columns_sum_to_the_readings_of_a_changed_robot(loaded):
-    """The robot is built with small errors and springs."""
+def test_nuisance_columns_predict_the_readings_of_a_changed_robot(loaded):
+    """The changed robot has small geometric errors and springs."""
     campaign, conditions, response = loaded
     geometry, springs = of_both_kinds(campaign, conditions, response)
     rng = np.random.default_rng(1)
@@ -90,15 +90,15 @@ def test_nuisance_columns_sum_to_the_readings_of_a_changed_robot(loaded):
     assert robot.errors[geometry.frame, geometry.axis].tolist() == x.tolist()
 
 
-def test_rigid_springs_keep_their_declared_stiffness():
+def test_zero_or_negative_compliance_does_not_change_a_joint():
     robot = Robot("a", "tip", (Frame("one", joint="revolute"), Frame("tip", "one")))
     first, axes = np.zeros(2, int), np.array([0, 1])
     same = with_compliance(robot, first, axes, np.array([0.0, -1e-6]))
     assert same.frame("one").joint_stiffness is robot.frame("one").joint_stiffness
 
 
-def test_springs_of_passive_joints_leave_their_own_motion_free():
-    """A compliance of 1e-7 m/N in series with a rigid bearing that rotates freely."""
+def test_passive_joint_with_added_compliance_rotates_freely():
+    """A compliance of 1e-7 m/N is in series with a rigid bearing."""
     hinge = Frame("hinge", "base", joint="revolute")
     robot = Robot("a", "tip", (hinge, Frame("tip", "hinge")))
     first, axes = np.zeros(2, int), np.array([2, 4])

@@ -1,4 +1,4 @@
-"""Implausible parameters, from a campaign and its known sizes."""
+"""Test the detection of implausible parameters."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -15,7 +15,7 @@ from tests.planar_arm_for_tests import measured
 
 
 def found(effects, small=()):
-    """A machine with given parameters of effects, by their public names."""
+    """Return a fitted machine with given parameters of effects."""
     parts = [
         SimpleNamespace(
             session=None,
@@ -33,21 +33,21 @@ def found(effects, small=()):
 
 
 def made_badly(rotation, translation):
-    """A machine whose geometric errors have prior sizes [rad, m]."""
+    """Return a machine whose geometric errors have given prior deviations [rad, m]."""
     std = np.array([rotation, translation])
     return found({}, [Small("geometry", np.zeros(2, int), np.array([0, 3]), std)])
 
 
 @pytest.fixture(scope="module")
 def campaign(tmp_path_factory):
-    """An arm of about 1 m under 30 N."""
+    """Campaign of an arm of about 1 m under 30 N."""
     return measured(tmp_path_factory.mktemp("arm") / "campaign", configurations=8)
 
 
 @pytest.mark.parametrize(
     ("effect", "name", "fair", "absurd"),
     [
-        ("drive_compliance", "one", 3e5, 44.0),  # 30 N at 1 m: 0.7 rad
+        ("drive_compliance", "one", 3e5, 44.0),  # 0.7 rad for 30 N at 1 m
         ("base_compliance", "stiffness.tx", 1e7, 49.0),
         ("registration", "base.tx", 2e-3, 29.0),
         ("load_gain", "factor", 1.08, 0.016),
@@ -68,7 +68,7 @@ def test_implausible_parameter_is_reported_by_name(
     assert "declared stiffness" in one
 
 
-def test_device_frame_at_any_distance_is_plausible(campaign):
+def test_any_device_pose_is_plausible(campaign):
     frame, C = device_frame(conditions_of(campaign)), np.eye(6)
     x = np.array([0.0, 0.0, 0.0, 29.0, 0.0, 0.0])
     for device, doubted in ((False, 1), (True, 0)):
@@ -78,14 +78,14 @@ def test_device_frame_at_any_distance_is_plausible(campaign):
         assert len(implausible(campaign, fit)) == doubted
 
 
-def test_geometric_errors_of_a_fiftieth_of_the_robot_are_implausible(campaign):
-    """For an arm of about 1 m, errors of 5 cm in all frames are implausible."""
+def test_large_geometric_errors_are_implausible(campaign):
+    """The limit is 2 % of the size of the robot."""
     for size, doubted in ((2e-3, 0), (5e-2, 1)):
         assert len(implausible(campaign, made_badly(1e-3, size))) == doubted
 
 
-def test_temperatures_far_from_the_median_are_reported(campaign):
-    """150 K from the median, in kelvin or degrees."""
+def test_temperatures_far_from_the_median_are_impossible(campaign):
+    """The limit is a difference of 150 K."""
     for usual in (0.0, 293.0):
         heat = np.full(len(campaign), usual)
         heat[2], heat[4] = usual + 149.0, usual - 151.0

@@ -1,4 +1,4 @@
-"""Most likely prior sizes, against a search over the density."""
+"""Test prior standard deviations of maximum evidence against a general optimiser."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ def _case(seed=1):
     return X, group, X @ x + rng.normal(size=60)
 
 
-def test_best_prior_sizes_maximise_the_density():
+def test_optimised_prior_deviations_maximise_the_evidence():
     X, group, z = _case()
 
     def cost(logs):
@@ -30,8 +30,8 @@ def test_best_prior_sizes_maximise_the_density():
     assert [found.of_group[g] for g in (0, 1)] == pytest.approx(expected, rel=0.05)
 
 
-def test_penalty_of_a_prior_size_is_laplaces_approximation():
-    # ln of the average over a range R of ln t of exp(-gamma u^2) about its maximum
+def test_penalty_of_a_prior_deviation_agrees_with_quadrature():
+    # The average of exp(-gamma u^2) is computed by numerical integration.
     for gamma in (1.0, 6.0):
         u = np.linspace(-5.18, 5.18, 100001)
         average = np.log(np.trapezoid(np.exp(-gamma * u**2), u) / 10.36)

@@ -1,4 +1,4 @@
-"""Errors on parts of a variable's range, against refits."""
+"""Test extrapolation errors of functions against refits."""
 
 from types import SimpleNamespace
 
@@ -34,7 +34,7 @@ def model(columns, std, z, wet):
 
 
 def refitted(columns, std, z, wet):
-    """Rms of parts predicted by the others: normal equations, a free constant."""
+    """Return the rms error of parts of the range, each predicted from the others."""
     X = np.column_stack([columns, np.ones(ROWS)])
     precision = np.diag([*(std**-2.0), 0.0])
     order = np.argsort(np.argsort(wet))
@@ -47,7 +47,7 @@ def refitted(columns, std, z, wet):
     return np.sqrt(np.mean(left**2))
 
 
-def test_range_errors_equal_those_of_refits():
+def test_extrapolation_errors_equal_those_of_refits():
     rng = np.random.default_rng(8)
     wet = rng.uniform(0, 3, ROWS)
     z = rng.normal(size=ROWS) + 3 * wet
@@ -65,7 +65,7 @@ def test_range_errors_equal_those_of_refits():
     assert found.without == pytest.approx(refitted(nothing, np.zeros(0), z, wet))
 
 
-def test_range_of_a_variable_with_few_values_has_no_parts():
+def test_extrapolation_error_is_none_for_few_distinct_values():
     wet = np.repeat([0.0, 1.0], ROWS // 2)
     one = model(wet[:, None], np.ones(1), wet, wet)
     assert range_error(function_of("cov.wet"), one, one, np.arange(ROWS)) is None

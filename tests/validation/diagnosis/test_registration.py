@@ -1,4 +1,4 @@
-"""The device frame, from positions or rotations."""
+"""Test the estimated pose of the measuring device."""
 
 from dataclasses import replace
 
@@ -19,14 +19,14 @@ TURN, SHIFT = [0.3, -0.2, 0.5], [1.0, 0.5, -2.0]
 
 
 def seen_by(turn, shift):
-    """(8, 6) readings of a device of a bar without errors."""
+    """Return the readings (8, 6) of a bar by a device with a given pose."""
     p, R = LENGTH * along(bar()), Rotation.from_rotvec(turn)
     return np.hstack([np.tile(turn, (8, 1)), R.apply(p) + shift - p])
 
 
 @pytest.mark.parametrize("cell", range(6))
-def test_registration_ignores_rows_with_a_missing_cell(cell):
-    """The other cells of such a row are wrong in this test."""
+def test_registration_ignores_incomplete_rows(cell):
+    """The other readings in the incomplete row are wrong."""
     seen = seen_by(TURN, SHIFT)
     kind = slice(0, 3) if cell < 3 else slice(3, 6)
     seen[2, kind] += 0.3
@@ -42,10 +42,10 @@ def test_registration_ignores_rows_with_a_missing_cell(cell):
     assert list(guess.values()) == pytest.approx([*TURN, *SHIFT], abs=1e-9)
 
 
-def test_device_rotation_is_found_from_a_rotated_model():
-    """R = D M: the device's rotation D follows from R and the model's rotation M.
+def test_device_rotation_does_not_include_the_model_rotation():
+    """The measured rotation is R = D M, where D is the rotation of the device.
 
-    It is the mean where rows differ.
+    The estimate is the mean over all rows.
     """
     model = np.array([0.02, -0.03, 0.04])
     own = Rotation.from_rotvec(model)
@@ -60,7 +60,7 @@ def test_device_rotation_is_found_from_a_rotated_model():
 
 
 @pytest.mark.parametrize("points", [2, 3, 4])
-def test_registration_needs_three_points_that_are_not_collinear(points):
+def test_registration_requires_three_points_that_are_not_collinear(points):
     seen = seen_by(TURN, SHIFT)
     seen[:, :3], seen[points:] = np.nan, np.nan
     campaign = bar(measured=seen)
@@ -76,11 +76,8 @@ def test_registration_needs_three_points_that_are_not_collinear(points):
 
 @pytest.mark.parametrize("turn", [[0.6, -0.5, 0.62], [0.0, 3.0, 0.0]])
 @pytest.mark.parametrize("cells", ["all", "points", "one rotation", "rotations"])
-def test_device_frame_far_from_the_base_is_found_exactly(turn, cells):
-    """p' = R p + t and R' = R without noise: 1 rad and 3 m.
-
-    Without a position, the displacement is zero.
-    """
+def test_device_pose_far_from_the_base_is_estimated_exactly(turn, cells):
+    """The readings contain no noise.  Without positions, the translation is zero."""
     t = np.array([2.0, -2.0, 1.0])
     seen = seen_by(turn, t)
     if cells == "points":
@@ -90,7 +87,7 @@ def test_device_frame_far_from_the_base_is_found_exactly(turn, cells):
     if cells == "rotations":
         seen[:, 3:], t = np.nan, np.zeros(3)
     campaign = bar(measured=seen)
-    # without errors of the model a first guess is right already
+    # Without model errors, the start value is exact.
     guess = coarse_frame(campaign, conditions_of(campaign))
     assert list(guess) == list(BASE)
     assert list(guess.values()) == pytest.approx([*turn, *t], abs=1e-8)
@@ -99,7 +96,7 @@ def test_device_frame_far_from_the_base_is_found_exactly(turn, cells):
 
 
 def test_collinear_points_do_not_determine_the_device_rotation():
-    """Five positions of a slide half a metre from the base, without rotations."""
+    """The positions of a slide are collinear, and no rotations are measured."""
     robot = Robot("slide", "tip", (
         Frame("rail", translation=[0.3, 0.5, -0.2], rotation=[0.4, 0.2, 0]),
         Frame("slide", "rail", joint="prismatic", actuated=True),
@@ -117,8 +114,8 @@ def test_collinear_points_do_not_determine_the_device_rotation():
         register(campaign, conditions_of(campaign))
 
 
-def test_device_frame_is_found_in_the_presence_of_declared_errors():
-    """The declared error of the tip, 4 mm, is not part of the device frame."""
+def test_device_pose_does_not_include_declared_errors():
+    """The declared error of the tip is 4 mm."""
     plain = bar()
     errors = np.zeros((2, 6))
     errors[1] = [0, 0, 0, 1e-3, 4e-3, -2e-3]
@@ -134,8 +131,8 @@ def test_device_frame_is_found_in_the_presence_of_declared_errors():
     assert list(guess.values()) == pytest.approx([*turn, *t], abs=1e-8)
 
 
-def test_each_session_has_its_own_device_frame():
-    """Two device frames in two sessions; a session without rows is refused."""
+def test_device_pose_is_estimated_for_each_session():
+    """A session without rows raises an error."""
     plain, sessions = bar(), np.array(["a", "b"] * 4)
     p, seen = LENGTH * along(plain), np.zeros((8, 6))
     seen[:, :3] = np.nan

@@ -1,4 +1,4 @@
-"""Effects linearised together, against finite motions of a drive and a bar."""
+"""Test the linearisation of several effects against finite motions of a bar."""
 
 from dataclasses import replace
 
@@ -20,7 +20,7 @@ def columns():
 
 
 def moved():
-    """(120,) whitened readings of a turned drive and a longer bar, finite motions."""
+    """Return whitened readings (120,) of a longer bar with an encoder offset."""
     q = CAMPAIGN.coordinates[:, 0]
     still = np.zeros_like(q)
     place = [
@@ -46,12 +46,12 @@ def known(columns, z=NOTHING):
     return Relinearisation(columns.tangents, models)
 
 
-def test_combined_effects_move_the_bar_by_finite_motions(columns):
+def test_combined_effects_agree_with_finite_motions(columns):
     elements, xs = effects(columns)
     assert known(columns).combined(elements, xs) == pytest.approx(moved(), abs=0.02)
 
 
-def test_linearised_elements_are_exact_at_their_values(columns):
+def test_linearised_elements_are_exact_at_the_estimates(columns):
     elements, xs = effects(columns)
     again = known(columns).again(elements, xs)
     total = sum(
@@ -63,7 +63,7 @@ def test_linearised_elements_are_exact_at_their_values(columns):
     assert [e.origin for e in again] == elements
 
 
-def test_relinearised_model_finds_values_that_a_linear_one_misses(columns):
+def test_relinearised_model_is_more_accurate_than_linear_model(columns):
     elements, xs = effects(columns)
     z = moved() + np.random.default_rng(0).normal(size=120)
     again = known(columns, z)
@@ -76,7 +76,7 @@ def test_relinearised_model_finds_values_that_a_linear_one_misses(columns):
         assert abs(e.values(mean) - x) < 4 * spread
 
 
-def test_drive_stiffness_is_estimated_as_an_effect_not_as_a_nuisance_parameter(columns):
+def test_drive_stiffness_is_identified_as_a_library_effect(columns):
     loaded = replace(CAMPAIGN, loads=np.tile([0, 0, 5.0, 0, 9.0, 0], (20, 1)))
     loose = columns_of(loaded)
     small, robot = loose.nuisance, CAMPAIGN.robot

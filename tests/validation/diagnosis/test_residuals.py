@@ -1,4 +1,4 @@
-"""Residuals of a diagnosis: lack of fit, outliers, trends."""
+"""Test lack of fit, outliers and trends of residuals."""
 
 import numpy as np
 import pytest
@@ -15,18 +15,18 @@ from forcefit.validation.diagnosis.signatures import conditions_of, whiten
 from tests.campaigns_for_tests import campaign_of
 from tests.planar_arm_for_tests import SIGMA
 
-# Test whether the residual is noise.
+# The following tests are about lack of fit.
 
 
 def noisy(rng, rows=40, sets=10, size=1.0):
-    """Noise of ``size`` sigmas, each configuration measured rows / sets times."""
+    """Return noise of ``size`` sigmas for repeated configurations."""
     z = size * rng.normal(size=(rows, 6))
     z[rng.random(z.shape) < 0.1] = np.nan
     return campaign_of(z * SIGMA, SIGMA, np.arange(rows) % sets)
 
 
-def test_lack_of_fit_probabilities_of_noise_are_uniform(rng):
-    """False alarms occur at the stated rate."""
+def test_p_values_of_noise_are_uniform(rng):
+    """The rate of false alarms agrees with the significance level."""
     found = []
     for _ in range(300):
         campaign = noisy(rng)
@@ -39,9 +39,8 @@ def test_lack_of_fit_probabilities_of_noise_are_uniform(rng):
     assert not any(one.significant for one in found)
 
 
-def test_scatter_between_repeats_equals_hand_calculation():
-    """Readings 1 and 3:
-    squared deviations of 2 about their mean, one degree of freedom."""
+def test_scatter_of_repeats_agrees_with_hand_calculation():
+    """Readings of 1 and 3 have a sum of squares of 2 and one degree of freedom."""
     seen = np.full((3, 6), np.nan)
     seen[:, 4] = [1.0, 3.0, 50.0]
     campaign = campaign_of(seen, repeat=[0, 0, 1])
@@ -51,8 +50,8 @@ def test_scatter_between_repeats_equals_hand_calculation():
     assert found.rms == pytest.approx(np.sqrt(2510 / 2))
 
 
-def test_equal_repeats_make_any_residual_a_lack_of_fit():
-    """The device rounds its readings, so that repeats are equal."""
+def test_any_residual_is_lack_of_fit_if_repeats_are_equal():
+    """Repeats may be equal because the device rounds its readings."""
     seen = np.full((4, 6), np.nan)
     seen[:, 4] = [1.0, 1.0, 3.0, 3.0]
     campaign = campaign_of(seen, repeat=[0, 0, 1, 1])
@@ -75,8 +74,7 @@ def test_campaign_without_repeats_has_no_repeat_scatter():
 
 @pytest.mark.parametrize("from_zero", [-40.0, 0.0, 300.0])
 def test_same_command_at_another_temperature_is_not_a_repeat(from_zero):
-    """A difference within a thirtieth of the range counts as a repeat,
-    from any zero of the scale; time does not count."""
+    """Temperatures are equal if they differ by less than 1/30 of their range."""
     seen = np.full((4, 6), np.nan)
     seen[:, 4] = [1.0, 3.0, 50.0, 7.0]
     temperature = from_zero + np.array([0.0, 0.2, 9.0, 10.0])
@@ -87,7 +85,7 @@ def test_same_command_at_another_temperature_is_not_a_repeat(from_zero):
     assert (found.repeats_freedom, found.repeats) == (1, pytest.approx(np.sqrt(2)))
 
 
-def test_noise_above_the_stated_sigma_is_not_a_lack_of_fit(rng):
+def test_large_noise_is_not_lack_of_fit(rng):
     campaign = noisy(rng, 120, 20, size=2.0)
     found = lack_of_fit(campaign, whiten(campaign, campaign.measured), 0)
     assert found.probability < SIGNIFICANT
@@ -97,8 +95,8 @@ def test_noise_above_the_stated_sigma_is_not_a_lack_of_fit(rng):
 
 
 @pytest.mark.parametrize("size", [1.0, 2.0])
-def test_deviation_common_to_repeats_is_a_lack_of_fit(size, rng):
-    """2 sigma common to all visits of a configuration, at any noise."""
+def test_deviation_common_to_repeats_is_lack_of_fit(size, rng):
+    """The deviation of each configuration is two sigma."""
     campaign = noisy(rng, 120, 20, size)
     shared = 2 * size * rng.normal(size=(20, 6))[campaign.repeat] * SIGMA
     z = whiten(campaign, campaign.measured + shared)
@@ -114,11 +112,11 @@ def test_large_residuals_are_outliers(rng):
     assert np.flatnonzero(outlying(campaign_of(z), z.ravel())).tolist() == [3, 20]
 
 
-# Trends of the residual.
+# The following tests are about trends.
 
 
 def varied(rng, rows=120):
-    """A post under loads in all directions, in wet and dry air; noise."""
+    """Return a campaign of noise with varying loads and covariates."""
     loads = np.zeros((rows, 6))
     loads[:, 3:] = 20 * rng.normal(size=(rows, 3))
     return campaign_of(
@@ -128,9 +126,8 @@ def varied(rng, rows=120):
     )  # fmt: skip
 
 
-def test_false_alarm_rate_of_trends_is_the_stated_one(rng, monkeypatch):
-    """Over all trends;
-    tested at 5 % instead of 0.1 %, for which 100 campaigns suffice."""
+def test_false_alarm_rate_of_trends_equals_significance_level(rng, monkeypatch):
+    """The level is 5 % instead of 0.1 % to limit the number of campaigns."""
     monkeypatch.setattr(module, "UNLIKELY", 0.05)
     alarms = 0
     for _ in range(100):

@@ -1,4 +1,4 @@
-"""Responses to small screws, by hand, at one posture or many."""
+"""Test the responses of the readings to small screws against hand calculation."""
 
 from dataclasses import replace
 
@@ -18,23 +18,22 @@ LOAD = np.array([0.3, -0.2, 3.0, 1.0, 5.0, -2.0])
 
 
 def loaded(rows=8, **given):
-    """A bar of beams and its conditions under a load in all directions."""
+    """Return a campaign of a loaded elastic bar and its conditions."""
     campaign = bar(LOAD, rows=rows, link=BEAM, **given)
     return campaign, conditions_of(campaign)
 
 
 def turns_of(campaign):
-    """(R, 3, 3) axes of the bar in the base's."""
+    """Return the rotation matrices (R, 3, 3) of the bar."""
     q = campaign.coordinates[:, 0]
     return np.stack([rotation_matrix(np.array([0, 0, angle])) for angle in q])
 
 
 @pytest.mark.parametrize("rows", [1, 50, 51, 120])
-def test_responses_equal_hand_calculation_for_screws_and_wrenches(rows):
-    """For any number and order of postures.
+def test_screw_responses_and_wrenches_agree_with_hand_calculation(rows):
+    """A screw at the drive is in base axes, and a screw at the tip is in bar axes.
 
-    The screw of a drive rotates the whole bar, in base axes; the tip's screw is in the
-    axes of the bar. The wrench at the drive has the moment of the forces at the tip.
+    The postures may be in any order and may occur several times.
     """
     campaign, once = loaded(rows)
     order = np.append(np.arange(rows)[::-1], np.arange(0, rows, 3))
@@ -53,9 +52,8 @@ def test_responses_equal_hand_calculation_for_screws_and_wrenches(rows):
     assert not found.wrenches[:, 1].any()
 
 
-def test_readings_of_small_screws_follow_the_device_frame():
-    """R (t + r x arm), where the arm ends at the measured point;
-    rotations by Rodrigues."""
+def test_readings_of_small_screws_are_in_device_axes():
+    """The reading is R (t + r x arm), where the arm ends at the measured point."""
     campaign, conditions = loaded()
     b, point, tool = np.array([0.4, -0.9, 0.7]), [0.1, -0.2, 0.3], [0.05, 0.02, -0.1]
     conditions = replace(
@@ -78,7 +76,7 @@ def test_readings_of_small_screws_follow_the_device_frame():
 
 
 def test_response_of_a_row_without_a_solution_is_zero():
-    """A closed chain with an unknown error; other rows are as before."""
+    """One row of a closed chain has an unknown error.  Other rows do not change."""
     at = home_posture(five_bar())
     three = replace(
         at, coordinates=np.stack([at.coordinates] * 3),
@@ -98,11 +96,8 @@ def test_response_of_a_row_without_a_solution_is_zero():
 
 @pytest.mark.parametrize("held", [False, True])
 @pytest.mark.parametrize("closed", [False, True])
-def test_clearance_closed_by_the_load_does_not_change_the_response(held, closed):
-    """To first order the joint stays where the load has shifted it.
-
-    For an open and a closed chain.
-    """
+def test_response_does_not_depend_on_clearance_under_load(held, closed):
+    """The load keeps the joint at the boundary of its clearance."""
     if closed:
         robot, loose = five_bar(), "right.elbow"
         load = [0, 0, 0, 5.0, 20.0, 0]
@@ -127,8 +122,8 @@ def test_clearance_closed_by_the_load_does_not_change_the_response(held, closed)
     assert tight.wrenches.any()
 
 
-def test_clearance_in_one_of_two_parallel_springs_does_not_change_the_load():
-    """Each spring carries half: responses equal those without clearance."""
+def test_clearance_in_a_parallel_spring_does_not_change_its_load():
+    """Each of the two springs transmits half of the load."""
     spring = np.eye(6) * 1e6
     robot = Robot("pair", "end_a", (
         Frame("a", joint_stiffness=spring, clearance=Clearance(radial=1e-5)),

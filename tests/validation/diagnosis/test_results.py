@@ -1,4 +1,4 @@
-"""The public format of a mock diagnosis, value by value."""
+"""Test the conversion of a diagnosis to plain values."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -14,7 +14,7 @@ from tests.bar_for_tests import LONGER, TURNED, bar
 
 
 def fitted(robot, parts, x, std):
-    """A machine with effects and nuisance parameters of known values."""
+    """Return a fitted machine with given parameters and standard deviations."""
     effects = tuple(Acting(p, np.zeros(1)) for p in parts if not isinstance(p, Small))
     small = tuple(p for p in parts if isinstance(p, Small))
     unknowns = Unknowns(robot, effects, small)
@@ -26,8 +26,8 @@ def diagnosis(campaign, fit, **more):
     return SimpleNamespace(campaign=campaign, fit=fit, robot=fit.robot, **more)
 
 
-def test_effect_table_has_values_deviations_and_90_per_cent_intervals():
-    """The intervals extend 1.645 standard deviations to either side."""
+def test_effect_has_value_standard_deviation_and_90_per_cent_interval():
+    """The half width of the interval is 1.645 standard deviations."""
     fit = fitted(bar().robot, [TURNED, LONGER], [3e-4, -2e-4], [2e-5, 1e-5])
     one = diagnosis(bar(), fit, probability={"link_length": 0.9})
     turned, length = module.effects(one)
@@ -42,8 +42,8 @@ def test_effect_table_has_values_deviations_and_90_per_cent_intervals():
     assert "found" not in number
 
 
-def test_effect_table_has_declared_value_difference_and_corrected_value():
-    """0.5 mrad in the file and 0.3 mrad more in the machine: 0.8 mrad are saved."""
+def test_declared_effect_has_declared_value_difference_and_sum():
+    """The declared value is 0.5 mrad, and the difference is 0.3 mrad."""
     campaign = bar()
     robot = replace(campaign.robot, effects={"encoder_offset": {"drive": 5e-4}})
     campaign = replace(campaign, robot=robot)
@@ -56,9 +56,11 @@ def test_effect_table_has_declared_value_difference_and_corrected_value():
     assert number["found"] == pytest.approx(expected)
 
 
-def test_nuisance_parameters_are_listed_by_frame_and_individually():
-    """Frames about which the readings say hardly anything are left out; units follow
-    the kind. The reported share is 1 minus the variance over that of the prior."""
+def test_nuisance_parameters_are_listed_with_determined_fractions():
+    """The fraction is 1 minus the posterior variance over the prior variance.
+
+    Frames with a small fraction are omitted from the list of frames.
+    """
     geometry = Small(GEOMETRY, np.array([0, 0, 1, 1]), np.array([2, 3, 0, 5]),
                      np.array([1e-4, 2e-4, 1e-4, 2e-4]))  # fmt: skip
     springs = Small(SPRINGS, np.zeros(2, int), np.array([1, 4]), np.array([1e-7, 1e-9]))

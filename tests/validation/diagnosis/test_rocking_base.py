@@ -1,7 +1,7 @@
-"""A rocking base with a tilt sensor: a measured motion of known or fitted gain.
+"""Test a robot on a rocking base whose tilt is measured by a sensor.
 
-The machine is rotated rigidly, by rotation matrices about its base; the model under
-test has the rotation as a function of the base, to first order.
+The simulated machine rotates by rotation matrices.  In the tested model, the rotation
+is a first-order function that acts at the base.
 """
 
 from dataclasses import replace
@@ -20,11 +20,11 @@ from forcefit.validation.diagnosis.results import learned
 from tests.campaigns_for_tests import write_campaign
 
 SIGMA, ROWS, ROCKING = 2e-5, 80, 1e-3
-GAIN = 0.8  # of a sensor that is read in units of its own
+GAIN = 0.8  # rotation of the base per unit of the sensor value
 
 
 def arm():
-    """Two turning joints at right angles, half a metre up."""
+    """Return an arm with two perpendicular revolute joints."""
     frames = (
         Frame("one", translation=[0, 0, 0.5], joint="revolute", actuated=True),
         Frame("two", "one", [0.4, 0, 0], [np.pi / 2, 0, 0], joint="revolute",
@@ -36,7 +36,7 @@ def arm():
 
 @pytest.fixture
 def rocking(tmp_path):
-    """The arm's tip seen by a tracker, while its base rocks about y as ``cov.tilt``."""
+    """Campaign of an arm whose base rocks about y, with the covariate ``cov.tilt``."""
     rng = np.random.default_rng(8)
     q = rng.uniform(-1.2, 1.2, (ROWS, 2))
     tilt = ROCKING * rng.normal(size=ROWS)
@@ -59,21 +59,20 @@ def rocking(tmp_path):
 
 
 def with_gain(campaign, gain):
-    """The campaign of a robot whose file says that its base turns with the sensor."""
+    """Return the campaign with a robot whose base rotates with the sensor value."""
     turn = Function("base", ("ry",), ("cov.tilt",), "powers", {"1": gain})
     return replace(campaign, robot=replace(campaign.robot, functions=(turn,)))
 
 
-def test_prediction_with_the_known_gain_of_a_motion_is_accurate_to_the_noise(rocking):
-    """1 mrad at 0.7 m is about twenty sigma,
-    a gain that is too large by 0.2 about four sigma."""
+def test_prediction_error_equals_the_noise_for_the_true_gain(rocking):
+    """The effect is about 20 sigma.  An error of 0.2 in the gain is about 4 sigma."""
     assert predict(rocking).error.normalised > 8
     assert 0.85 < predict(with_gain(rocking, GAIN)).error.normalised < 1.15
     assert predict(with_gain(rocking, 1.0)).error.normalised > 2
 
 
 def test_unknown_gain_of_a_measured_motion_is_learned(rocking):
-    """240 readings of rotations of 1 mrad determine the gain to a few thousandths."""
+    """The standard error of the gain is a few thousandths."""
     found = diagnose(rocking)
     assert found.verdict == "learned"
     assert 0.8 < found.after.normalised < 1.2

@@ -1,4 +1,4 @@
-"""Damaged covariance files are rejected in one line."""
+"""Test the reading of damaged covariance files."""
 
 from dataclasses import replace
 
@@ -24,7 +24,7 @@ def cut_to(share):
      lambda content: content.replace(b"\x08\x00", b"\x63\x00")],
     ids=["empty", "third", "end", "text", "compression"],
 )  # fmt: skip
-def test_damaged_covariance_file_is_rejected_by_name(tmp_path, damage):
+def test_damaged_covariance_file_is_rejected(tmp_path, damage):
     path = tmp_path / "saved.npz"
     write_covariance(SavedCovariance((), np.zeros((0, 0))), path)
     robot = replace(load_robot("arm6"), diagnosis={"covariance": str(path)})

@@ -1,4 +1,4 @@
-"""Saved robots: their predictions have the printed errors."""
+"""Test the robots that a diagnosis saves."""
 
 import json
 from dataclasses import asdict, replace
@@ -20,16 +20,16 @@ from tests.elastic_arm_for_tests import arm, commanded
 from tests.planar_arm_for_tests import SIGMA
 
 ERRORS = np.random.default_rng(3).normal(size=(4, 6)) * np.repeat([4e-4, 2e-4], 3)
-ROWS = 72  # configurations, so that one split judges
+ROWS = 72  # number of configurations, sufficient for a single split
 
 
 def machine():
-    """Errors of all frames, and an offset of the third drive."""
+    """Return the true machine, with errors of all frames and an encoder offset."""
     return arm(encoder_offset={"j3": 2e-3}).with_errors(ERRORS)
 
 
 def read(campaign, seed=5):
-    """Readings of the machine for the commands of a campaign, with noise."""
+    """Return the campaign with noisy readings of the true machine."""
     noise = SIGMA * np.random.default_rng(seed).normal(size=(len(campaign), 6))
     seen = predicted(replace(campaign, robot=machine())).deviation + noise
     return replace(campaign, measured=seen)
@@ -47,8 +47,8 @@ def saved(found, tmp_path_factory):
     return read_robot(path)
 
 
-def test_saved_robot_predicts_the_printed_errors(found, saved):
-    """To the ten digits of the file, over all rows except outliers."""
+def test_saved_robot_predicts_with_the_reported_error(found, saved):
+    """The robot file has ten digits, and outliers are omitted."""
     again = predict(replace(found.campaign, robot=saved).take(~found.outliers))
     printed = asdict(found.saved)
     assert asdict(again.error) == pytest.approx(printed, rel=1e-6)
@@ -56,8 +56,8 @@ def test_saved_robot_predicts_the_printed_errors(found, saved):
     assert written["error"]["saved"] == pytest.approx(printed)
 
 
-def test_table_of_a_diagnosis_has_the_printed_errors(found):
-    """The rms of the residuals over all rows except outliers is that of the text."""
+def test_residuals_in_the_table_have_the_reported_rms(found):
+    """Outliers are omitted."""
     pytest.importorskip("xarray")
     table = found.to_pandas()
     kept = table[~table["outlier", ""].astype(bool)]
@@ -67,8 +67,8 @@ def test_table_of_a_diagnosis_has_the_printed_errors(found):
     assert table["held_out", ""].sum() == found.held.rows.sum()
 
 
-def test_error_after_comes_from_a_fit_without_the_held_out_rows(found):
-    """The same unknowns are fitted to the other rows alone."""
+def test_held_out_error_is_that_of_a_fit_to_other_rows(found):
+    """The same unknowns are fitted again without the held-out rows."""
     assert found.held.how == "split"
     used = ~found.held.rows & ~found.outliers
     blind = np.where(found.held.rows[:, None], np.nan, found.campaign.measured)
@@ -78,7 +78,7 @@ def test_error_after_comes_from_a_fit_without_the_held_out_rows(found):
     error = errors_of(found.campaign, left, found.held.rows & ~found.outliers)
     assert error.normalised == pytest.approx(found.after.normalised, rel=2e-3)
     assert found.before.normalised > 20
-    # 18 rows of six readings, and what some twenty unknowns leave open
+    # The tolerance is due to the noise of 18 rows and the uncertainty of the fit.
     assert 0.75 < found.after.normalised < 1.35
 
 
@@ -92,8 +92,8 @@ def test_saved_robot_is_fitted_to_all_rows(found, saved):
 
 
 @pytest.mark.parametrize("change", ["noise", "anything"])
-def test_held_out_readings_change_only_the_stated_errors(found, change):
-    """Effects, functions, probabilities and unknowns are selected without them."""
+def test_held_out_readings_affect_only_errors_and_verdict(found, change):
+    """They are not used to select effects, functions or unknowns."""
     rng = np.random.default_rng(8)
     held, readings = found.held.rows, found.campaign.measured.copy()
     size = SIGMA if change == "noise" else 1e-2
@@ -113,8 +113,8 @@ def test_held_out_readings_change_only_the_stated_errors(found, change):
         assert not again.claimed
 
 
-def test_saved_robot_preserves_the_measured_point(found, saved):
-    """Predictions at another point report the point of identification."""
+def test_saved_robot_contains_the_measured_point(found, saved):
+    """A prediction for another point reports the measured point."""
     point = tuple(found.campaign.reference_point.tolist())
     assert saved.reference_point == pytest.approx(point)
     same = predict(replace(found.campaign, robot=saved)).table()
@@ -125,8 +125,8 @@ def test_saved_robot_preserves_the_measured_point(found, saved):
     assert told["reference_point"] == [0.0, 0.0, 0.0]
 
 
-def test_table_without_campaign_uses_the_point_of_the_saved_robot(found, tmp_path, run):
-    """By the command, for two rows of the campaign."""
+def test_prediction_uses_the_reference_point_of_the_robot(found, tmp_path, run):
+    """The table contains two rows, and the readings are predicted by the command."""
     save(found, tmp_path / "robot.toml")
     campaign = found.campaign.take(np.arange(2))
     names = ("mx", "my", "mz", "fx", "fy", "fz")
@@ -154,10 +154,10 @@ def test_table_without_campaign_uses_the_point_of_the_saved_robot(found, tmp_pat
     assert {f"std.{c}" for c in ("rx", "tz")} <= set(head)
 
 
-def test_predicted_intervals_cover_nine_readings_in_ten(found, saved):
-    """For 120 new rows; intervals include covariance and noise.
+def test_90_per_cent_of_new_readings_are_in_predicted_intervals(found, saved):
+    """The intervals include the uncertainty of the parameters and the noise.
 
-    720 readings whose errors of the model are common: five standard errors of 0.011.
+    The tolerance is five standard errors of 0.011 for 720 readings.
     """
     fresh = read(commanded(saved, 120, seed=11, reach=1.4), seed=12)
     told = predict(fresh)
@@ -168,8 +168,8 @@ def test_predicted_intervals_cover_nine_readings_in_ten(found, saved):
     assert told.spread.max() > 0.1 * SIGMA.min()
 
 
-def test_unmeasured_components_are_reported_as_uncertain(tmp_path):
-    """Only heights are measured: x and y are uncertain by the errors of frames."""
+def test_predictions_of_unmeasured_components_are_uncertain(tmp_path):
+    """Only tz is measured."""
     seen = read(commanded(arm(), 24))
     blind = seen.measured.copy()
     blind[:, :5] = np.nan
@@ -181,18 +181,20 @@ def test_unmeasured_components_are_reported_as_uncertain(tmp_path):
     fresh = read(commanded(robot, 30, seed=11, reach=1.4), seed=12)
     told = predict(fresh)
     left = fresh.measured - told.prediction.deviation
-    # Predictions in directions that were never measured are uncertain.
+    # The predictions of tx and ty are uncertain.
     assert np.median(told.spread[:, 3:5]) > 3 * SIGMA[3]
     inside = np.abs(left) < 2.6 * np.hypot(told.spread, told.noise)
     assert np.mean(inside[:, 3:]) > 0.9
-    # Statements about all rows refer to the measured component.
+    # Summaries over all rows include only the measured component.
     std = told.table()["std"]
     assert std["position"] == pytest.approx(np.sqrt(np.mean(told.spread[:, 5] ** 2)))
     assert np.isnan(std["rotation"])
 
 
-def test_robot_that_predicts_worse_is_not_saved(found, tmp_path, run, monkeypatch):
-    """Exit status 1 and no file, whatever the verdict."""
+def test_robot_with_larger_held_out_error_is_not_saved(
+    found, tmp_path, run, monkeypatch
+):
+    """The exit status is 1 for any verdict."""
     folder = tmp_path / "campaign"
     folder.mkdir()
     worse = replace(found, after=found.before, before=found.after, verdict="learned")

@@ -1,4 +1,4 @@
-"""Model search of a diagnosis, for a drive and a bar with closed forms."""
+"""Test the selection of effects for a bar with analytical solutions."""
 
 from dataclasses import replace
 
@@ -21,13 +21,16 @@ def columns():
 
 
 def turned(angle):
-    """(R, 6) readings of a bar whose drive is off by angles (R,)."""
+    """Return the readings (R, 6) of a bar for drive errors (R,)."""
     still = np.zeros((ROWS, 2))
     return np.hstack([still, angle[:, None], LENGTH * angle[:, None] * ACROSS])
 
 
 def found(columns, readings, seed=0, *, noise=1.0):
-    """Selection from readings (R, 6) with noise, in three of four cells."""
+    """Return the selected model for readings (R, 6) with noise.
+
+    Three of four cells are fitted.
+    """
     z = (readings / CAMPAIGN.sigma).ravel()
     z = z + noise * np.random.default_rng(seed).normal(size=len(z))
     cells = columns.row % 4 > 0
@@ -35,23 +38,23 @@ def found(columns, readings, seed=0, *, noise=1.0):
 
 
 @pytest.mark.parametrize("noise", [0.5, 1.0, 2.0, 3.0])
-def test_noise_of_any_scale_leads_to_no_selected_effect(columns, noise):
+def test_no_effect_is_selected_from_noise(columns, noise):
     selected = found(columns, np.zeros((ROWS, 6)), noise=noise)
     assert selected.hypotheses == selected.functions == ()
     assert max(selected.probability.values(), default=0.0) < 0.1
     assert selected.noise.tau == pytest.approx(noise, rel=0.2)
 
 
-def test_longer_bar_is_identified_with_its_length_error(columns):
+def test_length_error_of_a_bar_is_identified(columns):
     sigma = CAMPAIGN.sigma[0, 3]
     longer = np.hstack([np.zeros((ROWS, 3)), 8 * sigma * along(CAMPAIGN)])
     selected = found(columns, longer)
     assert [h.effect for h in selected.hypotheses] == ["link_length"]
-    # of the 30 rows fitted every one tells the length to a sigma
+    # The standard error from 30 fitted rows is sigma / sqrt(30).
     assert selected.values[0] == pytest.approx(8 * sigma, abs=4 * sigma / 30**0.5)
 
 
-def test_gear_harmonics_are_identified_with_their_number_per_turn(columns):
+def test_order_of_a_gear_harmonic_is_identified(columns):
     sigma = CAMPAIGN.sigma[0, 3]
     selected = found(columns, turned(12 * sigma * np.sin(5 * TURN + 0.4)))
     assert selected.hypotheses == ()
@@ -62,7 +65,7 @@ def test_gear_harmonics_are_identified_with_their_number_per_turn(columns):
     assert one.probability > 0.9
 
 
-def test_growth_with_time_is_attributed_to_a_body_instead_of_the_reading(columns):
+def test_growth_of_a_bar_is_identified_as_function_of_time(columns):
     sigma = CAMPAIGN.sigma[0, 3]
     grown = 12 * sigma * (TIME / TIME.max())[:, None] * along(CAMPAIGN)
     selected = found(columns, np.hstack([np.zeros((ROWS, 3)), grown]))
@@ -80,12 +83,10 @@ def test_model_search_excludes_outliers(columns):
     assert (selected.weights < 0.5).sum() == 3
 
 
-def test_effects_that_are_visible_only_through_round_off_are_excluded():
+def test_effects_visible_only_through_round_off_are_excluded():
     campaign = bar(link=BEAM, rows=ROWS, spread=0.0, time=TIME)
     measured = np.full((ROWS, 6), np.nan)
-    measured[:, 3] = (
-        0.0  # along the bar, which a drive rotation changes only by round-off
-    )
+    measured[:, 3] = 0.0  # a drive rotation does not change this component
     campaign = replace(campaign, measured=measured)
     known = columns_of(campaign)
     assert (("drive", "rz", "screw"),) not in known.functions.places.names

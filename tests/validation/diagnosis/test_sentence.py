@@ -1,4 +1,4 @@
-"""Learned functions and tallies as readable text."""
+"""Test the text about learned functions and error rates."""
 
 from dataclasses import replace
 
@@ -9,7 +9,7 @@ from forcefit.validation.diagnosis.calibration import Calibration
 from forcefit.validation.diagnosis.sentence import calibration_text, formula
 
 
-def test_formula_of_a_product_names_both_variables():
+def test_formula_of_a_product_contains_both_variables():
     numbers = {"0.0": 1.0, "1.0": 2.0, "0.1": 3.0, "2.1": -4.0}
     function = Function("drive", ("rz",), ("q.drive", "cov.bed"), "powers", numbers)
     assert formula(function) == "rz = 1 + 2 drive + 3 bed + -4 drive^2 bed"
@@ -32,12 +32,12 @@ def test_formula_of_a_product_names_both_variables():
         ("step", {"size": 2.0, "at": 0.5}, "rz = 2 step.size(drive)"),
     ],
 )  # fmt: skip
-def test_formula_has_each_coefficient_before_its_factor(form, parameters, expected):
+def test_formula_equals_expected_text_for_each_form(form, parameters, expected):
     function = Function("drive", ("rz",), ("q.drive",), form, parameters)
     assert formula(function) == expected
 
 
-def test_calibration_text_states_counts_and_shares():
+def test_calibration_text_contains_counts_and_percentages():
     tally = Calibration(
         20, {"none_needed": 19, "explained": 1}, {"explained": 18, "ambiguous": 2},
         0.85, 0.025,
@@ -51,7 +51,7 @@ def test_calibration_text_states_counts_and_shares():
     assert "named the" not in unnamed
 
 
-def test_formula_of_a_compliance_states_the_factor_of_the_wrench():
+def test_formula_of_a_compliance_mentions_the_wrench():
     function = Function(
         "drive", ("rz", "tx"), ("q.drive",), "powers",
         {"rz.1": 2e-3, "tx.1": 3e-3}, "compliance",

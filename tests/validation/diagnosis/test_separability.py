@@ -1,4 +1,4 @@
-"""Angles between signatures, against planes of known angles."""
+"""Test angles between signatures for lines and planes of known angles."""
 
 import numpy as np
 import pytest
@@ -10,8 +10,8 @@ def columns(*vectors):
     return 10 * np.array(vectors, dtype=float).T
 
 
-def test_cosine_of_two_lines_is_the_cosine_of_their_angle():
-    """The angle between two lines in a plane is 60 degrees."""
+def test_cosine_of_two_lines_equals_that_of_their_angle():
+    """The angle between the lines is 60 degrees."""
     found = compare_signatures({
         "a": columns([1, 0, 0]), "b": columns([0.5, np.sqrt(0.75), 0])
     })  # fmt: skip
@@ -21,8 +21,8 @@ def test_cosine_of_two_lines_is_the_cosine_of_their_angle():
     assert found.classes() == found.imitated() == found.overlapping() == []
 
 
-def test_intersecting_column_spaces_overlap_and_a_contained_one_is_imitated():
-    """Half of the squared length of (e1 + e2) is in the plane (e1, e3)."""
+def test_effect_in_the_span_of_another_effect_is_imitated():
+    """Two planes with a common line overlap."""
     found = compare_signatures({
         "plane": columns([1, 0, 0], [0, 1, 0]),
         "other": columns([1, 0, 0], [0, 0, 1]),
@@ -36,7 +36,7 @@ def test_intersecting_column_spaces_overlap_and_a_contained_one_is_imitated():
     assert found.classes() == []
 
 
-def test_effects_with_equal_column_spaces_form_an_equivalence_class(rng):
+def test_effects_with_equal_spans_form_a_class(rng):
     A = rng.normal(size=(50, 3))
     found = compare_signatures({
         "a": A, "b": A @ rng.normal(size=(3, 3)), "c": rng.normal(size=(50, 3))
@@ -46,7 +46,7 @@ def test_effects_with_equal_column_spaces_form_an_equivalence_class(rng):
 
 
 def test_nuisance_columns_are_projected_out(rng):
-    """Without the common column two effects are orthogonal, and a third vanishes."""
+    """Two effects become orthogonal, and a third effect becomes zero."""
     out = rng.normal(size=(40, 2))
     Q, _ = np.linalg.qr(np.column_stack([out, rng.normal(size=(40, 2))]))
     found = compare_signatures(
@@ -66,7 +66,7 @@ def test_nuisance_columns_are_projected_out(rng):
 
 @pytest.mark.parametrize("units", [1e-9, 1.0])
 def test_nuisance_columns_are_projected_out_at_any_scale(units, rng):
-    """Two orthogonal columns, one 200 times the other; no columns project nothing."""
+    """One of two orthogonal nuisance columns is 200 times larger than the other."""
     Q, _ = np.linalg.qr(rng.normal(size=(40, 3)))
     out = units * Q[:, :2] * [1e4, 50.0]
     found = compare_signatures({"a": Q @ [[3.0], [4.0], [12.0]]}, out)
@@ -74,8 +74,8 @@ def test_nuisance_columns_are_projected_out_at_any_scale(units, rng):
     assert compare_signatures({"a": Q[:, :1]}, out[:, :0]).left == pytest.approx(1.0)
 
 
-def test_invisible_effect_is_compared_at_any_size(rng):
-    """2 sigma in all rows is invisible; equivalence does not depend on size."""
+def test_equivalence_does_not_depend_on_the_size_of_an_effect(rng):
+    """An effect of two sigma in total is invisible."""
     line = rng.normal(size=(30, 1))
     line /= np.linalg.norm(line)
     found = compare_signatures({"a": 2 * line, "b": 50 * line, "none": 1e-5 * line})
@@ -85,8 +85,8 @@ def test_invisible_effect_is_compared_at_any_size(rng):
     assert found.classes() == [("a", "b")]
 
 
-def test_rank_is_correct_for_unknowns_of_different_scales(rng):
-    """An angle of 1e4 and an orthogonal shift of 100 sigma, and their sum."""
+def test_rank_does_not_depend_on_the_scale_of_unknowns(rng):
+    """Two columns of 1e4 and 100 sigma are orthogonal, and the third is their sum."""
     A = np.eye(3)[:, :2] * [1e4, 100.0]
     found = compare_signatures({"a": np.column_stack([A, A.sum(axis=1)])})
     assert (found.rank[0], found.unknowns[0]) == (2, 3)

@@ -1,4 +1,4 @@
-"""Campaigns of several sessions, simulated with springs."""
+"""Test diagnoses of campaigns with several sessions."""
 
 import re
 
@@ -20,14 +20,14 @@ from tests.elastic_arm_for_tests import arm, with_errors
 
 SIGMA = np.repeat([1e-5, 5e-6], 3)
 DESIGN = CampaignDesign(configurations=32, rows=56, load=40.0, reach=0.8)
-SPRING = 5e4  # N m/rad, in series with the drive that is declared
+SPRING = 5e4  # [N m/rad] stiffness in series with the declared drive
 ZEROS = {"monday": {"j2": 3e-4, "j3": -2e-4}, "tuesday": {"j2": -2e-4, "j3": 2.5e-4}}
 TOOLS = {"monday": [2e-4, 0.0, -1e-4], "tuesday": [-1e-4, 2e-4, 0.0]}
 FRAMES = {"monday": [0.3, -0.2, 0.5, 1.2, -0.4, 0.7], "tuesday": [0, 0, 1, 2, 0, 0]}
 
 
 def registration(session, *, placed):
-    """Registration of a session: its tool and its device frame."""
+    """Return the tool error of a session and, if ``placed``, the pose of the device."""
     numbers = {f"tool.{k}": v for k, v in zip(SCREW[3:], TOOLS[session], strict=True)}
     if placed:
         base = zip(SCREW, FRAMES[session], strict=True)
@@ -36,7 +36,7 @@ def registration(session, *, placed):
 
 
 def measured(folder, hidden, common=(), known=True):
-    """Write a campaign of the arm with effects of each session and of all."""
+    """Write a campaign of an arm with effects of each session and common effects."""
     folder.mkdir(exist_ok=True)
     robot, body, head = with_errors(arm()), [], None
     for number, (session, own) in enumerate(hidden.items()):
@@ -63,7 +63,7 @@ def measured(folder, hidden, common=(), known=True):
 
 
 def parameters(found, name, session=None):
-    """Value and standard deviation of an effect's parameters, by name."""
+    """Return values and standard deviations of the parameters of an effect."""
     return {
         p["name"]: (p["value"], p["std"])
         for effect in found["effects"]
@@ -73,7 +73,7 @@ def parameters(found, name, session=None):
 
 
 def assert_near(found, name, truth, session=None, most=np.inf):
-    """Check parameters within four standard deviations, which are below ``most``."""
+    """Check that parameters are within four standard deviations of the truth."""
     told = parameters(found, name, session)
     for key, true in truth.items():
         value, std = told[key]
@@ -84,8 +84,8 @@ def assert_near(found, name, truth, session=None, most=np.inf):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("known", [True, False])
-def test_encoder_offsets_and_tool_are_identified_for_each_session(known, tmp_path):
-    """A common spring is found together with them, and saved."""
+def test_encoder_offsets_and_tool_errors_are_identified_per_session(known, tmp_path):
+    """A spring that is common to all sessions is also identified."""
     spring = Hidden("drive_compliance", {"j2": SPRING})
     hidden = {
         s: [Hidden("encoder_offset", ZEROS[s]), registration(s, placed=not known)]
@@ -115,8 +115,8 @@ def test_encoder_offsets_and_tool_are_identified_for_each_session(known, tmp_pat
 
 
 @pytest.mark.slow
-def test_common_effects_are_reported_for_all_sessions(tmp_path):
-    """Common effects are claimed and saved without a session."""
+def test_common_effect_is_reported_without_a_session(tmp_path):
+    """The encoder offsets are equal in both sessions."""
     zeros = Hidden("encoder_offset", ZEROS["monday"])
     folder = measured(tmp_path, {"monday": [], "tuesday": []}, [zeros])
     diagnosis = diagnose(read_campaign(folder))
@@ -126,8 +126,8 @@ def test_common_effects_are_reported_for_all_sessions(tmp_path):
 
 
 @pytest.mark.slow
-def test_drift_is_identified_for_each_session(tmp_path):
-    """Different components, and time constants of 900 s and 2000 s."""
+def test_different_drifts_are_identified_per_session(tmp_path):
+    """The time constants are 900 s and 2000 s."""
     drifts = {
         "monday": {"amplitude.tx": 8e-5, "amplitude.ry": 1e-4, "time_constant": 900.0},
         "tuesday": {
@@ -145,8 +145,8 @@ def test_drift_is_identified_for_each_session(tmp_path):
 
 
 @pytest.mark.slow
-def test_per_session_effects_are_read_from_the_campaign(tmp_path):
-    """The gain of the load cell differs between sessions, by 10 % and -8 %."""
+def test_per_session_key_allows_a_different_load_gain_per_session(tmp_path):
+    """The load gains are 1.1 and 0.92."""
     gains = {"monday": 1.1, "tuesday": 0.92}
     hidden = {s: [Hidden("load_gain", {"factor": g})] for s, g in gains.items()}
     folder = measured(tmp_path, hidden)
@@ -171,8 +171,7 @@ def test_invalid_per_session_effect_is_rejected(given, message, tmp_path):
 
 
 def in_two_tables(folder, shift):
-    """An arm is measured on two days, with humidity recorded on one and temperature on
-    the other."""
+    """Write a campaign of two tables, each with a different covariate."""
     rng = np.random.default_rng(3)
     days = {"dry": "temperature", "wet": "humidity"}
     tables = '["dry.csv", "wet.csv"]'
@@ -189,8 +188,8 @@ def in_two_tables(folder, shift):
     return folder
 
 
-def test_function_acts_only_in_sessions_with_its_covariate(tmp_path):
-    """20 um for each of ten parts of humidity, recorded in one of two tables."""
+def test_learned_function_acts_only_in_sessions_with_its_covariate(tmp_path):
+    """The reading changes by 20 um per unit of humidity."""
     folder = in_two_tables(tmp_path / "days", 2e-5)
     diagnosis = diagnose(read_campaign(folder))
     assert diagnosis.verdict == "learned"
@@ -204,7 +203,7 @@ def test_function_acts_only_in_sessions_with_its_covariate(tmp_path):
     assert again.error.normalised == pytest.approx(diagnosis.saved.normalised)
 
 
-def test_covariate_of_one_table_is_ignored_without_dependence(tmp_path):
+def test_irrelevant_covariate_of_one_table_is_ignored(tmp_path):
     campaign = read_campaign(in_two_tables(tmp_path / "days", 0.0))
     assert set(campaign.partial) == {"temperature", "humidity"}
     assert campaign.covariates == {}

@@ -1,8 +1,7 @@
-"""Set-up blunders of machines with known readings, found by column.
+"""Test the detection of set-up blunders, such as exchanged columns.
 
-The machine is a built-in robot whose commands, loads or readings are changed after
-it was placed and measured; it has errors of its own of a millimetre, which no
-correction explains.
+The commands, loads or readings of a built-in robot are changed.  The machine also has
+errors of about 1 mm, which are not blunders.
 """
 
 from dataclasses import replace
@@ -20,12 +19,12 @@ from forcefit.validation.diagnosis.setup_blunders import setup_blunders
 
 ROWS = 25
 POINT = np.array([0.05, 0.02, 0.1])
-DEVICE = Rotation.from_rotvec([0.3, -0.8, 1.9])  # where a device stands in the room
+DEVICE = Rotation.from_rotvec([0.3, -0.8, 1.9])  # rotation of the measuring device
 SHIFT = np.array([2.0, -1.0, 0.5])
 
 
 def placed(robot, q):
-    """Coordinates and transforms of commands (R, drives)."""
+    """Return joint coordinates and frame poses for commands (R, drives)."""
     driven = [frame.actuated for frame in robot.frames]
     held = np.full((len(q), len(driven)), np.nan)
     held[:, driven] = q
@@ -40,8 +39,10 @@ class Machine:
     """A robot measured at random commands under random loads.
 
     Attributes:
-        q: (R, drives) commands; loads: (R, 6).
-        points, turns: positions and rotations measured by a device, in its axes.
+        q: (R, drives) commands.
+        loads: (R, 6) loads.
+        points: measured positions in the axes of the device.
+        turns: measured rotations in the axes of the device.
     """
 
     def __init__(self, rng, name="arm6", spread=0.5, unknown=False, noise=1e-5,
@@ -52,7 +53,7 @@ class Machine:
         self.q = home + spread * rng.uniform(-1, 1, (ROWS, len(driven)))
         self.loads = force * rng.normal(size=(ROWS, 6)) * np.repeat([0.02, 1.0], 3)
         T, deviation = self.declared(self.q, self.loads)
-        own = own * np.sin(3 * self.q[:, :3])  # errors of its own
+        own = own * np.sin(3 * self.q[:, :3])  # errors of the machine
         turns = Rotation.from_rotvec(deviation[:, :3]).as_matrix() @ T[:, :3, :3]
         points = T[:, :3, 3] + T[:, :3, :3] @ POINT + deviation[:, 3:] + own
         points += noise * rng.normal(size=points.shape)
@@ -61,14 +62,14 @@ class Machine:
         self.turns = R @ turns
 
     def declared(self, q, loads):
-        """Platform poses, and deviations as the robot's file has them."""
+        """Return the platform poses and the deviations of the declared robot."""
         coordinates, transforms = placed(self.robot, q)
         posture = Posture(self.robot, coordinates, transforms, 0.0)
         deviation = predict(as_declared(posture, loads, point=POINT)).deviation
         return transforms[:, self.robot.index(self.robot.platform)], deviation
 
     def campaign(self, rotations=False):
-        """The campaign of the present commands, loads and readings."""
+        """Return a campaign of the machine with its current commands and readings."""
         coordinates, transforms = placed(self.robot, self.q)
         T = transforms[:, self.robot.index(self.robot.platform)]
         gap = Rotation.from_matrix(self.turns @ np.swapaxes(T[:, :3, :3], 1, 2))
@@ -88,7 +89,7 @@ class Machine:
 
 
 def found(campaign):
-    """Return the blunders, under the declared conditions."""
+    """Return the set-up blunders of a campaign."""
     posture = Posture(campaign.robot, campaign.coordinates, campaign.transforms, 0.0)
     conditions = as_declared(posture, campaign.loads, point=campaign.reference_point)
     return setup_blunders(campaign, conditions)
@@ -101,7 +102,7 @@ def said(campaign):
 
 @pytest.mark.parametrize("unknown", [False, True])
 @pytest.mark.parametrize("joint", range(6))
-def test_joint_with_a_reversed_sign_is_reported_by_name(rng, joint, unknown):
+def test_reversed_joint_is_reported(rng, joint, unknown):
     machine = Machine(rng, unknown=unknown)
     machine.q[:, joint] *= -1
     (one,) = found(machine.campaign())
@@ -112,7 +113,7 @@ def test_joint_with_a_reversed_sign_is_reported_by_name(rng, joint, unknown):
 
 @pytest.mark.parametrize("joint", [1, 2, 4])
 @pytest.mark.parametrize("quarters", [1, 2, 3])
-def test_joint_offset_by_quarter_turns_is_reported_by_name(rng, joint, quarters):
+def test_joint_offset_by_quarter_turns_is_reported(rng, joint, quarters):
     machine = Machine(rng, unknown=True)
     machine.q[:, joint] -= quarters * np.pi / 2
     (one,) = found(machine.campaign())
@@ -120,7 +121,7 @@ def test_joint_offset_by_quarter_turns_is_reported_by_name(rng, joint, quarters)
     assert f"with {(90, 180, -90)[quarters - 1]} degrees added" in one.sentence
 
 
-def test_quarter_turn_of_the_first_joint_is_reported_only_for_a_known_device(rng):
+def test_quarter_turn_of_joint_1_requires_a_known_device_pose(rng):
     machine = Machine(rng, unknown=True, force=0.0)
     machine.q[:, 0] += np.pi / 2
     assert said(machine.campaign()) == set()
@@ -130,14 +131,14 @@ def test_quarter_turn_of_the_first_joint_is_reported_only_for_a_known_device(rng
 
 
 @pytest.mark.parametrize("pair", [(0, 1), (1, 2), (3, 5)])
-def test_exchanged_joints_are_reported_by_name(rng, pair):
+def test_exchanged_joints_are_reported(rng, pair):
     machine = Machine(rng, unknown=True)
     machine.q[:, list(pair)] = machine.q[:, list(pair)[::-1]]
     names = tuple(f"q.joint{k + 1}" for k in pair)
     assert said(machine.campaign()) == {("exchanged", names)}
 
 
-def test_two_set_up_mistakes_are_both_reported(rng):
+def test_two_blunders_are_both_reported(rng):
     machine = Machine(rng, unknown=True)
     machine.q[:, 1] *= -1
     machine.q[:, 3] += np.pi / 2
@@ -154,9 +155,7 @@ LOADS = tuple(f"load.{c}" for c in ("mx", "my", "mz", "fx", "fy", "fz"))
      (9.81, "unit", "times 0.1019"), (1e-3, "unit", "times 1000"),
      (1e3, "unit", "times 0.001")],
 )  # fmt: skip
-def test_loads_given_as_reactions_or_in_a_wrong_unit_are_reported(
-    rng, factor, kind, words
-):
+def test_loads_with_a_wrong_sign_or_unit_are_reported(rng, factor, kind, words):
     machine = Machine(rng, force=1e3, unknown=True)
     machine.loads = factor * machine.loads
     (one,) = found(machine.campaign())
@@ -169,7 +168,7 @@ def test_loads_given_as_reactions_or_in_a_wrong_unit_are_reported(
     [(25.4, "times 0.03937"), (1 / 25.4, "times 25.4"), (1e3, "times 0.001"),
      (1e-3, "times 1000")],
 )  # fmt: skip
-def test_positions_in_a_wrong_unit_are_reported(rng, factor, words):
+def test_measured_positions_in_a_wrong_unit_are_reported(rng, factor, words):
     machine = Machine(rng, unknown=True)
     machine.points = factor * machine.points
     (one,) = found(machine.campaign())
@@ -184,7 +183,7 @@ ROTATIONS = ("meas.rx", "meas.ry", "meas.rz")
     ("change", "kind", "words"),
     [
         (lambda R: R.inv(), "transposed", "transposed, as orientations"),
-        # a file of x y z w, read as w x y z: w, x, y, z become x, y, z, w
+        # A quaternion (x, y, z, w) is read in the order w, x, y, z.
         (lambda R: Rotation.from_quat(R.as_quat()[:, [1, 2, 3, 0]]),
          "quaternion", "w taken last, not first"),
         (lambda R: Rotation.from_quat(R.as_quat()[:, [3, 0, 1, 2]]),
@@ -205,41 +204,41 @@ def test_misread_rotations_are_reported(rng, change, kind, words):
                        for n in ("delta", "hexapod"))],
 )  # fmt: skip
 @pytest.mark.parametrize("unknown", [False, True])
-def test_no_set_up_mistake_is_reported_for_an_inaccurate_machine(rng, name, unknown):
-    """Errors of a millimetre, a hundred sigma, are not blunders."""
+def test_inaccurate_machine_has_no_reported_blunder(rng, name, unknown):
+    """The machine has errors of about 1 mm, which is 100 sigma."""
     machine = Machine(rng, name, spread=0.005, unknown=unknown)
     assert said(machine.campaign(rotations=True)) == set()
 
 
 @pytest.mark.slow
-def test_reversed_drive_of_a_closed_chain_is_reported_by_name(rng):
-    """A Delta whose second drive was recorded with the opposite sign."""
+def test_reversed_drive_of_a_delta_robot_is_reported(rng):
+    """The second drive has the opposite sign."""
     machine = Machine(rng, "delta", spread=0.05)
     machine.q[:, 1] *= -1
     (name,) = [f"q.{f.name}" for f in machine.robot.frames if f.actuated][1:2]
     assert said(machine.campaign()) == {("sign", (name,))}
 
 
-def test_outliers_do_not_hide_a_reversed_joint(rng):
+def test_reversed_joint_is_reported_despite_outliers(rng):
     machine = Machine(rng)
     machine.q[:, 2] *= -1
     machine.points[[3, 17]] += 5.0
     assert said(machine.campaign()) == {("sign", ("q.joint3",))}
 
 
-def test_no_set_up_mistake_is_reported_for_deviations_within_the_noise(rng):
+def test_accurate_machine_has_no_reported_blunder(rng):
     assert found(Machine(rng, own=0.0).campaign()) == ()
 
 
 def test_missing_compliance_is_not_reported_as_a_wrong_unit(rng):
-    """The declared drives are compliant, the machine is stiff."""
+    """The declared drives are compliant, but the machine is rigid."""
     machine = Machine(rng, force=1e3)
     T, _ = machine.declared(machine.q, machine.loads)
     machine.points = T[:, :3, 3] + T[:, :3, :3] @ POINT
     assert said(machine.campaign()) == set()
 
 
-def test_reversed_joint_is_found_from_heights_alone_with_a_known_device(rng):
+def test_reversed_joint_is_reported_if_only_tz_is_measured(rng):
     machine = Machine(rng)
     machine.q[:, 2] *= -1
     machine.points[:, :2] = np.nan
@@ -247,7 +246,7 @@ def test_reversed_joint_is_found_from_heights_alone_with_a_known_device(rng):
 
 
 def commanded_by_pose(machine, change):
-    """The campaign of a machine with changed commanded poses."""
+    """Return a campaign of a machine with changed pose commands."""
     T, _ = machine.declared(machine.q, machine.loads)
     turns = Rotation.from_matrix(T[:, :3, :3])
     postures, _ = place_many(machine.robot, change(T[:, :3, 3], turns))
@@ -281,7 +280,7 @@ def test_transposed_commanded_rotations_are_reported(rng):
 
 @pytest.mark.slow
 def test_commanded_positions_in_a_wrong_unit_are_reported(rng):
-    """Positions are 25.4 times too large; struts have no limits."""
+    """The commanded positions are 25.4 times too large."""
     machine = Machine(rng, "hexapod", spread=0.01)
 
     def change(p, R):
@@ -292,8 +291,8 @@ def test_commanded_positions_in_a_wrong_unit_are_reported(rng):
     assert "times 0.03937" in one.sentence
 
 
-def test_reversed_joint_is_found_from_orientations_of_two_sessions(rng):
-    """The device frame changes between sessions; no position is measured."""
+def test_reversed_joint_is_reported_if_only_rotations_are_measured(rng):
+    """The pose of the measuring device differs between two sessions."""
     machine = Machine(rng, unknown=True)
     machine.q[:, 4] *= -1
     first = np.arange(ROWS) < 12

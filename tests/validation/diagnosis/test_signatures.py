@@ -1,4 +1,4 @@
-"""Conditions of a campaign and its residual, on a bar by hand."""
+"""Test the conditions of a campaign and the residual of the declared model."""
 
 from dataclasses import replace
 
@@ -20,8 +20,8 @@ from tests.bar_for_tests import bar, fit_of
 from tests.planar_arm_for_tests import SIGMA
 
 
-def test_weight_has_the_direction_of_the_gravity_covariates():
-    """The weight is zero without these covariates."""
+def test_gravity_equals_the_gravity_covariates():
+    """Without these covariates, gravity is zero."""
     along = {"gravity.x": np.arange(8.0), "gravity.z": np.full(8, -9.81)}
     here = conditions_of(bar(**along))
     expected = np.column_stack([np.arange(8.0), np.zeros(8), np.full(8, -9.81)])
@@ -31,8 +31,8 @@ def test_weight_has_the_direction_of_the_gravity_covariates():
 
 @pytest.mark.parametrize("name", ["bed", "approach"])
 @pytest.mark.parametrize("given", [True, False])
-def test_function_of_a_covariate_requires_its_column(name, given):
-    """Except ``approach``, which follows from the preceding rows."""
+def test_function_of_a_covariate_requires_the_covariate(name, given):
+    """The side of approach is not required, because the preceding rows determine it."""
     function = (
         Function("reading", ("tx",), ("q.drive",), "reversal", {"0": 1e-6})
         if name == "approach"
@@ -48,8 +48,8 @@ def test_function_of_a_covariate_requires_its_column(name, given):
             conditions_of(campaign)
 
 
-def test_residual_equals_reading_minus_prediction_of_the_declared_model():
-    """A bar declared 0.1 mm longer, read 0.3 mm longer; some cells not measured."""
+def test_residual_equals_reading_minus_declared_prediction():
+    """The declared length error is 0.1 mm, and the measured one is 0.3 mm."""
     plain = bar()
     errors = np.zeros((2, 6))
     errors[1, 3] = 1e-4
@@ -64,8 +64,8 @@ def test_residual_equals_reading_minus_prediction_of_the_declared_model():
     assert len(tangents.declared) == 46
 
 
-def test_visible_effect_without_unknowns_becomes_an_offset():
-    """A compliant drive with a large rotation."""
+def test_signature_of_an_effect_without_unknowns_is_an_offset():
+    """The effect is a finite rotation of a compliant drive."""
     spring = np.diag([np.inf, np.inf, 2e3, np.inf, np.inf, np.inf])
     campaign = bar([0, 0, 0, 0, 150.0, 0], spring=spring)
     tangents = Tangents(campaign, Derivatives(conditions_of(campaign)))

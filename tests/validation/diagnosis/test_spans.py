@@ -1,4 +1,4 @@
-"""Readings of one place over time while temperatures change."""
+"""Test the diagnosis of readings in one configuration with varying temperatures."""
 
 from dataclasses import replace
 
@@ -15,7 +15,7 @@ from forcefit.validation.diagnosis.saving import corrected
 
 ROWS, STEP, SIGMA = 240, 60.0, 2e-6
 BED, FRAME = 0.9e-6, -16e-6  # [m/K]
-SLOW = 1.5e-6  # [m] of noise correlated over 10 minutes
+SLOW = 1.5e-6  # [m] standard deviation of noise with a correlation time of 10 min
 
 
 def lagged(x, time_constant):
@@ -28,7 +28,7 @@ def lagged(x, time_constant):
 
 
 def diagnosed(tmp_path, read, covariates, sigma=SIGMA):
-    """Diagnose readings of a z axis at rest, with covariates."""
+    """Diagnose the readings of a z axis at rest."""
     frames = Frame("z", joint="prismatic", actuated=True), Frame("nozzle", "z")
     write_robot(Robot("axis", "nozzle", frames), tmp_path / "robot.toml")
     (tmp_path / "campaign.toml").write_text(
@@ -44,7 +44,7 @@ def diagnosed(tmp_path, read, covariates, sigma=SIGMA):
 
 @pytest.fixture(scope="module")
 def heated(tmp_path_factory):
-    """A bed heated twice, and the frame, move the nozzle in proportion."""
+    """Diagnosis of readings that depend on two temperatures, and the noise."""
     rng = np.random.default_rng(3)
     time = STEP * np.arange(ROWS)
     asked = np.select([time < 600, time < 5400, time < 9000], [0.0, 60.0, 20.0], 80.0)
@@ -59,11 +59,11 @@ def heated(tmp_path_factory):
     return diagnosed(folder, read, covariates), noise
 
 
-def test_dependences_on_measured_variables_are_learned_as_polynomials(heated):
-    """Noise correlated in time would favour splines and functions of time.
+def test_dependence_on_temperatures_is_learned_as_polynomials(heated):
+    """Correlated noise could be mistaken for splines or functions of time.
 
-    The tolerance of the bed's gain is five of its standard errors. The noise is 2.5 um,
-    and its correlation leaves about forty independent rows of the 180 rows fitted.
+    The tolerance is five standard errors of the gain.  The noise is 2.5 um, and its
+    correlation reduces 180 fitted rows to about 40 independent ones.
     """
     diagnosis, _ = heated
     functions = corrected(diagnosis).functions
@@ -76,12 +76,12 @@ def test_dependences_on_measured_variables_are_learned_as_polynomials(heated):
         for given in (campaign.covariates, warmer)
     )
     value = np.mean(there - here)
-    spread = 15.0  # K rms of the bed's temperature about its mean and what frames say
+    spread = 15.0  # [K] rms of the bed temperature that other variables do not explain
     assert value == pytest.approx(BED, abs=5 * 2.5e-6 / spread / np.sqrt(40))
 
 
-def test_held_out_spans_of_time_are_predicted_to_the_noise(heated):
-    """About sixty independent rows: the error is below 1.5 times the noise."""
+def test_error_in_held_out_time_spans_is_near_the_noise(heated):
+    """There are about 60 independent rows, so the tolerance is a factor of 1.5."""
     diagnosis, noise = heated
     kept = diagnosis.held.rows
     left = np.sqrt(np.mean(noise[kept] ** 2))
@@ -89,8 +89,8 @@ def test_held_out_spans_of_time_are_predicted_to_the_noise(heated):
     assert diagnosis.after.position < 1.5 * left
 
 
-def test_many_outliers_do_not_prevent_learning_a_function(tmp_path):
-    """Eleven outliers, each two thirds as large as the one before."""
+def test_function_is_learned_despite_many_outliers(tmp_path):
+    """There are eleven outliers of decreasing size."""
     rng = np.random.default_rng(9)
     warm = np.sin(np.linspace(0, 20, 320))
     read = 80e-6 * warm**2 + 1e-6 * rng.normal(size=320)
@@ -100,6 +100,6 @@ def test_many_outliers_do_not_prevent_learning_a_function(tmp_path):
     assert set(where.tolist()) <= set(np.flatnonzero(diagnosis.outliers).tolist())
     (learned,) = table(diagnosis)["learned"]
     assert learned["variables"] == ["cov.bed"]
-    # what the readings do not show, all but z, stays as declared
+    # Components that were not measured remain as declared.
     assert learned["components"] == ["tz"]
     assert diagnosis.after.normalised < 1 + 4 / np.sqrt(2 * 309)

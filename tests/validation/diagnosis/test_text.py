@@ -1,4 +1,4 @@
-"""Terminal text of a mock diagnosis, line by line."""
+"""Test the terminal text of a diagnosis."""
 
 from types import SimpleNamespace
 
@@ -23,7 +23,7 @@ def step(term, unknowns, rms, sigma, unit="m"):
 
 
 def made(**changes):
-    """The table of four rows of which the last two were held out; nothing found."""
+    """Return the plain values of a diagnosis without identified effects."""
     return {
         "campaign": "arm", "verdict": "none_needed", "sentence": "Enough.",
         "effects": [], "geometry": None, "springs": None, "learned": [],
@@ -48,7 +48,7 @@ def made(**changes):
 
 @pytest.fixture
 def shown(monkeypatch):
-    """Lines of a diagnosis of four rows with a given table."""
+    """Return a function that formats given plain values as lines of text."""
 
     def lines(**changes):
         monkeypatch.setattr(module, "table", lambda diagnosis, tally: made(**changes))
@@ -59,8 +59,7 @@ def shown(monkeypatch):
 
 
 def test_diagnosis_text_omits_absent_sections(shown):
-    """The header, sets by probability, errors before and after,
-    and every step remain."""
+    """It contains the header, the sets of effects, the errors and the models."""
     said = shown()
     assert said[:2] == ["arm: none_needed", "Enough."]
     at = said.index("sets of effects, by probability:")
@@ -70,7 +69,7 @@ def test_diagnosis_text_omits_absent_sections(shown):
         ["before", "after", "noise", "saved"],
         ["position", "[m]", "3e-05", "1e-05", "5e-06", "8e-06"],
         ["rotation", "[rad]", "2e-06", "-", "1e-06", "3e-06"],
-        # More than one sigma, because the points of a row share noise.
+        # Noise that is common to the points of a row is not included in sigma.
         ["normalised", "[sigma]", "7", "1.5", "1.2", "1"],
     ]
     assert [line.split() for line in said[at + 10 :]] == [
@@ -80,8 +79,8 @@ def test_diagnosis_text_omits_absent_sections(shown):
     ]
 
 
-def test_errors_with_outliers_are_printed_only_for_held_out_outliers(shown):
-    """An outlier among the fitted rows is still named."""
+def test_errors_with_outliers_require_held_out_outliers(shown):
+    """If an outlier is among the fitted rows, only its name is printed."""
     fitted = shown(outliers=["m1"])
     assert "left out as outliers: m1" in fitted
     assert not any(line.startswith("with outliers") for line in fitted)
@@ -91,7 +90,7 @@ def test_errors_with_outliers_are_printed_only_for_held_out_outliers(shown):
     assert more.split() == ["with", "outliers", "8", "2.25", "1.2"]
 
 
-def test_text_ends_with_residual_trends_and_the_next_measurement(shown):
+def test_text_contains_residual_trends_and_the_next_measurement(shown):
     following = {
         "why": "a and b differ", "configuration": {"q.one": 0.5},
         "load": [0.0, 0, 0, 10.0, 0, 0], "covariates": {"temperature": 5.0},
@@ -110,8 +109,8 @@ def test_text_ends_with_residual_trends_and_the_next_measurement(shown):
     assert load_text((0.0,) * 6) == "none"
 
 
-def test_text_lists_effects_and_functions_with_their_values(shown):
-    """Geometry has lines of its own; a long formula is cut at 160 characters."""
+def test_text_contains_values_of_effects_and_functions(shown):
+    """Long formulas are truncated at 160 characters."""
     number = {"name": "one", "value": 2e-5, "std": 1e-6, "unit": "rad"}
     effect = {"name": "encoder_offset", "probability": 0.98, "parameters": [number]}
     function = {

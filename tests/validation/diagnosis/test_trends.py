@@ -1,4 +1,4 @@
-"""Trends of a residual, compared with F tests by a different routine."""
+"""Test trends of a residual against F tests with a different solver."""
 
 from dataclasses import replace
 
@@ -19,7 +19,7 @@ ROWS = 30
 
 @pytest.fixture
 def varied(rng):
-    """A drive that turns and one that slides, loaded and warmed; some not measured."""
+    """Campaign with a revolute and a prismatic drive, loads and temperatures."""
     robot = Robot("crane", "tip", (
         Frame("turn", joint="revolute", actuated=True),
         Frame("slide", "turn", [0.3, 0, 0.1], joint="prismatic", actuated=True),
@@ -42,7 +42,7 @@ def varied(rng):
 
 
 def functions(campaign):
-    """Names and functions, written down from what the trends are called."""
+    """Return the regression columns of each trend by name."""
     loads, (turn, slide) = campaign.loads, campaign.coordinates.T[:2]
     T = campaign.transforms[:, -1]
     turned = Rotation.from_matrix(T[:, :3, :3]).as_rotvec()
@@ -72,8 +72,7 @@ def functions(campaign):
 
 
 def by_least_squares(X, z):
-    """Return fraction and F test of functions in addition to a constant, by
-    component."""
+    """Return the explained fraction and the p-value of functions."""
     squares, unknowns = np.zeros(2), np.zeros(2)
     for column in z.T:
         known = np.isfinite(column)
@@ -93,12 +92,12 @@ def by_least_squares(X, z):
     return 1 - squares[1] / squares[0], f.sf(ratio, extra, freedom)
 
 
-def test_probability_of_every_trend_equals_an_f_test(varied, monkeypatch):
+def test_p_values_of_trends_equal_those_of_f_tests(varied, monkeypatch):
     monkeypatch.setattr(module, "UNLIKELY", 2.0)
     monkeypatch.setattr(module, "_MOST", 100)
     found = trends(varied, conditions_of(varied), varied.measured * varied.sigma)
     every = functions(varied)
-    # Variables that stay zero are not tested.
+    # Constant variables are not tested.
     moving = {n: X for n, X in every.items() if np.any(np.ptp(X, axis=0) > 1e-12)}
     assert {t.against for t in found} == moving.keys()
     for trend in found:
@@ -111,8 +110,8 @@ def test_probability_of_every_trend_equals_an_f_test(varied, monkeypatch):
     assert shares == sorted(shares, reverse=True)
 
 
-def test_quadratic_trend_is_found_far_from_zero(rng):
-    """Temperatures between 1e6 and 1e6 + 1, and times within half a second."""
+def test_quadratic_trend_of_large_values_is_found(rng):
+    """The temperatures are between 1e6 and 1e6 + 1."""
     x = rng.uniform(0, 1, 40)
     hot = bar(rows=40, heat=1e6 + x)
     rest = ((x - 0.5) ** 2)[:, None] * hot.sigma

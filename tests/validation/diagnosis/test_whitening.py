@@ -1,4 +1,4 @@
-"""Whitening of noise that is common to the points of one measurement."""
+"""Test the whitening of noise that is common to several points."""
 
 from dataclasses import replace
 
@@ -21,12 +21,12 @@ VISIT = np.array([3, 0, 3, 3, 7, 0, 9, 9, 9, 9, 3])
 
 
 def covariance(root, loadings, visit):
-    """By definition: 1 / w on the diagonal, L L' between cells of one measurement."""
+    """Return the covariance matrix of the noise of all cells."""
     return np.diag(root**-2.0) + (visit[:, None] == visit) * (loadings @ loadings.T)
 
 
 @pytest.mark.parametrize("k", [1, 3, 6])
-def test_cells_of_readings_are_independent_after_whitening(k):
+def test_whitened_cells_are_independent(k):
     rng = np.random.default_rng(k)
     root, L = rng.uniform(0.2, 2, 11), 3 * rng.normal(size=(11, k))
     C = covariance(root, L, VISIT)
@@ -40,7 +40,7 @@ def test_cells_of_readings_are_independent_after_whitening(k):
 
 
 def two_points(rows=40):
-    """The bar with two points of its tip measured together; rows in random order."""
+    """Return a campaign in which two points of a bar are measured together."""
     plain = bar(rows=rows)
     every = np.random.default_rng(2).permutation(np.repeat(np.arange(rows), 2))
     seen, which = {}, []
@@ -57,8 +57,8 @@ def two_points(rows=40):
     return replace(campaign, measured=measured)
 
 
-def test_platform_motions_rotate_about_the_centre_of_the_points():
-    """A rotation of the platform moves each point by its arm, but not their mean."""
+def test_platform_motions_are_rotations_about_the_centre_of_the_points():
+    """A rotation does not move the mean of the points."""
     campaign = two_points()
     motions = platform_motions(campaign, _reading(campaign))
     centre = np.mean(list(campaign.points.values()), axis=0)
@@ -72,7 +72,7 @@ def test_platform_motions_rotate_about_the_centre_of_the_points():
 
 
 def _reading(campaign):
-    """(R, 6, 6) change of the readings per screw, by small screws themselves."""
+    """Return the changes (R, 6, 6) of the readings per unit screw by differences."""
     conditions, columns = conditions_of(campaign), []
     for k in range(6):
         screw = np.tile(1e-6 * np.eye(6)[k], (len(campaign), 1))
@@ -80,7 +80,7 @@ def _reading(campaign):
     return np.stack(columns, axis=2)
 
 
-def test_whitened_residual_of_common_noise_is_independent_with_unit_variance():
+def test_whitened_common_noise_has_unit_covariance():
     campaign = two_points(400)
     rng = np.random.default_rng(4)
     common = np.zeros((800, 6, 3))
@@ -98,7 +98,7 @@ def test_whitened_residual_of_common_noise_is_independent_with_unit_variance():
     assert size == pytest.approx(np.sqrt(10) * campaign.sigma[:, 3:])
 
 
-def test_points_measured_at_the_same_time_are_held_out_together():
+def test_points_measured_together_are_held_out_together():
     campaign = replace(two_points(30), configuration=np.zeros(60, dtype=int))
     blocks = blocks_of(campaign)[0]
     assert len(np.unique(blocks)) > 8

@@ -1,4 +1,4 @@
-"""Remarks of an inspection, for designs with a known weakness."""
+"""Test the remarks of an inspection for designs with a known weakness."""
 
 import json
 
@@ -27,9 +27,16 @@ HEAD = ",".join([
 
 
 def elastic_campaign(folder, rng, temperature=None, heat=0.0, device=None, **more):
-    """Twelve configurations of an elastic arm, each measured twice under two loads.
-    ``heat`` [1/K] lengthens both arms; ``device`` is where the measuring device
-    stands."""
+    """Return a campaign of an elastic arm with repeats under two loads.
+
+    Args:
+        folder: folder to which the campaign is written.
+        rng: random number generator.
+        temperature: constant temperature [K], None for varying temperatures.
+        heat: [1/K] thermal expansion of both arms.
+        device: rotation and position of the measuring device.
+        more: further arguments of :func:`write_campaign`.
+    """
     q = rng.uniform(-1, 1, (12, 2)) + [0.0, 1.2]
     lines = []
     for i, kind in enumerate(np.concatenate([rng.permutation(24) for _ in range(2)])):
@@ -49,8 +56,8 @@ def elastic_campaign(folder, rng, temperature=None, heat=0.0, device=None, **mor
     return read_campaign(write_campaign(folder, HEAD, lines, robot=ELASTIC, **more))
 
 
-def test_table_of_an_inspection_has_a_row_for_each_effect(tmp_path):
-    """A length of 0.1 mm moves the tool by 20 sigma, in 48 rows and for 2 links."""
+def test_inspection_table_has_a_row_for_each_effect(tmp_path):
+    """A length error of 0.1 mm is 20 sigma in 48 rows, for each of two links."""
     pytest.importorskip("xarray")
     found = inspect_campaign(elastic_campaign(tmp_path, np.random.default_rng(1)))
     table = found.to_pandas()
@@ -63,7 +70,7 @@ def test_table_of_an_inspection_has_a_row_for_each_effect(tmp_path):
 
 
 def texts(campaign):
-    """Return all remarks on a campaign's design, with subject and level."""
+    """Return all remarks about the design of a campaign."""
     repeats = revisits(campaign, campaign.repeat)
     visits = revisits(campaign, campaign.configuration)
     noise = repeat_noise(campaign)
@@ -72,7 +79,7 @@ def texts(campaign):
 
 
 def sound(rng, **changes):
-    """Return a design without weaknesses, except for the given changes."""
+    """Return a campaign without weaknesses, except for the given changes."""
     rows = 60
     kinds = np.concatenate([rng.permutation(20) for _ in range(3)])
     loads = np.zeros((rows, 6))
@@ -122,7 +129,7 @@ SAYINGS = {
     "quiet": ({"measured": 5e-6 * NOISE}, "Repeats scatter only 0."),
     "rounded": ({"measured": np.round(NOISE, 1) * 1e-3},
         "is rounded to 0.0001, more than twice its sigma 1e-05"),
-    # 30 mm on a post of 1 m
+    # The deviations are about 30 mm for a robot of 1 m.
     "implausible size": ({"measured": 0.03 * NOISE}, "is the unit m, and is"),
     "correlated": ({"temperature": np.arange(60) / 10 + NOISE[:, 0] / 10},
         "time and temperature vary together (correlation +1.00)"),
@@ -135,8 +142,8 @@ def test_weakness_of_a_design_is_reported(case, rng):
     assert any(sentence in text for text in texts(sound(rng, **changes)))
 
 
-def test_design_without_weaknesses_has_one_remark(rng):
-    """The only remark is that each configuration has one load."""
+def test_good_design_has_a_single_remark(rng):
+    """The remark is that each configuration has only one load."""
     found = [t for t in texts(sound(rng)) if " fine: " not in t]
     assert found == [
         "load careful: No configuration was measured under two loads: only the model "
@@ -144,8 +151,8 @@ def test_design_without_weaknesses_has_one_remark(rng):
     ]
 
 
-def test_consecutive_outliers_cause_a_remark(rng):
-    """Six readings 30 sigma off at once, or spread over the session."""
+def test_consecutive_outliers_are_reported_as_a_sudden_change(rng):
+    """Six outliers of 30 sigma are consecutive or spread over the session."""
     for rows, sentence in (
         (range(10, 16), "suspects careful: Readings far from their repeats follow"),
         (range(3, 60, 10), None),
@@ -156,9 +163,8 @@ def test_consecutive_outliers_cause_a_remark(rng):
         assert [t.startswith(sentence or "?") for t in found] == [True] * bool(sentence)
 
 
-def test_constant_temperature_does_not_separate_expansion_from_length(tmp_path, rng):
-    """Both lengthen the same beams; a varying temperature separates them. A body with
-    delay has the constant temperature too."""
+def test_expansion_and_length_are_equivalent_at_constant_temperature(tmp_path, rng):
+    """They are distinguished by a varying temperature."""
     constant = inspect_campaign(elastic_campaign(tmp_path / "a", rng, temperature=6.0))
     assert (
         "thermal_expansion",
@@ -174,8 +180,8 @@ def test_constant_temperature_does_not_separate_expansion_from_length(tmp_path, 
     assert why == "needs cov.temperature, not 0 in every row"
 
 
-def test_unknown_registration_absorbs_the_first_encoder_offset(tmp_path, rng):
-    """Rotating the first joint about the base z axis is equivalent to base.rz."""
+def test_first_encoder_offset_is_equivalent_to_a_device_rotation(tmp_path, rng):
+    """Both are rotations about the z axis of the base."""
     known = inspect_campaign(elastic_campaign(tmp_path / "a", rng)).separability
     i = known.names.index("encoder_offset")
     assert known.rank[i] == 2
@@ -187,8 +193,8 @@ def test_unknown_registration_absorbs_the_first_encoder_offset(tmp_path, rng):
     assert 0 < unknown.left[i] < 0.9 < known.left[i]
 
 
-def test_device_frame_that_cannot_be_determined_is_reported(tmp_path):
-    """Two rows measure a single angle."""
+def test_undetermined_device_pose_is_reported(tmp_path):
+    """In both rows, only one angle is measured."""
     rows = ["a,0.1,0.2,1e-5", "b,0.1,0.2,2e-5"]
     folder = write_campaign(tmp_path, "id,q.one,q.two,meas.rz", rows,
                             toml={"registration": '"unknown"'})  # fmt: skip
@@ -197,9 +203,8 @@ def test_device_frame_that_cannot_be_determined_is_reported(tmp_path):
     assert "The registration cannot be found." in first.text
 
 
-def test_signature_of_an_encoder_offset_equals_hand_calculation(tmp_path, rng):
-    """An offset of the second encoder by 1e-5 rad turns the tool about the elbow by
-    that angle."""
+def test_signature_of_encoder_offset_agrees_with_hand_calculation(tmp_path, rng):
+    """The offset of the second joint rotates the tool about the elbow."""
     campaign = elastic_campaign(tmp_path, rng)
     found = design_signatures(campaign).columns["encoder_offset"]
     elbow, tool = (campaign.transforms[:, campaign.robot.index(n), :3, 3]
@@ -216,9 +221,8 @@ def test_signature_of_an_encoder_offset_equals_hand_calculation(tmp_path, rng):
 
 
 @pytest.mark.parametrize("registration", ["known", "unknown"])
-def test_expansion_does_not_enter_the_noise_estimate(registration, tmp_path, rng):
-    """12 sigma of expansion,
-    in the axes of a device that is rotated by 2 rad and 5 m away."""
+def test_noise_estimate_does_not_include_expansion(registration, tmp_path, rng):
+    """The expansion is 12 sigma, and the pose of the device may be unknown."""
     device = None
     if registration == "unknown":
         device = Rotation.from_rotvec([0.5, -1.2, 1.5]), np.array([3.0, -4.0, 1.0])
@@ -230,7 +234,7 @@ def test_expansion_does_not_enter_the_noise_estimate(registration, tmp_path, rng
     assert noise.taken_out["temperature"] < 1e-9
 
 
-def test_inspect_writes_every_section(tmp_path, rng, run):
+def test_inspect_command_writes_all_sections(tmp_path, rng, run):
     elastic_campaign(tmp_path / "arm", rng, temperature=6.0)
     status, out, _ = run("validation", "inspect", tmp_path / "arm", "--json", "-")
     assert status == 0
@@ -258,7 +262,7 @@ def test_inspect_writes_every_section(tmp_path, rng, run):
     assert "This campaign cannot determine:" in out
 
 
-def test_dh_table_without_alpha_causes_a_remark(tmp_path):
+def test_dh_parameters_without_alpha_cause_a_remark(tmp_path):
     flat = ARM.replace("translation = [1.0, 0, 0]\n", "dh = { a = 1.0 }\n")
     assert flat != ARM
     campaign = read_campaign(write_campaign(tmp_path / "campaign", robot=flat))

@@ -1,4 +1,4 @@
-"""Page of an inspection, for campaigns whose design is known."""
+"""Test the report page of an inspection."""
 
 from pathlib import Path
 
@@ -10,14 +10,14 @@ CAMPAIGNS = Path(__file__).parents[2] / "campaigns"
 
 
 def shown(run, name, folder):
-    """Page of one of the small campaigns."""
+    """Return the report page of a campaign."""
     page = folder / "inspection.html"
     status, _, err = run("validation", "inspect", CAMPAIGNS / name, "--report", page)
     assert status == 0, err
     return page.read_text(encoding="utf-8")
 
 
-def test_page_at_one_temperature_does_not_separate_expansion_from_length(run, tmp_path):
+def test_page_lists_expansion_and_length_as_equivalent(run, tmp_path):
     text = shown(run, "constant_temperature", tmp_path)
     assert "<p class='verdict mixed'>" in text
     lost = text.partition('<section id="section-what-this-campaign-cannot')[2]
@@ -27,8 +27,8 @@ def test_page_at_one_temperature_does_not_separate_expansion_from_length(run, tm
     assert any(alike <= set(group.rstrip(".").split(", ")) for group in groups)
 
 
-def test_page_shows_readings_and_repeats_of_the_campaign(run, tmp_path):
-    """Sigma was 1e-5 rad and 5e-6 m; the noise has that size, known to 30 %."""
+def test_page_shows_readings_sigma_and_noise(run, tmp_path):
+    """The true noise is 1e-5 rad and 5e-6 m."""
     text = shown(run, "encoder_offset", tmp_path)
     rows = {row[0].text: row for row in parse(text).table("reading", "measured")[1:]}
     assert list(rows) == ["rx", "ry", "rz", "tx", "ty", "tz"]

@@ -1,4 +1,4 @@
-"""Planned campaigns: closed form of the criterion, and the written file."""
+"""Test the planning of campaigns."""
 
 import csv
 import json
@@ -17,13 +17,13 @@ ROWS = 30
 
 
 def blocks(seed=0):
-    """Three effects of one, two and one unknown; two readings a row."""
+    """Return random columns of three effects with one, two and one unknown."""
     rng = np.random.default_rng(seed)
     return [rng.normal(size=(2 * ROWS, k)) for k in (1, 2, 1)]
 
 
-def test_identifiability_criterion_for_two_unknowns_equals_the_schur_complement():
-    """a'a - (a'b)^2 / (b'b + 1)."""
+def test_non_centrality_of_two_effects_equals_schur_complement():
+    """For one unknown each, it is a'a - (a'b)^2 / (b'b + 1)."""
     a, _, b = blocks()
     apart = _Criterion(blocks(), ROWS).apart(np.arange(ROWS))
     expected = float((a.T @ a - (a.T @ b) ** 2 / (b.T @ b + 1)).item())
@@ -31,7 +31,7 @@ def test_identifiability_criterion_for_two_unknowns_equals_the_schur_complement(
     assert np.isnan(np.diag(apart)).all()
 
 
-def test_plan_writes_a_campaign_with_empty_readings(tmp_path, run):
+def test_plan_command_writes_a_campaign_without_readings(tmp_path, run):
     robot = tmp_path / "arm.toml"
     robot.write_text(ARM)
     folder, answer = tmp_path / "plan", tmp_path / "plan.json"
@@ -57,7 +57,7 @@ def test_plan_writes_a_campaign_with_empty_readings(tmp_path, run):
     ("--position", "0", "--position: found 0, expected a finite number > 0 [m]"),
     ("--temperature", "hot", 'temperature: found "hot", expected swing'),
 ])  # fmt: skip
-def test_plan_rejects_invalid_options(tmp_path, run, option, value, says):
+def test_plan_command_rejects_invalid_options(tmp_path, run, option, value, says):
     robot = tmp_path / "arm.toml"
     robot.write_text(ARM)
     code, _, error = run("validation", "plan", str(robot), option, value,
@@ -68,8 +68,8 @@ def test_plan_rejects_invalid_options(tmp_path, run, option, value, says):
 
 
 @pytest.mark.slow
-def test_plan_rejects_a_rigid_robot_that_closes_only_by_its_clearances(tmp_path, run):
-    """A planar rigid four-bar whose coupler is twisted out of its plane."""
+def test_plan_command_rejects_a_loop_that_requires_clearance(tmp_path, run):
+    """The robot is a rigid planar four-bar linkage with a twisted coupler."""
     robot = load_robot("four_bar")
     frames = tuple(
         replace(f, link=None, joint_stiffness=None,

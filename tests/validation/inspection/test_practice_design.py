@@ -1,7 +1,7 @@
-"""Inspections of campaigns that another, geometrically exact program simulated.
+"""Test inspections of campaigns that an external program simulated.
 
-The truth it wrote down has, for each effect of the library, the cosine between what the
-hidden effect did and what that effect could have done: both worked out by that program.
+The external program computed the cosine between the simulated effect and each library
+effect.
 """
 
 import json
@@ -27,14 +27,13 @@ NAMES = sorted(TRUTH)
 
 @pytest.fixture(scope="module")
 def inspections():
-    """Inspections of all campaigns."""
+    """Inspections of all campaigns by name."""
     return {n: inspect_campaign(read_campaign(PRACTICE / n)) for n in NAMES}
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_noise_from_repeats_agrees_with_the_simulated_noise(name, inspections):
-    """The true ratio is 1;
-    the bounds are chi-square tails of 1/1000 each, for six campaigns."""
+    """The true ratio is 1, and the p-value must be above 0.001 on both sides."""
     noise = inspections[name].noise
     squares = noise.degrees * noise.ratio**2
     assert 1e-3 < chi2.cdf(squares, noise.degrees) < 1 - 1e-3
@@ -43,9 +42,11 @@ def test_noise_from_repeats_agrees_with_the_simulated_noise(name, inspections):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_angles_between_signatures_agree_with_the_exact_program(name, inspections):
-    """To 4e-4, the difference between finite motions and secants, for effects with
-    equal unknowns: contacts have another exponent there, and moduli may be grouped."""
+def test_angles_between_signatures_agree_with_external_program(name, inspections):
+    """The tolerance of 4e-4 is due to finite motions.
+
+    Only effects with the same unknowns in both programs are compared.
+    """
     hidden = {
         e["name"]: {p["name"]: p["value"] for p in e["parameters"]}
         for e in TRUTH[name]["effects"]
@@ -72,7 +73,7 @@ def test_angles_between_signatures_agree_with_the_exact_program(name, inspection
     assert compared >= 7 or not hidden
 
 
-def test_expansion_at_constant_temperature_is_equivalent_to_a_longer_link(inspections):
+def test_expansion_at_constant_temperature_is_equivalent_to_length(inspections):
     classes = inspections["p06_confounded"].separability.classes()
     assert ("thermal_expansion", "delayed_expansion", "link_length") in classes
     for name in ("p02_self_weight", "p03_thermal_expansion"):

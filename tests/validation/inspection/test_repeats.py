@@ -1,4 +1,4 @@
-"""Noise from repeats: textbook variances, removal of drift, outliers."""
+"""Test the noise that is estimated from repeats."""
 
 from dataclasses import replace
 
@@ -18,13 +18,13 @@ SIGMA = np.array([1e-5] * 3 + [5e-6] * 3)
 
 
 def interleaved(rng, rows=120, kinds=40):
-    """(rows,) each kind visited in every pass, in another order."""
+    """Return the kind (rows,) of each row, in random order within each pass."""
     passes = -(-rows // kinds)
     return np.concatenate([rng.permutation(kinds) for _ in range(passes)])[:rows]
 
 
-def test_noise_estimate_is_the_pooled_variance_of_repeats():
-    """Sets (1, 3), (2, 2, 5) and a single: sums of squares 2 and 6 over 1 + 2."""
+def test_noise_estimate_equals_pooled_standard_deviation():
+    """The sets (1, 3) and (2, 2, 5) have sums of squares 2 and 6."""
     measured = np.full((6, 6), np.nan)
     measured[:, 3] = [1, 3, 2, 2, 5, 100]
     noise = repeat_noise(campaign_of(measured, 2.0, [0, 0, 1, 1, 1, 2]), {})
@@ -37,8 +37,8 @@ def test_noise_estimate_is_the_pooled_variance_of_repeats():
     np.testing.assert_allclose(noise.component_interval[3], [low, high])
 
 
-def test_missing_cell_reduces_only_the_degrees_of_freedom_of_its_component():
-    """One of two rows has no tx: five components repeat."""
+def test_missing_reading_reduces_degrees_of_freedom():
+    """If tx is missing in one of two rows, five components have repeats."""
     measured = np.zeros((2, 6))
     measured[1] = 2.0
     measured[0, 3] = np.nan
@@ -48,16 +48,15 @@ def test_missing_cell_reduces_only_the_degrees_of_freedom_of_its_component():
     assert noise.ratio == pytest.approx(np.sqrt(2))
 
 
-def test_noise_is_not_estimated_from_rows_without_repeats():
+def test_noise_estimate_is_none_without_repeats():
     assert repeat_noise(campaign_of(np.zeros((5, 6)))) is None
     measured = np.full((2, 6), np.nan)
     measured[0, 0] = measured[1, 1] = 1.0
     assert repeat_noise(campaign_of(measured, 1.0, [0, 0])) is None
 
 
-def test_noise_equals_that_of_a_joint_least_squares_fit(rng):
-    """The reference has a column for every set and a general solver;
-    some cells are missing."""
+def test_noise_estimate_equals_that_of_a_joint_fit(rng):
+    """The reference is a least-squares fit with an unknown mean of each set."""
     repeat = interleaved(rng, 40, 15)
     measured = rng.normal(size=(40, 6))
     measured[rng.random((40, 6)) < 0.2] = np.nan
@@ -79,8 +78,8 @@ def test_noise_equals_that_of_a_joint_least_squares_fit(rng):
     assert found.component_degrees.sum() == pytest.approx(found.degrees)
 
 
-def test_drift_does_not_enter_the_noise_estimate(rng):
-    """Settling of 20 sigma and 5 sigma per kelvin, with interleaved repeats."""
+def test_noise_estimate_does_not_include_drift(rng):
+    """The drift is 20 sigma, and the thermal effect is 5 sigma per kelvin."""
     time = np.arange(120.0)
     temperature = 3 * np.sin(time / 17)
     drift = np.outer(1 - np.exp(-time / 25), [20, -20, 0, 10, 5, -10])
@@ -96,9 +95,8 @@ def test_drift_does_not_enter_the_noise_estimate(rng):
         assert noise.taken_out["temperature"] < 1e-6
 
 
-def test_intervals_cover_the_true_value_at_the_stated_rate(rng):
-    """400 campaigns: 90 % +- 3 standard deviations of a count, 0.855 ... 0.945; a
-    suspect in at most 1 % + 3 standard deviations of them, 0.025."""
+def test_90_per_cent_of_intervals_include_the_true_noise(rng):
+    """The tolerances are three standard deviations for 400 campaigns."""
     inside = suspected = 0
     time = np.arange(60.0)
     for _ in range(400):
@@ -111,9 +109,8 @@ def test_intervals_cover_the_true_value_at_the_stated_rate(rng):
     assert suspected / 400 <= 0.025
 
 
-def test_time_without_effect_is_reported_at_the_false_alarm_rate(rng):
-    """Probabilities for noise alone are uniform:
-    5 % +- 3 standard deviations of 300."""
+def test_false_alarm_rate_of_time_equals_significance_level(rng):
+    """The tolerance is three standard deviations for 300 campaigns."""
     time = np.arange(60.0)
     below = 0
     for _ in range(300):
@@ -123,9 +120,8 @@ def test_time_without_effect_is_reported_at_the_false_alarm_rate(rng):
     assert 0.012 <= below / 300 <= 0.088
 
 
-def test_outliers_among_repeats_are_reported_and_left_out(rng):
-    """There is one in a set of three and one in a set of two, where either row may be
-    wrong."""
+def test_outliers_among_repeats_are_reported_and_excluded(rng):
+    """In a set of two rows, either row may be wrong."""
     repeat = np.r_[np.repeat(np.arange(30), 3), [30, 30]]
     readings = rng.normal(size=(92, 6)) * SIGMA
     readings[4, 5] += 12 * SIGMA[5]
@@ -137,7 +133,7 @@ def test_outliers_among_repeats_are_reported_and_left_out(rng):
 
 
 def test_slow_changes_are_not_fitted_to_few_repeats(rng):
-    """Three pairs have 18 readings; slow changes in time alone would need 24."""
+    """Three pairs have 18 degrees of freedom, but slow changes have 24 unknowns."""
     readings = rng.normal(size=(20, 6)) * SIGMA
     repeat = np.r_[np.arange(17), [0, 1, 2]]
     noise = repeat_noise(campaign_of(readings, SIGMA, repeat))
@@ -145,13 +141,13 @@ def test_slow_changes_are_not_fitted_to_few_repeats(rng):
     assert noise.degrees == 18
 
 
-def test_constant_covariates_are_not_fitted_to_repeats():
+def test_slow_changes_omit_constant_covariates():
     campaign = campaign_of(np.zeros((4, 6)), temperature=np.full(4, 6.0),
                            approach=np.array([1.0, -1, 1, 1]))  # fmt: skip
     assert set(slow_changes(campaign)) == {"time", "approach"}
 
 
-def test_revisits_classify_the_order_of_repeats(rng):
+def test_order_of_repeats_is_classified(rng):
     readings = np.zeros((60, 6))
     row = campaign_of(readings, repeat=np.repeat(np.arange(20), 3))
     assert revisits(row, row.repeat).order == "back to back"
@@ -159,21 +155,20 @@ def test_revisits_classify_the_order_of_repeats(rng):
     spread = campaign_of(readings, repeat=np.tile(np.arange(20), 3))
     assert revisits(spread, spread.repeat).order == "interleaved"
     assert revisits(spread, spread.repeat).span == pytest.approx(40 / 59)
-    pairs = np.tile(np.repeat(np.arange(15), 2), 2)  # AABB ... AABB ...
+    pairs = np.tile(np.repeat(np.arange(15), 2), 2)  # order AABB ... AABB ...
     mixed = campaign_of(readings, repeat=pairs)
     assert revisits(mixed, mixed.repeat).order == "mixed"
     assert revisits(row, np.arange(60)).order == "none"
     assert revisits(row, np.zeros(60)).order == "all"
     assert revisits(row, np.r_[np.zeros(59), 1]).order == "back to back"
-    # rows that the file sorts by repeat were measured in passes
+    # The file is sorted by repeat, but the times are those of interleaved passes.
     order = np.argsort(np.tile(np.arange(20), 3), kind="stable")
     by_time = campaign_of(readings, repeat=row.repeat, time=60.0 * order)
     assert revisits(by_time, by_time.repeat).order == "interleaved"
 
 
-def test_points_read_at_the_same_time_count_as_one_visit():
-    """Twenty configurations are visited three times,
-    with three points read at each visit."""
+def test_points_measured_together_are_one_visit():
+    """Three points are measured in each of three visits to 20 configurations."""
     ids = tuple(f"m{i}{end}" for i in range(60) for end in ("", ":left", ":right"))
     points = {"left": np.array([0, 0.1, 0]), "right": np.array([0, -0.1, 0])}
     configuration = np.repeat(np.tile(np.arange(20), 3), 3)
