@@ -334,7 +334,8 @@ def _read_robot(root: Table, name: str, links: bool) -> Robot:
     path = Path(root.file).parent / name
     if not os.path.isfile(path):
         message = (
-            f"found {quoted(name)}, neither a built-in robot nor a file in this folder"
+            f"found {quoted(name)}, which is neither a built-in robot nor a file in "
+            "this folder"
         )
         raise root.bad("robot", f"{message}{nearest(name, BUILT_IN)}")
     return load_robot(path, links=links)
@@ -355,12 +356,12 @@ def _commanded(table: MeasurementTable, robot: Robot) -> str:
     missing = [name for name in actuated if name not in given]
     if missing and given:
         raise BadInput(
-            f"{table.file}: line 1: missing column {quoted(missing[0])}; expected one "
-            "for every actuated joint"
+            f"{table.file}: line 1: missing column {quoted(missing[0])}; expected a "
+            "column for every actuated joint"
         )
     if missing:
         raise BadInput(
-            f"{table.file}: line 1: no commanded configuration; expected columns "
+            f"{table.file}: line 1: found no commanded configuration; expected columns "
             f"{', '.join(quoted(n) for n in actuated[:6])} or pose.tx ... pose.rz"
         )
     return "joints"
@@ -386,7 +387,7 @@ def _place(table: MeasurementTable, robot: Robot, commanded: str,
         if posture is None:
             raise table.bad(int(row), "", reason)
         if not posture.mismatch < _CLOSED:
-            message = f"the closures stay open by {posture.mismatch:.3g} rad or m"
+            message = f"found loops with a gap of {posture.mismatch:.3g} rad or m"
             raise table.bad(int(row), "", f"{message}, expected < {_CLOSED:g}")
         placed.append(posture)
     return placed

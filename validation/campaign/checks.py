@@ -122,13 +122,13 @@ def check_readings(table: MeasurementTable, point: str, sigma: NDArray,
             raise table.bad(int(i), f"sigma{at}.{name}", message)
         unit, largest = ("rad", np.pi) if k < 3 else ("m", extent)
         for i in np.flatnonzero(~(sigma[:, k] >= _FINEST) & ~np.isnan(sigma[:, k]))[:1]:
-            message = f"found {sigma[i, k]:g} {unit}, expected one standard "
+            message = f"found {sigma[i, k]:g} {unit}, expected a standard "
             message += "deviation > 0"
             raise table.bad(int(i), f"sigma{at}.{name}", message)
         expected = (
             f"at most half a turn in rad{_UNITS}"
             if k < 3
-            else f"a length in m, at most the robot's {extent:.3g}{_UNITS}"
+            else f"a length in m, at most the robot's size of {extent:.3g}{_UNITS}"
         )
         _within(table, f"sigma{at}.{name}", sigma[:, k], largest, expected)
         if registration == "unknown" and k >= 3:

@@ -151,7 +151,7 @@ def join_tables(tables: Sequence[MeasurementTable]) -> MeasurementTable:
         for table in tables:
             if name not in table.columns and not may_lack:
                 message = (
-                    f"line 1: missing column {quoted(name)}, which other tables have"
+                    f"line 1: missing column {quoted(name)}, which another table has"
                 )
                 raise BadInput(f"{table.file}: {message}")
         absent = 0.0 if name.startswith("load.") else math.nan
@@ -218,9 +218,8 @@ def _header(
     if not any(name in known or name.startswith("cov.") for name in names):
         # The message does not contain the names, because the file may not be a table.
         raise BadInput(
-            f"{path}: line 1: found no column of a table of "
-            f"measurements{_other(names)}; expected id, q.<frame> or pose.tx "
-            "..., meas.tx ..."
+            f"{path}: line 1: found no column name of a measurement "
+            f"table{_other(names)}; expected id, q.<frame> or pose.tx ..., meas.tx ..."
         )
     for k, name in enumerate(names, 1):
         if not name:
@@ -302,8 +301,8 @@ def _numbers(
             raise table.bad(
                 i,
                 name,
-                "found an empty cell, expected a value; only meas. and sigma. "
-                "cells may be empty",
+                "found an empty cell, expected a value; only cells of meas. and sigma. "
+                "columns may be empty",
             )
         values[i] = parse_number(cell, table.dialect.decimal)
         if not abs(values[i]) <= LARGEST:
@@ -323,7 +322,7 @@ def _number_hint(name: str, cell: str, dialect: Dialect) -> str:
         if other == dialect.delimiter:
             setting = f'delimiter = ";", {setting} and separate cells by ";"'
         return (
-            f'; the decimal mark here is not "{other}": write {written}, or set '
+            f'; "{other}" is not the declared decimal mark: write {written}, or set '
             f"in [table] {setting}"
         )
     if cell.lower() in {"nan", "na", "n/a", "null", "none", "-"}:

@@ -171,7 +171,7 @@ class Diagnosis:
             "claimed": ", ".join(self.claimed) or "none",
             "likeliest": ", ".join(f"{name} {p:.3f}" for name, p in likely) or "none",
             "held-out rows": f"{self.before.normalised:.3g} sigma before, "
-            f"{self.after.normalised:.3g} after "
-            f"({self.noise.normalised:.3g} is noise)",
+            f"{self.after.normalised:.3g} sigma after the diagnosis "
+            f"(noise: {self.noise.normalised:.3g} sigma)",
             "outliers": f"{int(self.outliers.sum())} rows",
         }

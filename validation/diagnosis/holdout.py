@@ -62,14 +62,14 @@ def hold_out(campaign: Campaign) -> HeldOut:
         chosen = max(min(quarter, _ENOUGH), tenth)
         held = np.isin(blocks, names[:chosen])
         words = (
-            f"{int(held.sum())} rows of {chosen} of {count} {kind}, drawn once, "
-            "held out from every choice and every fit"
+            f"{int(held.sum())} rows of {chosen} of {count} {kind}, which were not "
+            "used to select or fit models"
         )
         return HeldOut("split", (held,), words)
     parts = np.array_split(names, min(_FOLDS, count))
     words = (
-        f"{len(parts)} folds over {count} {kind}: in each, the whole diagnosis is "
-        "repeated without its rows"
+        f"{len(parts)} folds over {count} {kind}: the diagnosis is repeated without "
+        "the rows of each fold"
     )
     return HeldOut("folds", tuple(np.isin(blocks, part) for part in parts), words)
 

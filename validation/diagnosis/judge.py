@@ -244,8 +244,8 @@ def _needed(campaign: Campaign, fit: MachineFit) -> str:
     count = int(np.ceil(max(wanted, 2.0 * blocks, 2.0 * FEWEST)))
     return (
         f"about {count} configurations spread over the range of every drive, some of "
-        "them loaded and some repeated; there are "
-        f"{blocks}, read in {components} components"
+        "them loaded and some repeated; the campaign contains "
+        f"{blocks} configurations with {components} measured components"
     )
 
 
@@ -267,5 +267,5 @@ def _impossible(campaign: Campaign) -> tuple[str, ...]:
     if not ids:
         return ()
     return (
-        f"rows left out because of an impossible temperature: {', '.join(ids[:10])}",
+        f"rows excluded because of an impossible temperature: {', '.join(ids[:10])}",
     )

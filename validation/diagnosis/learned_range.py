@@ -52,8 +52,8 @@ class Beyond:
     def __str__(self) -> str:
         (low, high), (least, most) = self.learned, self.now
         return (
-            f"{self.variable} is {least:g} to {most:g}, outside {low:g} to {high:g} "
-            f"where the robot was learned, in {self.rows} of {self.count} rows"
+            f"{self.variable} is {least:g} to {most:g}, outside the identified range "
+            f"{low:g} to {high:g}, in {self.rows} of {self.count} rows"
         )
 
 

@@ -105,8 +105,8 @@ def _measurement(
     sets = [sorted({e.hypothesis.effect for e in one.effects}) for one in fits]
     names = [" + ".join(effects) or "nothing" for effects in sets]
     why = (
-        f"{names[0]} and {names[1]} then differ by {np.sqrt(power):.1f} "
-        "standard deviations in one reading"
+        f"the predictions of {names[0]} and {names[1]} differ by {np.sqrt(power):.1f} "
+        "standard deviations"
     )
     known = {name: getattr(tried, name)[best] for name in ("temperature", "approach")}
     covariates = {name: float(v) for name, v in known.items() if np.isfinite(v)}

@@ -111,9 +111,9 @@ def findings(
     rms, freedom = repeats
     if freedom and float(chi2.sf(rms**2 * freedom, freedom)) < _CHANCE:
         told.append(
-            f"not repeatable: rows of one configuration and load differ by {rms:.2g} "
-            "times the stated sigma; possible causes: memory, time, or an unrecorded "
-            "variable"
+            "not repeatable: the scatter of rows with equal configuration and load is "
+            f"{rms:.2g} times the stated sigma; possible causes are memory, time or an "
+            "unrecorded variable"
         )
     if memory:
         told.append("memory: the readings depend on the order of the rows")

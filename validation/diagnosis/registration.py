@@ -81,8 +81,8 @@ def coarse_frame(campaign: Campaign, conditions: Conditions) -> dict[str, float]
         instead = "--fit zeros" if known else 'registration = "known" in campaign.toml'
         raise BadInput(
             f"{campaign.name}: found {found}, but neither rotations nor "
-            f"{_FEWEST_POINTS} measured points that are not on one line, each in x, y "
-            f"and z; expected one of the two, or {instead}"
+            f"{_FEWEST_POINTS} measured points that are not on one line (x, y and z); "
+            f"expected rotations or such points, or {instead}"
         )
     parts = campaign.measured[turned, :3], model[turned, :3]
     turns = [rotation_matrix(vectors) for vectors in parts]

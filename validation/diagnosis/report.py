@@ -23,10 +23,10 @@ from forcefit.validation.diagnosis.next_measurement import load_text
 from forcefit.validation.diagnosis.sentence import calibration_text, open_text
 
 _ASSUMED = (
-    "Errors are computed on held-out rows, used neither to choose nor to fit models.",
-    "The noise of the readings is their stated sigma, unless stated otherwise below.",
-    "Effects missing from the library appear as learned functions or as outside the "
-    "library; effects that the design cannot distinguish are named together.",
+    "Errors are computed on held-out rows, which no model selection or fit used.",
+    "The noise of the readings is the stated sigma, unless noted otherwise below.",
+    "Effects that are missing in the library appear as learned functions or as outside "
+    "the library. Effects that the design cannot distinguish are listed together.",
 )
 # Verdicts without a confirmed result.  None if additional rows could give a result.
 _GOOD = {AMBIGUOUS: None, NOT_ENOUGH_ROWS: None, OUTSIDE_LIBRARY: False}
@@ -192,9 +192,7 @@ def _structure(answer: Table) -> list[str]:
         return []
     return [
         paragraph("The residual after the best set of effects varies with:"),
-        table(
-            ["variable", "share of the squared residual", "probability by chance"], rows
-        ),
+        table(["variable", "fraction of the squared residual", "p-value"], rows),
     ]
 
 
@@ -216,11 +214,11 @@ def _noise(diagnosis: Diagnosis) -> list[str]:
     far = np.array(diagnosis.campaign.ids)[diagnosis.outliers]
     repeats = "the campaign contains no repeats"
     if lack.repeats_freedom:
-        repeats = f"between repeats {lack.repeats:.2f} times"
+        repeats = f"the scatter of repeats is {lack.repeats:.2f} times the stated sigma"
     texts = [
-        f"The residual is {lack.rms:.2f} times the stated sigma (probability "
-        f"{lack.probability:.2g} by chance); {repeats}.",
-        f"Left out as outliers: {', '.join(far) or 'none'}.",
+        f"The residual is {lack.rms:.2f} times the stated sigma (p-value "
+        f"{lack.probability:.2g}); {repeats}.",
+        f"Rows excluded as outliers: {', '.join(far) or 'none'}.",
     ]
     if diagnosis.open.any():
         texts.append(f"{open_text(diagnosis.open)}.")

@@ -26,47 +26,53 @@ def sentence(diagnosis: Diagnosis) -> str:
     """Describe the verdict and the errors of a diagnosis in sentences."""
     if diagnosis.setup:
         faults = "; ".join(one.sentence for one in diagnosis.setup)
-        return f"The campaign is set up wrongly: {faults}"
+        return f"The campaign contains set-up blunders: {faults}"
     where = {  # description of the held-out rows for each hold-out method
         "split": "held-out rows",
         "folds": f"rows held out in {len(diagnosis.held.folds)} folds",
-        "none": "the fitted rows (too few to hold any out)",
+        "none": "the fitted rows (there are too few rows to hold out)",
     }[diagnosis.held.how]
     before = f"{diagnosis.before.normalised:.2f} sigma"
-    kept = f"on {where} the residual is {before} before"
+    kept = f"The residual on {where} is {before} before"
     known = math.isfinite(diagnosis.uncertainty)
     unsure = f" +- {diagnosis.uncertainty:.2f}" if known else ""
     after, noise = diagnosis.after.normalised, diagnosis.noise.normalised
-    both = f"{kept}, {after:.2f}{unsure} after ({noise:.3g} is noise)"
+    both = (
+        f"{kept} and {after:.2f}{unsure} sigma after the diagnosis "
+        f"(noise: {noise:.3g} sigma)"
+    )
     if diagnosis.verdict == NONE_NEEDED:
         return (
-            "The declared model suffices: this design cannot distinguish the residual "
+            "The declared model suffices. This design cannot distinguish the residual "
             f"from noise ({before} on {where})."
         )
     if diagnosis.verdict == EXPLAINED:
         small = [WORDS[part.name] for part in diagnosis.fit.unknowns.small]
         names = " and ".join([*diagnosis.claimed, *small])
-        return f"The declared model lacks {names}; {both}."
+        return f"The declared model lacks {names}. {both}."
     if diagnosis.verdict == LEARNED:
         names = " and ".join([*diagnosis.claimed, *titles(diagnosis)][:6])
-        return f"The declared model lacks {names} (with learned functions); {both}."
+        return f"The declared model lacks {names} (with learned functions). {both}."
     if diagnosis.verdict == AMBIGUOUS:
         sets = " or ".join(
             " + ".join(names) or "nothing" for names, _ in diagnosis.alternatives[:4]
         )
-        return f"This design cannot distinguish these effects: {sets}; {kept}."
+        return (
+            f"This design cannot distinguish these effects: {sets}. {kept} the "
+            "diagnosis."
+        )
     if diagnosis.verdict == NOT_ENOUGH_ROWS:
-        return f"These rows are too few to distinguish a cause from chance; {both}."
+        return f"There are too few rows to distinguish an effect from noise. {both}."
     if not diagnosis.lack.significant:
         return (
             "The fitted rows contain only noise after the fit "
-            f"({diagnosis.lack.rms:.2f} sigma), but the model is not confirmed; {both}."
+            f"({diagnosis.lack.rms:.2f} sigma), but the model is not confirmed. {both}."
         )
     seen = ", ".join(t.against for t in diagnosis.trends[:3])
     varies = f", which varies with {seen}" if seen else ""
     return (
-        "No effect of the library explains the residual of the fitted rows, "
-        f"{diagnosis.lack.rms:.2f} sigma{varies}; {both}."
+        "No effect of the library explains the residual of the fitted rows "
+        f"({diagnosis.lack.rms:.2f} sigma{varies}). {both}."
     )
 
 
@@ -85,12 +91,13 @@ def calibration_text(tally: Calibration) -> str:
     named = (
         ""
         if math.isnan(tally.right)
-        else f"; {100 * tally.right:.0f} % named the effects"
+        else f"; {100 * tally.right:.0f} % with the correct effects"
     )
     return (
-        f"simulated on this design, {tally.campaigns} campaigns each: with noise alone "
-        f"{counts(tally.without)}; with the effects found {counts(tally.with_found)}"
-        f"{named}; false claims {100 * tally.false_claims:.1f} %"
+        f"verdicts on {tally.campaigns} simulated campaigns of each kind: with noise "
+        f"alone {counts(tally.without)}; with the identified effects "
+        f"{counts(tally.with_found)}{named}; false claims "
+        f"{100 * tally.false_claims:.1f} %"
     )
 
 
@@ -98,9 +105,9 @@ def open_text(open_: NDArray) -> str:
     """Describe the rows in which the pose is undetermined."""
     return (
         f"clearances leave the pose undetermined in {int(open_.sum())} of "
-        f"{len(open_)} rows (marked open): one of the minimum-energy poses is "
-        "predicted there, in a closed chain the pose nearest to nominal, in an open "
-        "chain that with centred clearances"
+        f"{len(open_)} rows (marked open). One pose of minimum energy is predicted "
+        "for each of these rows: in a closed chain the pose nearest to nominal, in an "
+        "open chain the pose with centred joints"
     )
 
 

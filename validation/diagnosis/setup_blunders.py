@@ -106,8 +106,8 @@ def _blunder(correction: Correction, before: float, after: float) -> SetupBlunde
     fit, s = ("fits", "") if len(columns) == 1 else ("fit", "s")
     sentence = (
         f"{', '.join(columns)} {fit} {correction.what}: the residual is then "
-        f"{after:.3g} sigma, otherwise {before:.3g}; check the column{s} and the robot "
-        "file"
+        f"{after:.3g} sigma instead of {before:.3g} sigma; check the column{s} and the "
+        "robot file"
     )
     return SetupBlunder(correction.kind, columns, before, after, sentence)
 

@@ -36,7 +36,7 @@ def text(diagnosis: Diagnosis, tally: Calibration | None = None) -> str:
         *answer["remarks"],
     ]
     notes = {
-        "measurement that would decide": answer["needed"],
+        "required for a verdict": answer["needed"],
         "not measured": ", ".join(answer["not_measured"]),
     }
     for what, words in notes.items():
@@ -46,11 +46,11 @@ def text(diagnosis: Diagnosis, tally: Calibration | None = None) -> str:
         share, constant = (answer["noise_in_time"][k] for k in ("share", "constant"))
         lines += [
             "",
-            f"noise is correlated in time: {100 * share:.0f} % of its variance "
-            f"over {constant:.3g} s; the intervals of the effects include it",
+            f"noise is correlated in time: {100 * share:.0f} % of its variance has a "
+            f"correlation time of {constant:.3g} s, which the intervals include",
         ]
     if answer["outliers"]:
-        lines += ["", f"left out as outliers: {', '.join(answer['outliers'])}"]
+        lines += ["", f"excluded as outliers: {', '.join(answer['outliers'])}"]
     if answer["open"]:
         lines += ["", open_text(diagnosis.open)]
     for trend in answer["structure"]:
@@ -73,7 +73,7 @@ def _effect_lines(effect: Table) -> list[str]:
     for p in effect["parameters"]:
         line = f"  {p['name']:<28}{p['value']:>14.6g} +- {p['std']:.2g} {p['unit']}"
         if "found" in p:
-            line += " (declared {declared:.6g}, found {difference:+.6g})".format(
+            line += " (declared {declared:.6g}, difference {difference:+.6g})".format(
                 **p["found"]
             )
         lines.append(line)
@@ -90,7 +90,7 @@ def _small_lines(one: Table | None, name: str) -> list[str]:
     frames = sorted(one["frames"], key=lambda f: -f["identifiable"])[:6]
     where = ", ".join(f"{f['frame']} {f['identifiable']:.1f}" for f in frames)
     return [
-        f"{WORDS[name]}  (prior std {sizes or 'by the tolerances'})",
+        f"{WORDS[name]}  (prior std {sizes or 'from the tolerances'})",
         f"  {one['identifiable']:.1f} of {one['unknowns']} determined: {where}",
     ]
 
@@ -102,11 +102,11 @@ def _function_lines(one: Table) -> list[str]:
     lines = [f"learned: {one['label']}", f"  {short}"]
     if parts is not None:
         lines.append(
-            "  error in left-out parts of the range of {variable}: {after:.3g} sigma, "
-            "without the function {without:.3g}".format(**parts)
+            "  extrapolation error over the range of {variable}: {after:.3g} sigma, "
+            "without the function {without:.3g} sigma".format(**parts)
         )
     if one["equivalent_places"]:
-        lines.append(f"  {len(one['equivalent_places'])} other places fit equally well")
+        lines.append(f"  {len(one['equivalent_places'])} equivalent other locations")
     return lines
 
 
@@ -116,7 +116,7 @@ def _error_lines(answer: Table) -> list[str]:
     noise = {**error["noise"], "normalised": answer["noise_scale"]["normalised"]}
     columns = error["before"], error["after"], noise, error["saved"]
     lines = [
-        f"errors on {held['words']}; saved: on all rows",
+        f"errors on {held['words']}; errors of the saved robot on all rows",
         f"{'':<20}{'before':>12}{'after':>12}{'noise':>12}{'saved':>12}",
     ]
     for name, unit in (("position", "m"), ("rotation", "rad"), ("normalised", "sigma")):

@@ -47,7 +47,10 @@ def _on_readings(campaign: Campaign) -> list[Remark]:
     measured, sigma = campaign.measured, campaign.sigma
     absent = ", ".join(campaign.not_measured)
     if absent:
-        text = f"Never measured: {absent}. Effects on these alone remain hidden."
+        text = (
+            f"Components never measured: {absent}. Effects that change only these "
+            "components cannot be detected."
+        )
         remarks.append(Remark("readings", LOST, text))
     for k, name in enumerate(READING):
         column = measured[campaign.cells[:, k], k]
@@ -56,19 +59,19 @@ def _on_readings(campaign: Campaign) -> list[Remark]:
         values = np.unique(column)
         typical = float(np.median(sigma[campaign.cells[:, k], k]))
         if len(values) == 1:
-            text = f"{name} reads the same in every row: is the device connected?"
+            text = f"{name} is the same in every row. Is the device connected?"
             remarks.append(Remark("readings", CAREFUL, text))
         elif len(values) < len(column) / 2 and np.diff(values).min() > 2 * typical:
             step = np.diff(values).min()
             text = f"{name} is rounded to {step:.2g}, more than twice its sigma " \
-                   f"{typical:.2g}: the noise is that of the rounding."  # fmt: skip
+                   f"{typical:.2g}. The noise is mainly due to rounding."  # fmt: skip
             remarks.append(Remark("readings", CAREFUL, text))
     extent = extent_of(campaign.transforms, np.zeros((1, 3)))
     largest = np.nanmax(np.abs(measured[:, 3:]), initial=0.0)
     if campaign.registration == "known" and largest > _UNIT * extent:
         text = (
-            f"The largest deviation is {largest:.3g} m, the robot {extent:.3g} m "
-            'across: is the unit m, and is the registration really "known"?'
+            f"The largest deviation is {largest:.3g} m, and the size of the robot is "
+            f'{extent:.3g} m. Is the unit m, and is the registration "known"?'
         )
         remarks.append(Remark("readings", CAREFUL, text))
     return remarks
@@ -86,18 +89,19 @@ def _on_configurations(campaign: Campaign, visits: Revisits) -> list[Remark]:
     count = len(np.unique(campaign.configuration))
     if count == 1:
         text = (
-            "One configuration only: geometric errors, offsets and a wrong "
+            "There is only one configuration, so geometric errors, offsets and a wrong "
             "registration cannot be distinguished."
         )
         remarks.append(Remark("configurations", LOST, text))
     elif still:
-        text = f"Never moved: {', '.join(quoted(s) for s in still[:6])}. An offset " \
-               "there is indistinguishable from a wrong length or angle."  # fmt: skip
+        text = f"Drives that never moved: {', '.join(quoted(s) for s in still[:6])}. " \
+               "Their offsets cannot be distinguished from wrong lengths or " \
+               "angles."  # fmt: skip
         remarks.append(Remark("configurations", LOST, text))
     if visits.order == "back to back" and count > 1:
         text = (
-            "Every configuration was measured without a break: changes with time "
-            "cannot be distinguished from effects of the configuration."
+            "All rows of each configuration were measured consecutively, so changes "
+            "with time cannot be distinguished from effects of the configuration."
         )
         remarks.append(Remark("configurations", LOST, text))
     return remarks
@@ -108,8 +112,8 @@ def _on_loads(campaign: Campaign) -> list[Remark]:
     loads = campaign.loads
     if not loads.any():
         text = (
-            "No load was applied: compliance and clearances show only through the "
-            "machine's weight and internal forces; load errors cannot be detected."
+            "No load was applied. Compliance and clearances can be detected only by "
+            "the effect of weight and internal forces. Load errors cannot be detected."
         )
         return [Remark("load", LOST, text)]
     remarks = []
@@ -118,21 +122,23 @@ def _on_loads(campaign: Campaign) -> list[Remark]:
     twice = int((np.bincount(kinds) > 1).sum())
     if len(np.unique(loads.round(9), axis=0)) == 1:
         text = (
-            "One load in every row: its effect cannot be distinguished from errors "
-            "without load, nor a stiffening compliance from a linear one."
+            "All rows have the same load. Its effect cannot be distinguished from "
+            "errors without load, and stiffening cannot be distinguished from linear "
+            "compliance."
         )
         remarks.append(Remark("load", LOST, text))
     elif twice == 0:
         text = (
-            "No configuration was measured under two loads: only the model separates "
-            "effects of the load from effects of the configuration."
+            "No configuration was measured under two loads, so only the model "
+            "distinguishes effects of the load from effects of the configuration."
         )
         remarks.append(Remark("load", CAREFUL, text))
     else:
         rank = np.linalg.matrix_rank(loads[:, 3:], 1e-6 * np.abs(loads).max())
         if rank == 1:
             text = (
-                "The load acts along a single line: only compliance along it is known."
+                "All forces have the same direction, so only compliance in this "
+                "direction can be detected."
             )
             remarks.append(Remark("load", CAREFUL, text))
         else:
@@ -146,7 +152,8 @@ def _on_temperature(campaign: Campaign) -> list[Remark]:
     temperature = campaign.covariates.get("temperature")
     if temperature is None:
         text = (
-            "No cov.temperature: thermal expansion can be neither found nor excluded."
+            "The campaign has no cov.temperature, so thermal expansion can be neither "
+            "detected nor excluded."
         )
         return [Remark("temperature", LOST, text)]
     span = float(np.ptp(temperature))
@@ -157,15 +164,15 @@ def _on_temperature(campaign: Campaign) -> list[Remark]:
             if value
             else "thermal expansion has no effect"
         )
-        text = f"The temperature stayed at {value:+.3g} K in every row: {what}."
+        text = f"The temperature is {value:+.3g} K in every row, so {what}."
         return [Remark("temperature", LOST, text)]
     extent = extent_of(campaign.transforms, np.zeros((1, 3)))
     most = _EXPANSION * span * extent
     sigma = campaign.sigma[:, 3:][campaign.cells[:, 3:]]
     if sigma.size and most < np.median(sigma):
         text = (
-            f"The temperature varied by {span:.2g} K: even aluminium would move the "
-            f"platform by {most:.2g} m at most, less than one sigma."
+            f"The temperature varied by {span:.2g} K. Thermal expansion of aluminium "
+            f"would move the platform by at most {most:.2g} m, less than one sigma."
         )
         return [Remark("temperature", CAREFUL, text)]
     text = f"The temperature varied by {span:.2g} K."
@@ -176,20 +183,28 @@ def _on_approach(campaign: Campaign) -> list[Remark]:
     """Return remarks on whether friction can be detected."""
     side = campaign.covariates.get("approach")
     if side is None:
-        text = "No cov.approach: friction can be neither found nor excluded."
+        text = (
+            "The campaign has no cov.approach, so friction can be neither detected nor "
+            "excluded."
+        )
         return [Remark("approach", LOST, text)]
     if np.ptp(side) == 0.0:
-        text = "Every row was approached from one side: friction looks like an offset."
+        text = (
+            "All rows were approached from the same side, so friction has the same "
+            "effect as an offset."
+        )
         return [Remark("approach", LOST, text)]
     both = _in_both(campaign.configuration, side)
     if not both:
         text = (
-            "No configuration was approached from both sides: only the model separates "
-            "friction from effects of the configuration."
+            "No configuration was approached from both sides, so only the model "
+            "distinguishes friction from effects of the configuration."
         )
         return [Remark("approach", CAREFUL, text)]
     return [
-        Remark("approach", FINE, f"{both} configurations approached on both sides.")
+        Remark(
+            "approach", FINE, f"{both} configurations were approached from both sides."
+        )
     ]
 
 
@@ -197,8 +212,9 @@ def _on_time(campaign: Campaign) -> list[Remark]:
     """Return remarks on whether a drift can be detected."""
     if np.ptp(campaign.covariates.get("time", np.zeros(1))) == 0.0:
         text = (
-            "No cov.time, or the same in every row: a drift can be neither found nor "
-            "excluded; rows are assumed to be in the order of measurement."
+            "The campaign has no cov.time, or its value is the same in every row. A "
+            "drift can be neither detected nor excluded. Rows are assumed to be in the "
+            "order of measurement."
         )
         return [Remark("time", LOST, text)]
     return []
@@ -214,8 +230,8 @@ def _on_covariates(campaign: Campaign) -> list[Remark]:
         together = correlation(x, y)
         if abs(together) > _TOGETHER:
             text = (
-                f"{a} and {b} vary together (correlation {together:+.2f}): their "
-                "effects are hard to distinguish."
+                f"{a} and {b} vary together (correlation {together:+.2f}), so their "
+                "effects are difficult to distinguish."
             )
             remarks.append(Remark("covariates", CAREFUL, text))
     return remarks

@@ -67,16 +67,16 @@ def design_signatures(
     for done, name in enumerate(LIBRARY):
         progress(done, len(LIBRARY))
         if name in _NOT_COMPARED:
-            untestable[name] = "finite motions are compared by the diagnosis itself"
+            untestable[name] = "only a diagnosis tests finite motions"
         elif name not in shown:
             needs = LIBRARY[name].needs
             lacking = [f"cov.{n}" for n in needs if not _given(campaign, n)]
             if LIBRARY[name].weighs and not conditions.gravity.any():
                 lacking.append("cov.gravity.z")
             untestable[name] = (
-                f"needs {', '.join(lacking)}, not 0 in every row"
+                f"requires {', '.join(lacking)}, not 0 in all rows"
                 if lacking
-                else "the robot has no place where it could act"
+                else "the robot has no frame on which this effect acts"
             )
         else:
             column = _at_plausible_sizes(tangents, shown[name])

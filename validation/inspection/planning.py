@@ -112,8 +112,8 @@ def plan_rows(
     if not columns:
         raise BadInput(
             f"{robot.name}: found no effect that changes the readings if all "
-            "clearances are zero, as a plan assumes; expected geometric errors with "
-            "which the loops can be closed without clearances"
+            "clearances are zero, which a plan assumes; expected geometric errors "
+            "with which the loops can be closed without clearances"
         )
     names = tuple(columns)
     criterion = _Criterion([columns[name] for name in names], count)
@@ -279,7 +279,7 @@ def text(planned: Planned) -> str:
     shown = table(planned)
     lines = [f"{shown['rows']} rows of {shown['configurations']} configurations"]
     lines.append(
-        "least distinguishable pairs, in brackets for as many random rows [sigma]:"
+        "least distinguishable pairs [sigma], with values for random rows in brackets:"
     )
     for pair in shown["pairs"][:5]:
         sizes = [np.sqrt(pair[key]) for key in ("planned", "random")]

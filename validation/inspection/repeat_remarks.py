@@ -25,46 +25,46 @@ def on_repeats(
     """
     if noise is None:
         text = (
-            "Nothing was measured twice: the noise cannot be checked, and the goodness "
-            "of fit is judged by the stated sigma alone."
+            "There are no repeated measurements. The noise cannot be checked, and the "
+            "goodness of fit is tested only with the stated sigma."
         )
         return [Remark("repeats", LOST, text)]
     remarks = []
     if repeats.order == "back to back":
         text = (
-            "Repeats were measured consecutively, so they contain no slow drift: the "
-            "noise from repeats is too small, and a correct model may seem wrong."
+            "Repeats were measured consecutively, so they contain no slow drift. The "
+            "noise from repeats is too small, and a correct model may be rejected."
         )
         remarks.append(Remark("repeats", CAREFUL, text))
     elif repeats.order == "mixed":
         text = (
-            "Only some repeats are spread over the session: they contain part of "
-            "the drift."
+            "Only some repeats are spread over the session, so they contain only part "
+            "of the drift."
         )
         remarks.append(Remark("repeats", CAREFUL, text))
     elif repeats.order == "interleaved":
         remarks.append(Remark("repeats", FINE, "Repeats are spread over the session."))
     if noise.degrees < _FEW:
-        text = f"Few repeats: {noise.degrees} degrees of freedom in all."
+        text = f"There are few repeats ({noise.degrees} degrees of freedom)."
         remarks.append(Remark("repeats", CAREFUL, text))
     low, high = noise.interval
     size = f"{noise.ratio:.2f} times the stated sigma ({low:.2f} ... {high:.2f})"
     squares = noise.degrees * noise.ratio**2
     if chi2.sf(squares, noise.degrees) < UNLIKELY:
         text = (
-            f"Repeats scatter {size}: sigma is stated too small, or a quantity other "
-            "than time, temperature or approach changes between them."
+            f"The scatter of repeats is {size}. The stated sigma is too small, or a "
+            "quantity other than time, temperature or approach changes between repeats."
         )
         remarks.append(Remark("repeats", CAREFUL, text))
     elif chi2.cdf(squares, noise.degrees) < UNLIKELY:
         text = (
-            f"Repeats scatter only {size}: sigma is stated too large, or repeats share "
-            "an error."
+            f"The scatter of repeats is only {size}. The stated sigma is too large, or "
+            "repeats have a common error."
         )
         remarks.append(Remark("repeats", CAREFUL, text))
     for name, chance in noise.taken_out.items():
         if chance < UNLIKELY:
-            text = f"Repeats change with {name} by more than the noise."
+            text = f"Changes of repeats with {name} exceed the noise."
             remarks.append(Remark("repeats", CAREFUL, text))
     return remarks + _on_suspects(campaign, noise)
 
@@ -78,14 +78,14 @@ def _on_suspects(campaign: Campaign, noise: RepeatNoise) -> list[Remark]:
     rows = sorted({int(order[i]) for s in suspects for i in s.rows})
     if 2 * np.count_nonzero(np.diff(rows) == 1) >= len(rows) - 1:
         text = (
-            "Readings far from their repeats follow each other in time: the cause is "
-            "probably a sudden change, not isolated blunders."
+            "Readings that differ strongly from their repeats are consecutive in time. "
+            "The cause is probably a sudden change instead of isolated blunders."
         )
         return [Remark("suspects", CAREFUL, text)]
     if len(suspects) == MOST:
         text = (
-            f"{MOST} or more readings lie far from their repeats: the scatter is not "
-            "normally distributed."
+            f"At least {MOST} readings differ strongly from their repeats. The scatter "
+            "is not normally distributed."
         )
         return [Remark("suspects", CAREFUL, text)]
     return []

@@ -14,11 +14,10 @@ from forcefit.validation.inspection.inspection import Inspection
 from forcefit.validation.inspection.remark import CAREFUL, LOST
 
 _ASSUMED = (
-    "Effects have the plausible sizes of the library; the campaign may have larger or "
-    "smaller ones.",
-    "The noise of the readings is their stated sigma unless repeats indicate "
-    "otherwise.",
-    "Nothing is fitted: readings are used only to estimate the noise between repeats.",
+    "Effects have the plausible sizes that the library assumes. Real effects may be "
+    "larger or smaller.",
+    "The noise of the readings is the stated sigma, unless repeats indicate otherwise.",
+    "No effect is fitted. Readings are used only to estimate the noise from repeats.",
 )
 _HEADS = {LOST: "What this campaign cannot determine", CAREFUL: "Warnings"}
 Cells = list[list[Cell]]
@@ -70,11 +69,11 @@ def _verdict(inspection: Inspection) -> str:
         "warnings": len(_texts(inspection, CAREFUL)),
     }
     words = [
-        f"{n} {'thing ' if n == 1 else 'things '}{what}" if what[0] == "c"
+        f"{n} {'aspect ' if n == 1 else 'aspects '}{what}" if what[0] == "c"
         else f"{n} {what[:-1] if n == 1 else what}"
         for what, n in counts.items() if n
     ]  # fmt: skip
-    return f"{text}; {', '.join(words) or 'no objections'}."
+    return f"{text}; {', '.join(words) or 'no warnings'}."
 
 
 def _library(inspection: Inspection) -> int:
@@ -129,8 +128,8 @@ def _effects(inspection: Inspection) -> str:
         for i, name in enumerate(s.names)
     ]  # fmt: skip
     head: list[str | Column] = [
-        "effect", "detectable", Column("from this multiple of the plausible size"),
-        Column("signature [sigma]"), Column("fraction left by the registration"),
+        "effect", "detectable", Column("if larger than this multiple"),
+        Column("signature [sigma]"), Column("fraction without registration"),
         "unknowns determined",
     ]  # fmt: skip
     untestable = [f"{k}: {why}" for k, why in inspection.signatures.untestable.items()]

@@ -42,12 +42,12 @@ def inspection_text(inspection: Inspection) -> str:
 def _separability_lines(inspection: Inspection) -> list[str]:
     """Return lines about detectable effects and indistinguishable effects."""
     s = inspection.separability
-    lines = ["Effects, at plausible sizes, in this design:"]
+    lines = ["Effects of plausible size in this design:"]
     shown = [n for n, seen in zip(s.names, s.visible, strict=True) if seen]
     lines.append(f"  detectable: {', '.join(shown) or 'none'}")
     small = s.traced & ~s.visible
     weak = [
-        f"{n} (at {s.shows_at[i]:.2g} times that size)"
+        f"{n} (from {s.shows_at[i]:.2g} times the plausible size)"
         for i, n in enumerate(s.names)
         if small[i]
     ]
@@ -110,7 +110,7 @@ def _noise_lines(c: Campaign, noise: RepeatNoise | None) -> list[str]:
     lines = [
         f"noise from repeats: {noise.ratio:.2f} ({low:.2f} ... {high:.2f}, 90 %) times "
         f"the stated sigma, {noise.degrees} degrees of freedom; "
-        f"{noise.plain:.2f} with slow changes included"
+        f"{noise.plain:.2f} times including slow changes"
     ]
     for k, name in enumerate(READING):
         if np.isfinite(noise.component[k]):
@@ -123,6 +123,7 @@ def _noise_lines(c: Campaign, noise: RepeatNoise | None) -> list[str]:
     for s in noise.suspects:
         who = " or ".join(c.ids[i] for i in s.rows)
         lines.append(
-            f"  suspect: {who}, {s.component}, {abs(s.size):.1f} standard deviations"
+            f"  suspect reading: {who}, {s.component}, {abs(s.size):.1f} standard "
+            "deviations"
         )
     return lines

@@ -171,7 +171,7 @@ BAD_TABLES = {
     "a joint that is not driven": (HEAD.replace("q.two", "q.tool"), ROWS,
         r'unknown column "q.tool": that joint is fixed'),
     "a drive without a command": (HEAD.replace("q.two", "cov.two"), ROWS,
-        r'line 1: missing column "q.two"; expected one for every actuated joint'),
+        r'line 1: missing column "q.two"; expected a column for every actuated joint'),
     "no command at all": ("id,meas.tx", ["a,1e-5"],
         r'no commanded configuration; expected columns "q.one", "q.two" or pose.tx'),
     "joints and poses": ("id,q.one,q.two,pose.tx,meas.tx", ["a,0,0,0,0"],
@@ -182,7 +182,7 @@ BAD_TABLES = {
         r'line 1: found column "load.fx" twice'),
     "a column without a name": (HEAD.replace("load.mx", " "), ROWS,
         r"line 1: column 5 has no name"),
-    "no header": (None, ROWS, r"line 1: found no column of a table of measurements"),
+    "no header": (None, ROWS, r"line 1: found no column name of a measurement table"),
     "semicolons": (HEAD.replace(",", ";"), [r.replace(",", ";") for r in ROWS],
         r'it contains ;: if this separates the cells, set delimiter = ";"'),
     "tabs": (HEAD.replace(",", "\t"), [r.replace(",", "\t") for r in ROWS],
@@ -193,7 +193,7 @@ BAD_TABLES = {
         r"line 2: found 12 cells, expected 11 as in the header; if the decimal mark"),
     "quoted decimal commas": (HEAD, [ROWS[0].replace("1e-05", '"0,00001"'), *ROWS[1:]],
         r'line 2 \(id "m1"\), meas.tx: found "0,00001", expected a finite number \[m\]'
-        r'; the decimal mark here is not ",": write "0.00001", or set in \[table\] '
+        r'; "," is not the declared decimal mark: write "0.00001", or set in \[table\] '
         r'delimiter = ";", decimal = "," in campaign.toml and separate cells by ";"'),
     "a NUL in a label": (HEAD, [ROWS[0].replace("m1", "m\0"), *ROWS[1:]],
         r"line 2 contains NUL; expected a text file"),
@@ -207,7 +207,7 @@ BAD_TABLES = {
     "nan": (HEAD, [ROWS[0].replace("1e-05", "nan")],
         r'meas.tx: found "nan".*; leave the cell empty if it was not measured'),
     "an empty command": (HEAD, [ROWS[0].replace(",0.1,", ",,")],
-        r"q.one: found an empty cell, expected a value; only meas. and sigma"),
+        r"q.one: found an empty cell, expected a value; only cells of meas. and sigma"),
     "nothing measured": (HEAD, [ROWS[0].replace("1e-05,2e-05,3e-05", ",,")],
         r'line 2 \(id "m1"\): found no reading in this row; expected'),
     "an id twice": (HEAD, [*ROWS, ROWS[1]],
@@ -222,7 +222,8 @@ BAD_TABLES = {
     "absolute temperature": (HEAD, [ROWS[0].replace("1.5,0,1", "293.15,0,1")],
         r"cov.temperature: found 293.15, expected the deviation from the temperature"),
     "metres for micrometres": (HEAD, [ROWS[0].replace("1e-05", "153")],
-        r"meas.tx: found 153, expected a length in m, at most the robot's 1\.\d+; "
+        r"meas.tx: found 153, expected a length in m, at most the robot's size of "
+        r"1\.\d+; "
         r"declare other units in \[units\]"),
     "degrees": (HEAD, [ROWS[0].replace(",0.1,", ",90,")],
         r"q.one: found 90, expected an angle in rad; declare other units"),
@@ -233,7 +234,7 @@ BAD_TABLES = {
     "out of reach": ("id,pose.tx,pose.ty,meas.tx", ["a,0.5,1,0", "b,5,1,0"],
         r'line 3 \(id "b"\): pose tx=5, ty=1 cannot be reached'),
     "sigma of zero": ("id,q.one,q.two,meas.tx,sigma.tx", ["a,0,0,0,0"],
-        r"sigma.tx: found 0 m, expected one standard deviation > 0"),
+        r"sigma.tx: found 0 m, expected a standard deviation > 0"),
     "an open quote": (HEAD, ['"m1,0.1'], r"line \d: not CSV: unexpected end of data"),
 }  # fmt: skip
 
@@ -252,7 +253,8 @@ BAD_TOML = {
     "unknown key": ({"note": '"x"'}, NOISE, r'unknown key "note"; did you mean "noi'),
     "robot missing": ({"robot": None}, NOISE, r"robot: missing; expected a built-in"),
     "no such robot": ({"robot": '"irsbot3"'}, NOISE,
-        r'robot: found "irsbot3", neither a built-in robot nor a file in this folder; '
+        r'robot: found "irsbot3", which is neither a built-in robot nor a file in '
+        r'this folder; '
         r'did you mean "irsbot2"\?'),
     "no table": ({"measurements": '"m.csv"'}, NOISE, r"m.csv: cannot be read: No such"),
     "a point in mm": ({"reference_point": "[20, 0, 50]"}, NOISE,

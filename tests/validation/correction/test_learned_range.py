@@ -90,8 +90,8 @@ def test_commands_warn_of_rows_beyond_the_learned_range(tmp_path, run, command):
                          "-o", str(out), "--json", str(answer))  # fmt: skip
     assert (code, out.exists()) == (0, True)
     assert error == (
-        "warning: cov.tilt is 0.2 to 0.9, outside 0 to 0.4 where the robot was "
-        "learned, in 1 of 2 rows\n"
+        "warning: cov.tilt is 0.2 to 0.9, outside the identified range 0 to 0.4, in 1 "
+        "of 2 rows\n"
     )
     (one,) = json.loads(answer.read_text())["beyond_learned_range"]
     assert (one["variable"], one["learned"], one["rows"]) == ("cov.tilt", [0, 0.4], 1)

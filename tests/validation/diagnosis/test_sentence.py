@@ -43,12 +43,12 @@ def test_calibration_text_contains_counts_and_percentages():
         0.85, 0.025,
     )  # fmt: skip
     assert calibration_text(tally) == (
-        "simulated on this design, 20 campaigns each: with noise alone explained 1, "
-        "none_needed 19; with the effects found ambiguous 2, explained 18; "
-        "85 % named the effects; false claims 2.5 %"
+        "verdicts on 20 simulated campaigns of each kind: with noise alone explained "
+        "1, none_needed 19; with the identified effects ambiguous 2, explained 18; "
+        "85 % with the correct effects; false claims 2.5 %"
     )
     unnamed = calibration_text(replace(tally, right=float("nan")))
-    assert "named the" not in unnamed
+    assert "correct effects" not in unnamed
 
 
 def test_formula_of_a_compliance_mentions_the_wrench():

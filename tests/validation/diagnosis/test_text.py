@@ -64,7 +64,9 @@ def test_diagnosis_text_omits_absent_sections(shown):
     assert said[:2] == ["arm: none_needed", "Enough."]
     at = said.index("sets of effects, by probability:")
     assert said[at + 1 : at + 3] == ["   0.750  drift", "   0.250  none"]
-    assert said[at + 4] == "errors on 2 rows, drawn once; saved: on all rows"
+    assert said[at + 4] == (
+        "errors on 2 rows, drawn once; errors of the saved robot on all rows"
+    )
     assert [line.split() for line in said[at + 5 : at + 9]] == [
         ["before", "after", "noise", "saved"],
         ["position", "[m]", "3e-05", "1e-05", "5e-06", "8e-06"],
@@ -82,10 +84,10 @@ def test_diagnosis_text_omits_absent_sections(shown):
 def test_errors_with_outliers_require_held_out_outliers(shown):
     """If an outlier is among the fitted rows, only its name is printed."""
     fitted = shown(outliers=["m1"])
-    assert "left out as outliers: m1" in fitted
+    assert "excluded as outliers: m1" in fitted
     assert not any(line.startswith("with outliers") for line in fitted)
     aside = shown(outliers=["m1", "m3"])
-    assert "left out as outliers: m1, m3" in aside
+    assert "excluded as outliers: m1, m3" in aside
     (more,) = [line for line in aside if line.startswith("with outliers")]
     assert more.split() == ["with", "outliers", "8", "2.25", "1.2"]
 
@@ -127,7 +129,7 @@ def test_text_contains_values_of_effects_and_functions(shown):
     assert said[2:] == [
         "learned: tool tx, ty of q.one",
         f"  {'x' * 157}...",
-        "  error in left-out parts of the range of q.j1: 1.25 sigma, "
-        "without the function 5",
-        "  2 other places fit equally well",
+        "  extrapolation error over the range of q.j1: 1.25 sigma, "
+        "without the function 5 sigma",
+        "  2 equivalent other locations",
     ]

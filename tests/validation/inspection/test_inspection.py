@@ -100,37 +100,38 @@ STILL, NOISE = np.zeros((60, 6)), np.random.default_rng(4).normal(size=(60, 6))
 ALWAYS = np.tile([0, 0, 0, 0, 0, -50.0], (60, 1))
 SAYINGS = {
     "no load": ({"loads": STILL}, "load lost: No load was applied"),
-    "one load": ({"loads": ALWAYS}, "load lost: One load in every row"),
-    "no thermometer": ({"temperature": None}, "temperature lost: No cov.temperature"),
+    "one load": ({"loads": ALWAYS}, "load lost: All rows have the same load"),
+    "no thermometer": ({"temperature": None},
+        "temperature lost: The campaign has no cov.temperature"),
     "constant": ({"temperature": np.full(60, 6.0)},
-        "temperature lost: The temperature stayed at +6 K in every row: thermal "
+        "temperature lost: The temperature is +6 K in every row, so thermal "
         "expansion has the same effect as longer links."),
     "calibrated": ({"temperature": np.zeros(60)},
-        "stayed at +0 K in every row: thermal expansion has no effect."),
+        "is +0 K in every row, so thermal expansion has no effect."),
     "too even": ({"temperature": np.linspace(0, 0.1, 60)},
-        "temperature careful: The temperature varied by 0.1 K: even aluminium would "
-        "move the platform by 2.4e-06 m at most, less than one sigma."),
-    "no side": ({"approach": None}, "approach lost: No cov.approach"),
-    "one side": ({"approach": np.ones(60)}, "approach lost: Every row was approached"),
-    "no clock": ({"time": None}, "time lost: No cov.time"),
+        "temperature careful: The temperature varied by 0.1 K. Thermal expansion of "
+        "aluminium would move the platform by at most 2.4e-06 m, less than one sigma."),
+    "no side": ({"approach": None}, "approach lost: The campaign has no cov.approach"),
+    "one side": ({"approach": np.ones(60)}, "approach lost: All rows were approached"),
+    "no clock": ({"time": None}, "time lost: The campaign has no cov.time"),
     "never rotations": ({"measured": np.c_[np.full((60, 3), np.nan), STILL[:, :3]]},
-        "readings lost: Never measured: rx, ry, rz."),
-    "stuck": ({"measured": STILL}, "readings careful: rx reads the same in every row"),
-    "nothing twice": ({"repeat": np.arange(60)}, "repeats lost: Nothing was measured"),
+        "readings lost: Components never measured: rx, ry, rz."),
+    "stuck": ({"measured": STILL}, "readings careful: rx is the same in every row"),
+    "nothing twice": ({"repeat": np.arange(60)}, "repeats lost: There are no repeated"),
     "in a row": ({"repeat": np.repeat(np.arange(20), 3)},
         "repeats careful: Repeats were measured consecutively"),
     "in one go": ({"repeat": np.repeat(np.arange(20), 3)},
-        "configurations lost: Every configuration was measured without a break"),
+        "configurations lost: All rows of each configuration were measured"),
     "one configuration": ({"repeat": np.zeros(60, dtype=int)},
-        "configurations lost: One configuration only"),
+        "configurations lost: There is only one configuration"),
     "few repeats": ({"repeat": np.r_[np.arange(58), 0, 1]},
-        "repeats careful: Few repeats: 12 degrees of freedom in all."),
-    "noisy": ({"measured": 2e-5 * NOISE}, "repeats careful: Repeats scatter "),
-    "quiet": ({"measured": 5e-6 * NOISE}, "Repeats scatter only 0."),
+        "repeats careful: There are few repeats (12 degrees of freedom)."),
+    "noisy": ({"measured": 2e-5 * NOISE}, "careful: The scatter of repeats is "),
+    "quiet": ({"measured": 5e-6 * NOISE}, "The scatter of repeats is only 0."),
     "rounded": ({"measured": np.round(NOISE, 1) * 1e-3},
         "is rounded to 0.0001, more than twice its sigma 1e-05"),
     # The deviations are about 30 mm for a robot of 1 m.
-    "implausible size": ({"measured": 0.03 * NOISE}, "is the unit m, and is"),
+    "implausible size": ({"measured": 0.03 * NOISE}, "Is the unit m, and is"),
     "correlated": ({"temperature": np.arange(60) / 10 + NOISE[:, 0] / 10},
         "time and temperature vary together (correlation +1.00)"),
 }  # fmt: skip
@@ -146,15 +147,15 @@ def test_good_design_has_a_single_remark(rng):
     """The remark is that each configuration has only one load."""
     found = [t for t in texts(sound(rng)) if " fine: " not in t]
     assert found == [
-        "load careful: No configuration was measured under two loads: only the model "
-        "separates effects of the load from effects of the configuration."
+        "load careful: No configuration was measured under two loads, so only the "
+        "model distinguishes effects of the load from effects of the configuration."
     ]
 
 
 def test_consecutive_outliers_are_reported_as_a_sudden_change(rng):
     """Six outliers of 30 sigma are consecutive or spread over the session."""
     for rows, sentence in (
-        (range(10, 16), "suspects careful: Readings far from their repeats follow"),
+        (range(10, 16), "suspects careful: Readings that differ strongly"),
         (range(3, 60, 10), None),
     ):
         measured = rng.normal(size=(60, 6)) * 1e-5
@@ -177,7 +178,7 @@ def test_expansion_and_length_are_equivalent_at_constant_temperature(tmp_path, r
         elastic_campaign(tmp_path / "c", rng, temperature=0.0)
     )
     why = at_calibration.signatures.untestable["thermal_expansion"]
-    assert why == "needs cov.temperature, not 0 in every row"
+    assert why == "requires cov.temperature, not 0 in all rows"
 
 
 def test_first_encoder_offset_is_equivalent_to_a_device_rotation(tmp_path, rng):
