@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-# Names of the six components of a pose deviation; rotations come first.
+# Names of the six components of a pose deviation, rotations first.
 READING = ("rx", "ry", "rz", "tx", "ty", "tz")
 LOAD = ("mx", "my", "mz", "fx", "fy", "fz")
 
@@ -186,9 +186,9 @@ class Campaign:
 
     @property
     def measured_at_once(self) -> NDArray:
-        """Index (R,) of the file row in which each row was measured.
+        """Index (R,) of the row in the file for each row of the campaign.
 
-        All points measured in a file row have the same index.
+        All points measured in a row of the file have the same index.
         """
         number = dict[str, int]()
         rows = [number.setdefault(label, len(number)) for label in self.labels]

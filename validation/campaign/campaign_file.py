@@ -115,7 +115,7 @@ def read_commands(source: Path | str, robot: Robot) -> Campaign:
 
 
 def _declaration(folder: Path | str) -> Path:
-    """Return the path of ``campaign.toml`` in a folder or as given."""
+    """Return the path of ``campaign.toml`` for a given folder or file."""
     file = Path(folder)
     return file if os.path.isfile(file) else file / "campaign.toml"
 

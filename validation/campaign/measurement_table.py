@@ -124,7 +124,7 @@ def read_table(
     for k, name in enumerate(header):
         if name not in _TEXTS:
             table.columns[name] = _numbers(table, robot, name, [row[k] for row in rows])
-    _check_labels(table)  # last, because a wrong format is reported first
+    _check_labels(table)  # after checking the format
     return table
 
 
@@ -285,7 +285,7 @@ def _check_labels(table: MeasurementTable) -> None:
 def _numbers(
     table: MeasurementTable, robot: Robot, name: str, cells: list[str]
 ) -> NDArray:
-    """Convert a column to numbers in SI units; empty readings become NaN."""
+    """Convert a column to numbers in SI units, NaN for empty readings."""
     key = _unit_key(name, robot)
     unit = table.dialect.unit(key) if key else ""
     factor = table.dialect.factor(key) if key else 1.0

@@ -39,7 +39,7 @@ class Calibration:
 def calibrate(
     diagnosis: Diagnosis, count: int, update: Callable[[int, int], None]
 ) -> Calibration:
-    """Simulate and diagnose campaigns with the design of a diagnosis.
+    """Simulate and diagnose campaigns with the design of a measured campaign.
 
     The simulated readings are linear in the effects of the identified machine. The
     final fit of the diagnosis is omitted.

@@ -60,7 +60,7 @@ class Columns:
         conditions: measuring conditions of these rows.
         row: (N,) row of each cell.
         block: (N,) configuration or time span of each cell.
-        visit: (N,) file row of each cell; a file row may contain several points.
+        visit: (N,) row of each cell in the file.
         motions: (R, 6, 6) change of the readings per platform motion, see
             :func:`.platform_motions`. None if every file row contains a single point.
         device: hypothesis for the pose of the measuring frame. None if this pose is
@@ -178,7 +178,7 @@ class Columns:
 
     @property
     def has_clocks(self) -> bool:
-        """Whether rows are successive in time and a function can depend on time."""
+        """Whether held-out blocks are time spans and a function can depend on time."""
         successive = blocks_of(self.campaign)[1] == SPANS
         return successive and any(map(self._is_clock, self.functions.variables))
 

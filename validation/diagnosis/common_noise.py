@@ -22,10 +22,10 @@ _STEP = 1.0
 _CLOSE = 0.05  # tolerance on the logarithms of the standard deviations
 # [sigma] Lower bound on the noise that a standard deviation causes in the readings.
 _LEAST = 0.02
-# [sigma] Common noise above which models without it are not tested.
+# [sigma] Common noise above which models without common noise are not tested.
 _CLEAR = 1.0
 _EVALUATIONS = 40  # maximum number of evaluations of the evidence
-_STABLE = 0.1  # largest difference between logarithms of equal standard deviations
+_STABLE = 0.1  # largest difference between the logarithms of agreeing estimates
 
 
 def common_sizes(state: State) -> tuple[float, float]:

@@ -20,7 +20,7 @@ from forcefit.validation.diagnosis.signatures import Signature
 from forcefit.validation.diagnosis.whitening import Whitening
 
 _PLAUSIBLE = 1e3  # largest prior standard deviation, relative to a plausible value
-_NO_OFFSET = 1e-9  # [sigma] smallest offset above round-off
+_NO_OFFSET = 1e-9  # [sigma] offset below which an effect has no offset
 
 
 @dataclass(frozen=True, eq=False)

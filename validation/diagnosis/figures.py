@@ -111,7 +111,7 @@ def covariate_charts(diagnosis: Diagnosis) -> str:
 
 
 def _residuals(diagnosis: Diagnosis) -> dict[str, NDArray]:
-    """Return the (R, 6) [rad, m] residuals before and after the diagnosis."""
+    """Return the residuals (R, 6) [rad, m] before and after the diagnosis."""
     return {"before": diagnosis.residual_before, "after": diagnosis.residual_after}
 
 

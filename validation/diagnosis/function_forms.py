@@ -54,7 +54,7 @@ class CandidateShape:
 
     @property
     def bends(self) -> NDArray:
-        """The shape parameter to fit, as an array (1,) or (0,)."""
+        """Shape parameter to fit, (1,), or an empty array (0,)."""
         one = len(self.given) == 1 and self.form != "step"
         return np.array([value for _, value in self.given] if one else [])
 

@@ -43,7 +43,7 @@ from forcefit.validation.diagnosis.sensitivities import Sensitivities, in_cells
 Variables = tuple[str, ...]
 # A request contains the variables of a function and the forms to score.
 Request = tuple[Variables, tuple[CandidateShape, ...]]
-# Largest number of columns of a function: six for each of six components.
+# Largest number of columns of a function with six components.
 _WIDEST = 36
 # Number of functions of highest score that are retained.
 _LISTED = 2000

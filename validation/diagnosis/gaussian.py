@@ -33,7 +33,7 @@ FREEDOM = 20.0
 # averaged over these values.
 SIZES = 10.0 ** np.arange(-0.5, 4.1, 0.5)
 SPAN = math.log(SIZES[-1] / SIZES[0])
-_SEEN = 1e-8  # smallest eigenvalue of a normalised Gram matrix above round-off
+_SEEN = 1e-8  # eigenvalue of a normalised Gram matrix that is treated as zero
 
 
 def deviance(squares: NDArray | float, count: int) -> NDArray | float:

@@ -76,7 +76,8 @@ def _knees(functions: Functions, name: str, component: str) -> list[CandidateSha
     if axis != frame.own_axis or name not in (*drives(robot), *elastic_joints(robot)):
         return []
     load = functions.sensitivities.wrenches[:, robot.index(name), axis]
-    # A jump at zero load of a slide is the library effect of joint clearance.
+    # For a slide, a jump at zero load is equivalent to joint clearance, which is an
+    # effect in the library.
     return forms.knees(np.abs(load), jump=frame.turns)
 
 

@@ -25,7 +25,7 @@ KINDS = ("rotation", "translation")
 LARGEST_TURN = 0.2  # [rad] largest plausible rotation error of a frame or drive
 # Largest plausible translation of a frame, relative to the size of the robot.
 LARGEST_SHIFT = 0.1
-# Smallest norm of a column above round-off, relative to the largest in its group.
+# Norm of a column that is treated as zero, relative to the largest in its group.
 _ROUNDING = 1e-9
 _SAME = 1 - 1e-6  # smallest cosine of two parallel columns
 

@@ -31,7 +31,7 @@ from forcefit.assembly.measurement.settled_clearance import (
 from forcefit.assembly.measurement.without_clearance import flexibility
 
 _STEP = 1e-5  # [rad, m] step of central differences
-# Smallest component of a wrench above round-off, relative to the largest component.
+# Wrench component that is treated as zero, relative to the largest component.
 _ROUNDING = 1e-9
 _AT_ONCE = 50  # number of postures that are computed together, to limit memory
 

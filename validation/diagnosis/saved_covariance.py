@@ -225,7 +225,8 @@ def read_covariance(robot: Robot) -> SavedCovariance | None:
         raise BadInput(f"{path}: found damaged content, {expected}") from None
     if C.shape != (len(values), len(values)) or not np.isfinite(C).all():
         raise BadInput(
-            f"{path}: found shape {C.shape}, expected {len(values)} rows and columns"
+            f"{path}: found a matrix of shape {C.shape} or invalid values, expected "
+            f"{len(values)} rows and columns of finite numbers"
         )
     return SavedCovariance(numbers, C)
 

@@ -18,7 +18,7 @@ from forcefit.validation.diagnosis.weighted_readings import WeightedReadings
 from forcefit.validation.diagnosis.whitening import Whitening
 
 BEAM = 6  # number of candidate elements that are tried for a model
-OF_NAME = 2  # largest number of these candidates that have the same name
+OF_NAME = 2  # largest number of tried candidates with the same name
 _VARIABLES = 4  # number of variables whose products with other variables are scored
 # Largest number of columns of a function at several locations, to limit memory.
 _WIDEST = 600

@@ -36,7 +36,7 @@ from forcefit.validation.diagnosis.weighted_readings import NONE, WeightedReadin
 
 # Smallest relevant difference between two log posteriors, which is odds of 20.
 _EQUAL = 3.0
-# Probability of functions above which the selected model must contain one.
+# Probability of functions above which the selected model must contain a function.
 _CLAIMED = 0.9
 # Squared whitened difference below which two predictions are treated as equal.
 _SAME = 1.0

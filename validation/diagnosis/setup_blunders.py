@@ -38,10 +38,9 @@ _CLEAR = 0.1
 _LESS = 0.9
 # Largest residual with which blunders are reported, relative to the initial residual.
 _DECISIVE = 0.5
-# Smallest factor by which the residual must increase without a necessary correction.
+# Smallest factor by which the residual increases without a necessary correction.
 _NEEDED = 1.5
-# Largest standard deviation of commanded positions, relative to that of the readings.
-# Other corrections are rejected.
+# Largest standard deviation of corrected positions, relative to that of the readings.
 _FAR = 10.0
 _NOISE = 3.0  # [sigma] residual below which the search for blunders ends
 _LEAST = 100.0  # smallest decrease of chi-square for each reported blunder

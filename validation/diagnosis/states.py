@@ -30,7 +30,7 @@ from forcefit.validation.diagnosis.weighted_readings import NARROW, WeightedRead
 # Whether geometric errors and whether springs are included in a model.
 Mode = tuple[bool, bool]
 MORE = math.log(2.0)  # decrease of the log prior for each additional element
-# Decrease of the log prior if geometric errors are included, and if springs are.
+# Decrease of the log prior for including geometric errors, and for including springs.
 IN_USE = math.log(10.0)
 _GROUPS = 4  # number of groups of nuisance parameters
 

@@ -2,12 +2,10 @@
 
 Steps:
 
-1. the pose of the measuring frame is estimated if it is unknown;
-2. effects and functions are searched for together (:mod:`.select`);
-3. the machine with these effects is fitted (:mod:`.fit`), second-order terms of its
-   geometric errors are added to the model, and step 2 is repeated until they converge.
-
-The search uses only the rows to be fitted.
+1. Estimate the pose of the measuring frame if it is unknown.
+2. Select effects and functions (:mod:`.select`).
+3. Fit the machine with these effects (:mod:`.fit`).
+4. Add second-order terms of its geometric errors to the model, and repeat from step 2.
 """
 
 from collections.abc import Callable, Mapping
@@ -207,7 +205,7 @@ def trace(
 
 
 def _searched_rows(campaign: Campaign, fitted: NDArray) -> NDArray:
-    """Return a mask (R,) of the rows for model selection, at most a random sample."""
+    """Return a mask (R,) of the rows for model selection, at most 2000 rows."""
     chosen = np.zeros(len(campaign), dtype=bool)
     chosen[fitted] = drawn(campaign.measured_at_once[fitted], _SEARCHED)
     return chosen

@@ -59,7 +59,7 @@ def test_diagnose_writes_results_a_report_and_a_robot(small, tmp_path, run):
     placed = place_robot(campaign.robot, joints={"one": q[0], "two": q[1]})
     declared = as_declared(placed, campaign.loads[0])
     fitted = predict(apply_effects(declared, {effect: values})).deviation[0]
-    assert solved == pytest.approx(fitted, abs=1e-9)  # second-order rotations differ
+    assert solved == pytest.approx(fitted, abs=1e-9)  # tolerance for second-order terms
     assert np.abs(fitted - predict(declared).deviation[0]).max() > 1e-5
 
 

@@ -63,7 +63,7 @@ def numbers(found, effect):
 
 
 def assert_within(found, effect, truth):
-    """Check that errors are at most three standard deviations and these are small."""
+    """Check values against the truth, with a tolerance of three standard deviations."""
     values = numbers(found, effect)
     assert values.keys() == truth.keys()
     for name, (value, std) in values.items():
@@ -267,7 +267,7 @@ def test_verdict_on_simulated_campaigns_is_correct(name):
     truth = TRUTH[name]
     found = diagnose(read_campaign(CAMPAIGNS / name))
     accepted = set(truth["accept_verdicts"])
-    if "outside_library" in accepted:  # functions may describe effects outside it
+    if "outside_library" in accepted:  # functions may describe such effects
         accepted.add("learned")
     assert found.verdict in accepted
     sets = [tuple(sorted(names)) for names in truth["accept_effects"]]

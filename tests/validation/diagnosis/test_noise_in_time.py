@@ -132,7 +132,7 @@ def by_definition(campaign, z):
             squares = z @ np.linalg.solve(R, z)
             gain = len(z) * np.log(z @ z / squares) - np.linalg.slogdet(R)[1]
             best = max(best, (gain, share, constant))
-    return best[1], best[2], np.exp(-best[0] / 2)  # chi-square with two degrees
+    return best[1], best[2], np.exp(-best[0] / 2)  # equal to chi2.sf(best[0], 2)
 
 
 @pytest.mark.parametrize("sessions", [None, np.repeat([0, 1, 1], 12)])

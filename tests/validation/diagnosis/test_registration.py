@@ -19,7 +19,7 @@ TURN, SHIFT = [0.3, -0.2, 0.5], [1.0, 0.5, -2.0]
 
 
 def seen_by(turn, shift):
-    """Return the readings (8, 6) of a bar by a device with a given pose."""
+    """Return the readings (8, 6) of a bar for a given pose of the device."""
     p, R = LENGTH * along(bar()), Rotation.from_rotvec(turn)
     return np.hstack([np.tile(turn, (8, 1)), R.apply(p) + shift - p])
 

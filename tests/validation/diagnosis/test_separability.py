@@ -75,7 +75,7 @@ def test_nuisance_columns_are_projected_out_at_any_scale(units, rng):
 
 
 def test_equivalence_does_not_depend_on_the_size_of_an_effect(rng):
-    """An effect of two sigma in total is invisible."""
+    """An effect with a norm of two sigma is invisible."""
     line = rng.normal(size=(30, 1))
     line /= np.linalg.norm(line)
     found = compare_signatures({"a": 2 * line, "b": 50 * line, "none": 1e-5 * line})
