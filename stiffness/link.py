@@ -1,4 +1,4 @@
-"""Link stiffness and its estimated error."""
+"""Stiffness of a link and its estimated error."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -11,30 +11,30 @@ from numpy.typing import ArrayLike, NDArray
 from forcefit.inputs.table import BadInput
 from forcefit.results.display import Figures, html_table, numbers, short_repr
 
-# round-off error of the eigenvalues of a scaled 6 by 6 matrix, relative to its size
+# relative round-off error of the eigenvalues of a 6 by 6 matrix
 _ROUNDING = 6 * np.finfo(float).eps
 
 
 @dataclass(frozen=True, eq=False)
 class LinkStiffness:
-    """An elastic link between two interfaces, described at its tip.
+    """Stiffness of an elastic link between two interfaces.
 
-    The base is held while a wrench acts on the tip: ``screw = compliance @ wrench``.
-    Screw and wrench refer to the point ``tip``, in the same axes as ``tip`` and
-    ``base``.
+    The base is clamped, and a wrench acts on the tip: ``screw = compliance @ wrench``.
+    Screw and wrench refer to the point ``tip``.
 
     Attributes:
         method: computation method, such as ``"Timoshenko beam"``.
-        compliance: (6, 6) [rad/(N m) .. m/N] symmetric positive definite.
+        compliance: (6, 6) [rad/(N m) .. m/N] compliance, symmetric and positive
+            definite.
         tip: (3,) [m] reference point of screws and wrenches.
-        base: (3,) [m] centre of the held interface.
-        stiffness_error: (6, 6) [N m/rad .. N/m] symmetric estimate of the difference
-            between ``stiffness`` and the exact stiffness; zero for a closed form.
-        mesh: counts, volume and quality of the mesh; empty for a closed form.
+        base: (3,) [m] centre of the clamped interface.
+        stiffness_error: (6, 6) [N m/rad .. N/m] estimated error of ``stiffness``; zero
+            for beam theory.
+        mesh: size and quality of the mesh; empty for beam theory.
         mass: [kg] mass of the link; 0 if no density was given.
         center_of_mass: (3,) [m] position of the centre of mass.
-        inertia: (3, 3) [kg m^2] about the centre of mass.
-        stiffness: (6, 6) [N m/rad .. N/m] inverse of the compliance, computed here.
+        inertia: (3, 3) [kg m^2] inertia about the centre of mass.
+        stiffness: (6, 6) [N m/rad .. N/m] inverse of the compliance.
     """
 
     method: str
@@ -51,7 +51,7 @@ class LinkStiffness:
     __repr__, _repr_html_, summary = short_repr, html_table, short_repr
 
     def _figures(self) -> Figures:
-        """Return the values shown in short texts on the link."""
+        """Return the values in the short description of a link."""
         K = np.diag(self.stiffness)
         error = self.relative_error_estimate
         figures = {
@@ -88,45 +88,45 @@ class LinkStiffness:
         object.__setattr__(self, "mesh", MappingProxyType(dict(self.mesh)))
 
     def _store(self, name: str, array: NDArray) -> None:
-        """Store a read-only array under a name."""
+        """Store an array as a read-only attribute."""
         array.setflags(write=False)
         object.__setattr__(self, name, array)
 
     @property
     def relative_errors(self) -> NDArray:
-        """(6, 6) absolute error of each entry of K, scaled by sqrt(K_ii K_jj)."""
+        """Estimated error of each entry K_ij, divided by sqrt(K_ii K_jj), (6, 6)."""
         return np.abs(scaled(self.stiffness_error, self.stiffness))
 
     @property
     def relative_error_estimate(self) -> float:
-        """Largest entry of :attr:`relative_errors`; 0 for a closed form."""
+        """Largest entry of :attr:`relative_errors`."""
         return float(self.relative_errors.max())
 
 
 def scaled(matrix: ArrayLike, stiffness: ArrayLike) -> NDArray:
-    """Scale entries by sqrt(K_ii K_jj), so that rotations and translations compare.
+    """Divide the entries of a matrix by sqrt(K_ii K_jj).
 
     Args:
-        matrix: (6, 6) stiffness, or difference of two stiffnesses.
-        stiffness: (6, 6) stiffness whose diagonal sets the scale.
+        matrix: (6, 6) stiffness, or difference between two stiffnesses.
+        stiffness: (6, 6) stiffness K.
 
     Returns:
-        (6, 6) [1] scaled entries.
+        (6, 6) [1] scaled matrix.
     """
     diagonal = np.sqrt(np.diag(np.asarray(stiffness, dtype=float)))
     return np.asarray(matrix, dtype=float) / np.outer(diagonal, diagonal)
 
 
 def check_definite(who: str, matrix: NDArray) -> None:
-    """Check that a matrix can be a stiffness or a compliance.
+    """Check that a matrix is symmetric and positive definite.
 
     Args:
-        who: description of the matrix, for the error message.
-        matrix: (6, 6) matrix.
+        who: description of the matrix, for error messages.
+        matrix: (6, 6) stiffness or compliance.
 
     Raises:
-        BadInput: the matrix is not symmetric within 1e-6 of its scale, or not positive
-            definite beyond round-off.
+        BadInput: the matrix is not symmetric within a relative difference of 1e-6, or
+            not positive definite.
     """
     if not np.all(np.diag(matrix) > 0):
         raise BadInput(f"{who} is not positive definite: a diagonal entry is <= 0")
@@ -146,13 +146,13 @@ def check_definite(who: str, matrix: NDArray) -> None:
 
 
 def inverted(matrix: NDArray) -> NDArray:
-    """Invert a symmetric positive definite matrix of mixed units.
+    """Invert a stiffness or a compliance.
 
     Args:
         matrix: (6, 6) stiffness or compliance.
 
     Returns:
-        (6, 6) inverse, exactly symmetric.
+        (6, 6) inverse, which is exactly symmetric.
     """
     size = np.sqrt(np.diag(matrix))
     unit = np.linalg.inv(matrix / np.outer(size, size))
@@ -160,14 +160,15 @@ def inverted(matrix: NDArray) -> NDArray:
 
 
 def turn_link(link: LinkStiffness, rotation: ArrayLike) -> LinkStiffness:
-    """Express a link in rotated axes with the same origin.
+    """Express a link in rotated axes.
 
     Args:
         link: the link.
-        rotation: (3, 3) rotation whose columns are the old axes in the new axes.
+        rotation: (3, 3) rotation matrix whose columns are the old axes, expressed in
+            the new axes.
 
     Returns:
-        The link, with all vectors and matrices in the new axes.
+        The link in the new axes.
 
     Raises:
         BadInput: the matrix is not a rotation.

@@ -1,4 +1,4 @@
-"""Closed-form link models: sections, straight and curved beams, and their stress.
+"""Beam models of links: sections, compliances and stresses.
 
 Start with ``beam.py``, which computes the compliance of a cantilever.
 """

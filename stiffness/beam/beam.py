@@ -1,4 +1,4 @@
-"""Closed-form compliance of straight beams.
+"""Compliance of straight beams in closed form.
 
 ========  ======================================================  =====
 symbol    meaning                                                 unit
@@ -6,7 +6,7 @@ symbol    meaning                                                 unit
 x y z     section axes: x along the beam, from base to tip, z up  -
 I_y I_z   second moments of area; I_y bends about y               m^4
 J         Saint-Venant's torsion constant                         m^4
-shear_*   factor on the area that resists a force along y, z      1
+shear_*   shear factor of the area, for a force along y or z      1
 C         tip compliance, ``screw = C @ wrench``                  SI
 ========  ======================================================  =====
 """
@@ -39,34 +39,34 @@ def beam_compliance(
     axis: ArrayLike = (1.0, 0.0, 0.0),
     up: ArrayLike | None = None,
 ) -> NDArray:
-    r"""Compute the tip compliance of a straight cantilever of constant section.
+    r"""Compute the tip compliance of a straight cantilever with a constant section.
 
-    The link is clamped at its base, and the screw refers to its tip. Bending, torsion,
-    stretching and (Timoshenko) shear are included. Warping restraint, taper and the
-    local compliance of the end fittings are neglected;
-    :func:`forcefit.stiffness.fem.fea.mesh_link` includes them.
+    The beam is clamped at its base, and the screw refers to its tip. Bending, torsion,
+    tension and shear are included. Restrained warping and the compliance of the end
+    fittings are neglected. To include them, use
+    :func:`forcefit.stiffness.fem.fea.mesh_link`.
 
     Args:
         length: [m] distance from the clamped section to the tip, > 0.
-        section: lengths of the cross-section [m], as for a link of a robot:
-            ``{"radius": 0.02}`` and optionally ``inner_radius``; ``width`` and
-            ``height``, and optionally ``wall`` of a box or ``web`` and ``flange`` of an
-            I-section; or the constants of any other section.
+        section: dimensions of the cross-section [m] by name, such as ``{"radius":
+            0.02}``. See :func:`forcefit.stiffness.beam.sections.declared_section` for
+            the names.
         E: [Pa] Young's modulus, > 0.
         nu: [-] Poisson's ratio, in (-1, 0.5).
-        theory: ``"timoshenko"``, or ``"euler"`` for bending without shear.
-        axis: (3,) vector of any length from base to tip, in the axes of the result.
-        up: (3,) vector along the section's z axis, in the same axes; its component
-            along the beam is removed.  The default is y, or z for a beam along y.
+        theory: ``"timoshenko"``, or ``"euler"`` to neglect shear.
+        axis: (3,) vector in the direction from base to tip.
+        up: (3,) vector in the direction of the section's z axis. Its component along
+            the beam is removed. The default is y, or z for a beam along y.
 
     Returns:
-        (6, 6) [rad/(N m), rad/N, m/(N m), m/N] compliance, symmetric positive definite.
+        Compliance, (6, 6) [rad/(N m), rad/N, m/(N m), m/N], symmetric and positive
+        definite.
 
     Raises:
         BadInput: an argument is out of range.
 
     Sources:
-        Timoshenko & Gere, *Mechanics of Materials*: cantilever under an end load.
+        Timoshenko & Gere, *Mechanics of Materials*, for a cantilever with an end load.
 
     Example:
         A downward force of 100 N rotates the tip about y:
@@ -117,19 +117,18 @@ def _compliance_in_section_axes(
 
 
 def section_axes(axis: ArrayLike, up: ArrayLike | None = None) -> NDArray:
-    """Return the axes of a section as columns: x along the beam, y, and z up.
+    """Return the axes of a section: x along the beam, and z up.
 
     Args:
-        axis: (3,) vector of any length from base to tip.
-        up: (3,) vector along the section's z axis; its component along the beam is
-            removed.  The default is y, or z for a beam along y.
+        axis: (3,) vector in the direction from base to tip.
+        up: (3,) vector in the direction of the section's z axis. Its component along
+            the beam is removed. The default is y, or z for a beam along y.
 
     Returns:
-        (3, 3) proper orthogonal matrix, whose columns are the axes.
+        (3, 3) rotation matrix whose columns are the axes.
 
     Raises:
-        BadInput: a vector does not consist of three finite numbers or is zero, or
-            ``up`` is parallel to the beam.
+        BadInput: a vector is zero or not finite, or ``up`` is parallel to the beam.
     """
     x = unit_vector("axis", axis)
     if up is None:
@@ -144,17 +143,17 @@ def section_axes(axis: ArrayLike, up: ArrayLike | None = None) -> NDArray:
 
 
 def unit_vector(name: str, vector: ArrayLike) -> NDArray:
-    """Normalise a user-supplied vector to unit length.
+    """Normalise a vector to unit length.
 
     Args:
-        name: name for error messages.
+        name: name of the vector, for error messages.
         vector: (3,) nonzero vector.
 
     Returns:
         (3,) unit vector.
 
     Raises:
-        BadInput: the vector does not consist of three finite numbers, or is zero.
+        BadInput: the vector is zero or does not consist of three finite numbers.
     """
     direction = np.asarray(vector, dtype=float)
     if direction.shape != (3,) or not np.isfinite(direction).all():

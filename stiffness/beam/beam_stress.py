@@ -1,4 +1,4 @@
-r"""Peak von Mises stress of a straight beam under a tip wrench and its own weight.
+r"""Peak von Mises stress in a straight beam under a tip wrench and its own weight.
 
 ========  ==========================================================  ======
 symbol    meaning                                                     unit
@@ -12,12 +12,12 @@ sigma     normal stress along x                                       Pa
 tau       shear stress along y and along z                            Pa
 ========  ==========================================================  ======
 
-In a section sigma = N / A + M_y z / I_y - M_z y / I_z.  Without weight, shear forces
-and torsion are the same in all sections, and M is linear in x. The von Mises stress of
-a fibre, sqrt(sigma^2 + 3 tau^2), is then convex in x and attains its maximum at the
-base or at the tip, so only these two sections are evaluated. With weight, forces
-increase as s W / L and moments as s^2 / 2 (e_x x W) / L. In this case, 31 intermediate
-sections and the sections with an extremum of the moment about y or z are evaluated too.
+In a section sigma = N / A + M_y z / I_y - M_z y / I_z. Without weight, N, V and the
+torsional moment are constant along the beam, and the bending moments are linear in x.
+The von Mises stress of a fibre, sqrt(sigma^2 + 3 tau^2), is then convex in x, so its
+maximum is at the base or at the tip. With weight, forces increase as s W / L and
+moments as s^2 / 2 (e_x x W) / L. The stress is then evaluated in 31 more sections and
+at the extrema of both bending moments.
 """
 
 import math
@@ -29,15 +29,15 @@ from numpy.typing import ArrayLike, NDArray
 from forcefit.inputs.table import BadInput
 from forcefit.stiffness.beam.sections import Section, declared_section
 
-# number of fibres around a round section; the relative error between two fibres is at
-# most 4e-5
+# number of fibres around a round section, which limits the relative error of the peak
+# to 4e-5
 _AROUND = 360
-# number of fibres along a side; the error of a parabola between two fibres is at most
+# number of fibres along a side, which limits the relative error of a parabolic peak to
 # 1e-3
 _ACROSS = 33
-_CHUNK = 2048  # number of sections in a batch: 2048 x 1089 x 3 numbers occupy 54 MB
-# number of sections of a heavy beam; the error of a parabola between two is at most
-# 1e-3
+_CHUNK = 2048  # number of sections in a batch, whose stresses occupy 54 MB
+# number of sections of a beam with weight, which limits the relative error of a
+# parabolic peak to 1e-3
 _ALONG = 33
 _SHAPES = "radius (inner_radius), or width and height (wall)"
 
@@ -50,42 +50,40 @@ def peak_beam_stress(
 ) -> tuple[NDArray, NDArray]:
     """Compute the peak von Mises stress of a straight beam and its position.
 
-    Axial force, bending, torsion and shear act together. The stress is evaluated in the
-    sections at the base and at the tip and, for a beam with weight, in sections between
-    them. In each section, the stress is evaluated at
+    The stress is evaluated in the sections at the base and at the tip. For a beam with
+    weight, it is also evaluated in sections between them. The points in each section
+    are
 
-    - round bar and tube: 360 points of the outer circle;
-    - solid rectangle: a grid of 33 x 33 points, including corners and midpoints;
-    - hollow rectangle: 33 points along each outer side.
+    - 360 points on the outer circle of a round bar or tube,
+    - a grid of 33 x 33 points in a solid rectangle, and
+    - 33 points along each outer side of a hollow rectangle.
 
-    Two local effects are neglected. The first is the stress where a joint holds the
-    ends of the link, since a clamped edge is singular; see
-    :mod:`forcefit.stiffness.fem.stress`.  The second is the stress in the inner corners
-    of a hollow rectangle, which depends on their fillet radius.
+    The local stresses at the clamped ends and in the inner corners of a hollow
+    rectangle are neglected.
 
     Args:
-        section: ``radius`` and optionally ``inner_radius``, or ``width`` (along y) and
-            ``height`` (along z) and optionally ``wall`` [m].
+        section: dimensions [m] by name: ``radius`` and optionally ``inner_radius``, or
+            ``width`` (along y), ``height`` (along z) and optionally ``wall``.
         length: [m] length of the beam, >= 0.
         wrench: (..., 6) [N m, N] wrench at the tip, in the axes of the beam.
-        weight: (3,) or (..., 3) [N] force distributed evenly along the length, in the
-            same axes.
+        weight: (3,) or (..., 3) [N] weight, in the axes of the beam. It is distributed
+            uniformly along the length.
 
     Returns:
-        (...) [Pa] peak stress, and (..., 3) [m] its position relative to the base, in
+        Peak stress, (...) [Pa], and its position relative to the base, (..., 3) [m], in
         the axes of the beam.
 
     Raises:
-        BadInput: the section is given only by its constants, or the section, the length
-            or the wrench is invalid.
+        BadInput: the outline of the section is unknown, or the section, the length or
+            the wrench is invalid.
 
     Sources:
-        Timoshenko & Gere, *Mechanics of Materials*, for bending and for shear by
-        V Q / (I b); Timoshenko & Goodier, *Theory of Elasticity*, section 109, for a
-        twisted rectangle; Bredt (1896), with the wall's own twist, for a hollow one.
+        Timoshenko & Gere, *Mechanics of Materials*, for bending and for the shear
+        stress V Q / (I b); Timoshenko & Goodier, *Theory of Elasticity*, section 109,
+        for torsion of a rectangle; Bredt (1896) for torsion of a hollow rectangle.
 
     Example:
-        A transverse tip force bends a bar most at its base:
+        Under a transverse tip force, the peak stress is at the base:
 
         >>> bar = {"radius": 0.04}
         >>> stress, where = peak_beam_stress(bar, 0.452, [0, 0, 0, 0, 0, 1e3])
@@ -123,14 +121,13 @@ def peak_beam_stress(
 
 
 def _sections(wrench: NDArray, weight: NDArray, length: float) -> NDArray:
-    """Return (n, k) [m] distances of sections from the tip, starting with the base."""
+    """Return the distances of the evaluated sections from the tip, (n, k) [m]."""
     ends = np.broadcast_to([length, 0.0], (len(wrench), 2))
     if not weight.any():
         return ends
     between = np.linspace(0, length, _ALONG)[1:-1]
     with np.errstate(divide="ignore", invalid="ignore"):
-        # a moment has its extremum where the transverse force in the other direction
-        # vanishes
+        # a bending moment is extremal where the corresponding shear force is zero
         share = -wrench[:, 4:] / weight[:, 1:]
     extrema = length * np.clip(np.nan_to_num(share), 0, 1)
     between = np.broadcast_to(between, (len(wrench), len(between)))
@@ -140,19 +137,20 @@ def _sections(wrench: NDArray, weight: NDArray, length: float) -> NDArray:
 def _on_sections(
     wrench: NDArray, weight: NDArray, s: NDArray, length: float
 ) -> NDArray:
-    """Return (n, k, 6) [N m, N] loads on sections at distances s from the tip."""
+    """Return the moments and forces on sections, (n, k, 6) [N m, N]."""
     on = np.repeat(wrench[:, None], s.shape[1], axis=1)
     share = s / length if length else np.zeros_like(s)
-    # mean force between tip and section, which includes half the weight of this length
+    # The moment is the distance from the tip times the mean force, which includes half
+    # of the weight between tip and section.
     middle = wrench[:, None, 3:] + share[..., None] * weight[:, None] / 2
-    on[..., 1] -= s * middle[..., 2]  # moment: distance from the tip times mean force
+    on[..., 1] -= s * middle[..., 2]
     on[..., 2] += s * middle[..., 1]
     on[..., 3:] += share[..., None] * weight[:, None]
     return on
 
 
 def _stresses(influence: NDArray, forces: NDArray) -> tuple[NDArray, NDArray]:
-    """Return (n, p) sigma [Pa] and 3 tau^2 [Pa^2] of fibres from section loads."""
+    """Return sigma [Pa] and 3 tau^2 [Pa^2] of each fibre, both (n, p)."""
     sigma, tau_y, tau_z = (forces @ influence[:, k].T for k in range(3))
     return sigma, 3 * (tau_y**2 + tau_z**2)
 
@@ -164,11 +162,12 @@ def section_stress(section: Mapping[str, float]) -> tuple[NDArray, NDArray]:
         section: see :func:`peak_beam_stress`.
 
     Returns:
-        (p, 2) [m] y and z of the fibres, and (p, 3, 6) [1/m^3, 1/m^2] sigma, tau along
-        y and tau along z for each unit moment and force about and along x, y, z.
+        Coordinates y and z of the fibres, (p, 2) [m]; and sigma, tau along y and tau
+        along z for unit moments about x, y, z and unit forces along x, y, z, (p, 3, 6)
+        [1/m^3, 1/m^2].
 
     Raises:
-        BadInput: the section is given only by its constants, or is invalid.
+        BadInput: the outline of the section is unknown, or the section is invalid.
     """
     if "area" in section:
         raise BadInput(
@@ -183,7 +182,7 @@ def section_stress(section: Mapping[str, float]) -> tuple[NDArray, NDArray]:
             f"stress: found a section of {', '.join(section) or 'nothing'}; "
             f"expected {_SHAPES}"
         )
-    # Poisson's ratio affects only the shear factors
+    # the value of Poisson's ratio affects only the shear factors, which are not used
     constants = declared_section(section, nu=0.3)
     if "radius" in section:
         return _round(constants, section["radius"], section.get("inner_radius", 0.0))
@@ -194,7 +193,7 @@ def section_stress(section: Mapping[str, float]) -> tuple[NDArray, NDArray]:
 
 
 def _bending(section: Section, y: NDArray, z: NDArray) -> NDArray:
-    """Return the (p, 3, 6) normal stress of axial force and bending, without shear."""
+    """Return the normal stresses due to unit loads, (p, 3, 6)."""
     influence = np.zeros((len(y), 3, 6))
     influence[:, 0, 1] = z / section.I_y
     influence[:, 0, 2] = -y / section.I_z
@@ -203,15 +202,15 @@ def _bending(section: Section, y: NDArray, z: NDArray) -> NDArray:
 
 
 def _round(section: Section, radius: float, hole: float) -> tuple[NDArray, NDArray]:
-    """Return the fibres on the outer circle; shear acts along the circle."""
+    """Return the fibres on the outer circle and their stresses under unit loads."""
     angle = 2 * np.pi * np.arange(_AROUND) / _AROUND
     out = np.column_stack([np.cos(angle), np.sin(angle)])
     along = np.column_stack([-out[:, 1], out[:, 0]])
     influence = _bending(section, *(radius * out.T))
     influence[:, 1:, 0] = along * radius / section.J
-    # V Q / (I b) at the neutral axis: 4/3 of the mean in a bar, 2 in a thin tube
+    # V Q / (I b) at the neutral axis is 4/3 of the mean in a bar, and 2 in a thin tube
     peak = 4 / 3 * (radius**2 + radius * hole + hole**2) / (radius**2 + hole**2)
-    # along the circle, the stress varies as the sine of the angle from V
+    # the stress varies with the sine of the angle between V and the radius
     influence[:, 1:, 4:] = peak / section.area * along[:, :, None] * along[:, None, :]
     return radius * out, influence
 
@@ -219,13 +218,13 @@ def _round(section: Section, radius: float, hole: float) -> tuple[NDArray, NDArr
 def _rectangle(
     section: Section, width: float, height: float
 ) -> tuple[NDArray, NDArray]:
-    """Return fibres on a grid over the whole section."""
+    """Return the fibres on a grid over the section and their stresses."""
     share = np.linspace(-0.5, 0.5, _ACROSS)
     y, z = (v.ravel() for v in np.meshgrid(width * share, height * share))
     influence = _bending(section, y, z)
     if width <= height:
         tau_y, tau_z = _torsion(y, z, width / 2, height / 2)
-    else:  # rotate by a quarter turn about x to bring the short side along z
+    else:  # rotate by 90 degrees about x, so that the short side is along z
         tau_z, minus_tau_y = _torsion(z, -y, height / 2, width / 2)
         tau_y = -minus_tau_y
     influence[:, 1, 0], influence[:, 2, 0] = tau_y / section.J, tau_z / section.J
@@ -235,9 +234,10 @@ def _rectangle(
 
 
 def _torsion(p: NDArray, q: NDArray, a: float, b: float) -> tuple[NDArray, NDArray]:
-    """Return shear [m] along p and q for unit G theta; half sides a <= b along p, q."""
+    """Return the shear stresses along p and q for unit G theta [m]."""
     along_p, along_q = np.zeros_like(p), 2 * p
-    # the terms decrease as exp(-n pi (b - |q|) / 2a), on the short sides as 1 / n^2
+    # The terms decrease as exp(-n pi (b - |q|) / 2a), and as 1 / n^2 on the short
+    # sides.
     for n in range(1, 400, 2):
         k = n * np.pi / (2 * a)
         factor = 16 * a / np.pi**2 / n**2 * (-1) ** ((n - 1) // 2)
@@ -251,11 +251,12 @@ def _torsion(p: NDArray, q: NDArray, a: float, b: float) -> tuple[NDArray, NDArr
 def _hollow(
     section: Section, width: float, height: float, wall: float
 ) -> tuple[NDArray, NDArray]:
-    """Return fibres on the outer sides, counterclockwise; shear acts along them."""
+    """Return the fibres on the outer sides, counterclockwise, and their stresses."""
     share = np.linspace(-0.5, 0.5, _ACROSS)
     places, influences = [], []
     for turns in range(4):
-        # only the right side is computed; the section is rotated by quarter turns
+        # The stresses are computed for the right side of the section, which is rotated
+        # by multiples of 90 degrees.
         across, up = (width, height) if turns % 2 == 0 else (height, width)
         second = section.I_y if turns % 2 == 0 else section.I_z
         out = np.round([np.cos(turns * np.pi / 2), np.sin(turns * np.pi / 2)])
@@ -264,16 +265,15 @@ def _hollow(
         influence = _bending(section, *where.T)
         b, h = across - wall, up - wall
         around = 2 * (b + h)
-        # Bredt's shear flow in the wall, plus the twist of the wall itself at the outer
-        # face
+        # Bredt's shear flow plus the torsional shear stress of an open wall at its face
         twist = 2 * b * h / around / section.J + wall / section.J
-        # V Q / (I b) of the flange and then of the wall; the wall ends at the hole
+        # V Q / (I b), where Q is that of the flange and of the wall beyond the point
         inside = np.minimum(np.abs(up * share), up / 2 - wall)
         flange = across * (up**2 - (up - 2 * wall) ** 2) / 8
         Q = flange + wall * ((up / 2 - wall) ** 2 - inside**2)
         parallel = Q / (second * 2 * wall)
-        # shear flow of a transverse force along this side, zero at the middle of the
-        # side
+        # The shear flow of a force normal to this side is zero in the middle of the
+        # side.
         other = section.I_z if turns % 2 == 0 else section.I_y
         crossing = -b / 2 * (up * share) / other
         flow = parallel[:, None] * along + crossing[:, None] * out

@@ -1,13 +1,13 @@
-r"""Tapered, bent and L-shaped beams, by integrating the compliance along a curve.
+r"""Compliance of tapered and curved beams, by integration along the curve.
 
-The tip wrench of a cantilever is transmitted through every section, so the compliance
-is the integral of the compliances of its slices, each expressed at the tip,
+The compliance of a cantilever is the integral of the compliances of its slices, each
+expressed at the tip:
 
     C = integral A(s) c(s) A(s)^T ds,   A(s) = screw_map(p(s) - tip, R(s)),
 
-with c(s) = diag(1/GJ, 1/EI_y, 1/EI_z, 1/EA, 1/GA_y, 1/GA_z) per unit length in the
-section's axes R(s).  The formula is accurate if the radius of curvature is large
-compared with the section. Thick curved bars and warping at kinks are not covered.
+Here c(s) = diag(1/GJ, 1/EI_y, 1/EI_z, 1/EA, 1/GA_y, 1/GA_z) is the compliance per unit
+length in the section's axes R(s). The formula is accurate if the radius of curvature is
+large compared with the section. Warping at corners of the curve is neglected.
 """
 
 from collections.abc import Callable, Sequence
@@ -27,16 +27,16 @@ _MOST_PARTS = 128
 
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """Smooth piece of a beam, from t = 0 at its base to t = 1.
+    """A smooth segment of a beam, parametrised by t from 0 to 1.
 
     Attributes:
-        place: function of t that returns the position (3,) [m].
-        tangent: function of t that returns the derivative (3,) [m] of the position with
-            respect to t.
+        place: function of t that returns the position, (3,) [m].
+        tangent: function of t that returns the derivative of the position with respect
+            to t, (3,) [m].
         section: function of t that returns the section.
-        up: function of t that returns a vector (3,) along the section's z axis; its
-            component along the tangent is removed.  None selects the default of
-            :func:`forcefit.stiffness.beam.beam.section_axes`.
+        up: function of t that returns a vector in the direction of the section's z
+            axis, (3,). If None, the default of
+            :func:`forcefit.stiffness.beam.beam.section_axes` is used.
     """
 
     place: Callable[[float], NDArray]
@@ -51,16 +51,16 @@ def straight_piece(
     section: Section | Callable[[float], Section],
     up: ArrayLike | None = None,
 ) -> Piece:
-    """Create a straight piece, tapered if its section is a function of t.
+    """Create a straight segment, which is tapered if its section depends on t.
 
     Args:
         start: (3,) [m] position of the start.
         end: (3,) [m] position of the end.
-        section: constant section, or a function of t from 0 to 1.
-        up: (3,) vector along the section's z axis.
+        section: constant section, or function of t that returns the section.
+        up: (3,) vector in the direction of the section's z axis.
 
     Returns:
-        The piece.
+        The segment.
 
     Raises:
         BadInput: the ends coincide or are not finite.
@@ -82,16 +82,16 @@ def arc_piece(
     turn: ArrayLike,
     section: Section | Callable[[float], Section],
 ) -> Piece:
-    """Create a piece along a circular arc, with the section's z along the arc axis.
+    """Create a segment along a circular arc, with the section's z along the arc's axis.
 
     Args:
         start: (3,) [m] position of the start.
         center: (3,) [m] centre of the circle.
-        turn: (3,) [rad] rotation vector from start to end about the centre.
-        section: constant section, or a function of t from 0 to 1.
+        turn: (3,) [rad] rotation vector from the start to the end of the arc.
+        section: constant section, or function of t that returns the section.
 
     Returns:
-        The piece.
+        The segment.
 
     Raises:
         BadInput: the rotation is zero, or its axis is not normal to the radius.
@@ -115,7 +115,7 @@ def arc_piece(
 def _as_function(
     section: Section | Callable[[float], Section],
 ) -> Callable[[float], Section]:
-    """Convert a constant or varying section to a function of t."""
+    """Convert a section to a function of t."""
     return (lambda t: section) if isinstance(section, Section) else section
 
 
@@ -130,22 +130,25 @@ def curve_compliance(
     """Compute the tip compliance of a beam along a curve.
 
     Args:
-        pieces: pieces from base to tip; each starts where the previous one ends.
+        pieces: segments from base to tip, each of which starts where the previous one
+            ends.
         E: [Pa] Young's modulus, > 0.
         nu: [-] Poisson's ratio, in (-1, 0.5).
-        theory: ``"timoshenko"``, or ``"euler"`` for bending without shear.
-        tolerance: [1] largest integration error of entries scaled by sqrt(C_ii C_jj).
+        theory: ``"timoshenko"``, or ``"euler"`` to neglect shear.
+        tolerance: [1] largest integration error of an entry C_ij, divided by sqrt(C_ii
+            C_jj).
 
     Returns:
-        (6, 6) [rad/(N m) .. m/N] compliance, symmetric positive definite, at the end of
-        the last piece, in the axes of the pieces.
+        Compliance at the end of the last segment, (6, 6) [rad/(N m) .. m/N], symmetric
+        and positive definite, in the axes of the segments.
 
     Raises:
-        BadInput: no piece is given, two pieces do not meet, an argument is out of
-            range, or a section changes too abruptly for the integration.
+        BadInput: no segment is given, consecutive segments do not share a point, an
+            argument is out of range, or a section changes too abruptly.
 
     Example:
-        A force at the end of an L-shape of two bars, parallel to the first, bends both:
+        An L-shaped beam consists of two bars. A force at its end, parallel to the first
+        bar, bends both bars:
 
         >>> from forcefit.stiffness.beam.sections import round_section
         >>> bar = round_section(0.01, nu=0.3)
@@ -190,13 +193,12 @@ def curve_mass(
     """Compute the mass, the centre of mass and the inertia of a beam along a curve.
 
     Args:
-        pieces: pieces from base to tip.
+        pieces: segments from base to tip.
         density: [kg/m^3] density.
 
     Returns:
-        Mass [kg]; centre of mass (3,) [m]; and inertia (3, 3) [kg m^2] about the centre
-        of mass, all in the axes of the pieces. Sections are treated as plane and normal
-        to the curve.
+        Mass [kg]; centre of mass, (3,) [m]; and inertia about the centre of mass, (3,
+        3) [kg m^2]; in the axes of the segments.
     """
     mass, moment, second, own = 0.0, np.zeros(3), np.zeros((3, 3)), np.zeros((3, 3))
     for piece in pieces:
@@ -219,10 +221,10 @@ def curve_length(pieces: Sequence[Piece]) -> float:
     """Compute the length of a beam along its curve.
 
     Args:
-        pieces: straight pieces and arcs, from base to tip.
+        pieces: segments from base to tip.
 
     Returns:
-        [m] length.
+        Length [m].
     """
     speeds = [
         [np.linalg.norm(piece.tangent((x + 1) / 2)) for x in _POINTS]
@@ -232,7 +234,7 @@ def curve_length(pieces: Sequence[Piece]) -> float:
 
 
 def _check_joined(pieces: Sequence[Piece]) -> None:
-    """Check that each piece starts where the previous one ends."""
+    """Check that each segment starts where the previous segment ends."""
     for number, (one, next_one) in enumerate(
         zip(pieces[:-1], pieces[1:], strict=True), start=2
     ):
@@ -248,7 +250,7 @@ def _check_joined(pieces: Sequence[Piece]) -> None:
 def _integral(
     piece: Piece, tip: NDArray, E: float, nu: float, theory: str, parts: int
 ) -> NDArray:
-    """Integrate the compliance of one piece by Gauss quadrature in equal parts."""
+    """Integrate the compliance of a segment by Gauss quadrature."""
     G, shear = E / (2 * (1 + nu)), theory == "timoshenko"
     total = np.zeros((6, 6))
     for first in range(parts):

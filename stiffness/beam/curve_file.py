@@ -1,4 +1,4 @@
-"""Reader of curved beams: straight pieces, tapered pieces and arcs."""
+"""Reader of files that describe curved and tapered beams."""
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -14,23 +14,23 @@ _LARGEST = 1e6  # largest accepted absolute value in SI units
 
 
 def read_curve(path: Path | str, nu: float) -> list[Piece]:
-    """Read the pieces of a beam from a file.
+    """Read the segments of a beam from a file.
 
     Args:
-        path: TOML file with tables ``[[piece]]``.  The ``section`` of a piece is given
-            as in a robot file, or with ``wall`` (a box) or ``web`` and ``flange`` (an
-            I-section). Without ``section``, a piece has the section of the previous
-            piece. ``end`` defines a straight piece; ``up`` is optional, and
-            ``tip_section`` makes it tapered, with lengths that change linearly.
-            ``center`` and ``turn``, a rotation vector, define an arc.  ``start`` [m] of
-            the first piece is optional; its default is the origin.
+        path: TOML file with one table ``[[piece]]`` for each segment. The key
+            ``section`` contains the dimensions of the section. The default is the
+            section of the previous segment. A straight segment has the key ``end`` and
+            optionally ``up``. With the key ``tip_section``, a straight segment is
+            tapered linearly. An arc has the keys ``center`` and ``turn``, a rotation
+            vector. The first segment may have the key ``start`` [m], whose default is
+            the origin.
         nu: [-] Poisson's ratio, which determines the shear factors.
 
     Returns:
-        The pieces from base to tip.
+        The segments from base to tip.
 
     Raises:
-        BadInput: the file, a name or a value is invalid.
+        BadInput: the file, a key or a value is invalid.
     """
     table = read_toml(path)
     tables = table.tables("piece")
@@ -44,18 +44,18 @@ def read_curve(path: Path | str, nu: float) -> list[Piece]:
 
 
 def read_pieces(tables: Sequence[Table], start: NDArray, nu: float) -> list[Piece]:
-    """Read the pieces of a beam from their tables.
+    """Read the segments of a beam from TOML tables.
 
     Args:
-        tables: at least one table, with the keys of :func:`read_curve`.
-        start: (3,) [m] start of the first piece.
+        tables: one or more tables with the keys described in :func:`read_curve`.
+        start: (3,) [m] start of the first segment.
         nu: [-] Poisson's ratio, which determines the shear factors.
 
     Returns:
-        The pieces from base to tip.
+        The segments from base to tip.
 
     Raises:
-        BadInput: a name or a value is invalid.
+        BadInput: a key or a value is invalid.
     """
     pieces: list[Piece] = []
     section: dict[str, float] | None = None
@@ -71,7 +71,7 @@ def read_pieces(tables: Sequence[Table], start: NDArray, nu: float) -> list[Piec
 
 
 def _section(part: Table, key: str) -> dict[str, float]:
-    """Read the lengths or constants of a section by name."""
+    """Read the dimensions or constants of a section."""
     inner = part.table(key)
     given = {
         name: inner.number(name, "m", largest=_LARGEST) for name in list(inner.content)
@@ -83,7 +83,7 @@ def _section(part: Table, key: str) -> dict[str, float]:
 def _piece(
     part: Table, start: NDArray, section: Mapping[str, float], nu: float
 ) -> Piece:
-    """Read one piece of the curve from its table."""
+    """Read a segment from a TOML table."""
     try:
         shape = _tapered(part, section, nu)
         if part.has("turn"):
@@ -105,7 +105,7 @@ def _piece(
 def _tapered(
     part: Table, section: Mapping[str, float], nu: float
 ) -> Section | Callable[[float], Section]:
-    """Return a constant section, or one whose lengths vary linearly."""
+    """Return a constant section, or a section whose dimensions vary linearly with t."""
     constant = declared_section(section, nu)
     if not part.has("tip_section"):
         return constant

@@ -1,4 +1,4 @@
-"""Beam sections: round, rectangular, thin-walled, or given by their constants.
+"""Cross-sections of beams and their constants.
 
 ========  ======================================================  =====
 symbol    meaning                                                 unit
@@ -6,7 +6,7 @@ symbol    meaning                                                 unit
 y z       section axes, z up                                      -
 I_y I_z   second moments of area; I_y bends about y               m^4
 J         Saint-Venant's torsion constant                         m^4
-shear_*   shear area for a force along y, z, over the area        1
+shear_*   shear area for a force along y or z, divided by area        1
 ========  ======================================================  =====
 """
 
@@ -45,7 +45,7 @@ class Section:
 
     @property
     def size(self) -> float:
-        """[m] twice the larger radius of gyration: the radius of a solid round bar."""
+        """Twice the larger radius of gyration [m]."""
         return 2 * math.sqrt(max(self.I_y, self.I_z) / self.area)
 
 
@@ -65,8 +65,7 @@ def round_section(radius: float, nu: float, inner_radius: float = 0.0) -> Sectio
     Args:
         radius: [m] outer radius, > 0.
         nu: [-] Poisson's ratio, in (-1, 0.5), which determines the shear factor.
-        inner_radius: [m] radius of the hole, smaller than ``radius``; 0 if the bar is
-            solid.
+        inner_radius: [m] inner radius, < ``radius``; 0 for a solid bar.
 
     Returns:
         The section.
@@ -97,8 +96,8 @@ def rectangular_section(width: float, height: float, nu: float) -> Section:
     """Return the section of a solid rectangular bar.
 
     Args:
-        width: [m] along the section's y, > 0.
-        height: [m] along the section's z, the ``up`` of the beam, > 0.
+        width: [m] width along y, > 0.
+        height: [m] height along z, > 0.
         nu: [-] Poisson's ratio, in (-1, 0.5), which determines the shear factor.
 
     Returns:
@@ -126,26 +125,26 @@ def rectangular_section(width: float, height: float, nu: float) -> Section:
 
 
 def _rectangle_torsion(width: float, height: float) -> float:
-    """Evaluate Saint-Venant's series for the torsion constant, accurate to 1e-16."""
+    """Evaluate Saint-Venant's series for the torsion constant [m^4]."""
     long, short = max(width, height), min(width, height)
     odd = np.arange(1.0, 2001.0, 2.0)
-    # tanh equals 1 except in the first few terms; the remaining sum decays as n^-4
+    # tanh is nearly 1 except in the first terms, so the terms decrease as n^-5
     tail = np.sum(np.tanh(odd * math.pi * long / (2 * short)) / odd**5)
     return long * short**3 / 3 * (1 - 192 / math.pi**5 * short / long * float(tail))
 
 
 def box_section(width: float, height: float, wall: float, nu: float) -> Section:
-    """Return the section of a hollow rectangle with walls of equal thickness.
+    """Return the section of a rectangular tube with walls of equal thickness.
 
     Args:
         width: [m] outer width, along y.
         height: [m] outer height, along z (up).
-        wall: [m] wall thickness, less than half of width and height.
+        wall: [m] wall thickness, less than half of the width and half of the height.
         nu: [-] Poisson's ratio.
 
     Returns:
-        The section. Its torsion constant is that of a closed thin wall plus that of the
-        wall itself; its shear factors are those of thin walls.
+        The section. The torsion constant is that of a closed thin wall plus that of an
+        open thin wall. The shear factors are those of thin walls.
 
     Raises:
         BadInput: a dimension or Poisson's ratio is out of range.
@@ -173,9 +172,8 @@ def box_section(width: float, height: float, wall: float, nu: float) -> Section:
 
 
 def _box_shear(along: float, across: float, nu: float) -> float:
-    """Return Cowper's shear factor of a thin box for a force parallel to one side."""
-    # with walls of equal thickness, the areas of flange and web are in the ratio of the
-    # side lengths
+    """Return Cowper's shear factor of a thin-walled rectangular tube."""
+    # the walls are equally thick, so areas are proportional to side lengths
     m = n = across / along
     top = 10 * (1 + nu) * (1 + 3 * m) ** 2
     plain = 12 + 72 * m + 150 * m**2 + 90 * m**3
@@ -187,7 +185,7 @@ def _box_shear(along: float, across: float, nu: float) -> float:
 def i_section(
     width: float, height: float, web: float, flange: float, nu: float
 ) -> Section:
-    """Return the section of an I-beam with equal flanges and its web along z (up).
+    """Return the section of an I-beam with equal flanges and a web along z.
 
     Args:
         width: [m] width of the flanges, along y.
@@ -197,14 +195,16 @@ def i_section(
         nu: [-] Poisson's ratio.
 
     Returns:
-        The section. Its torsion constant is that of an open thin wall that is free to
-        warp. The flanges carry a shear force along y like two rectangles.
+        The section. The torsion constant is that of an open thin wall that is free to
+        warp. For a shear force along y, the section consists of two rectangular
+        flanges.
 
     Raises:
         BadInput: a dimension or Poisson's ratio is out of range.
 
     Sources:
-        Cowper (1966) for the shear factors of a thin I and of a rectangle.
+        Cowper (1966) for the shear factors of a thin-walled I-section and of a
+        rectangle.
     """
     _check(width=width, height=height, web=web, flange=flange)
     check_poisson("i_section", nu)
@@ -232,12 +232,13 @@ def i_section(
 
 
 def declared_section(given: Mapping[str, float], nu: float) -> Section:
-    """Build a section from its lengths or constants.
+    """Create a section from its dimensions or constants.
 
     Args:
-        given: ``radius`` and optionally ``inner_radius``; or ``width`` and ``height``
-            and optionally ``wall`` (a box) or ``web`` and ``flange`` (an I-section); or
-            the attributes of a :class:`Section` [m, m^2, m^4].
+        given: values by name [m, m^2, m^4]. A round section has ``radius`` and
+            optionally ``inner_radius``. A rectangle has ``width`` and ``height``, a
+            rectangular tube also has ``wall``, and an I-section also has ``web`` and
+            ``flange``. Any other section has the attributes of :class:`Section`.
         nu: [-] Poisson's ratio.
 
     Returns:
@@ -257,16 +258,14 @@ def declared_section(given: Mapping[str, float], nu: float) -> Section:
 
 
 def check_section(place: str, given: Mapping[str, float]) -> None:
-    """Check that values describe a section.
+    """Check the names and values that describe a section.
 
     Args:
-        place: name of the key, for the message.
-        given: lengths or constants by name, see
-            :func:`forcefit.stiffness.beam.sections.declared_section`.
+        place: name of the key, for error messages.
+        given: values by name, see :func:`declared_section`.
 
     Raises:
-        BadInput: a name does not belong to a section, a required name is missing, or a
-            value is invalid.
+        BadInput: a name is unknown or missing, or a value is invalid.
     """
     if set(given) in _SECTIONS:
         for name, value in given.items():
@@ -287,10 +286,10 @@ def check_section(place: str, given: Mapping[str, float]) -> None:
 
 
 def check_material(who: str, E: float, nu: float) -> None:
-    """Check that an isotropic solid can have the given elastic constants.
+    """Check the elastic constants of an isotropic material.
 
     Args:
-        who: name of the part, for the message.
+        who: name of the part, for error messages.
         E: [Pa] Young's modulus.
         nu: [-] Poisson's ratio.
 
@@ -302,7 +301,7 @@ def check_material(who: str, E: float, nu: float) -> None:
 
 
 def check_poisson(who: str, nu: float) -> None:
-    """Check that an isotropic solid can have a given Poisson's ratio."""
+    """Check that Poisson's ratio is between -1 and 0.5."""
     if not -1.0 < nu < 0.5:
         raise BadInput(f"{who}: nu = {nu:g} must lie between -1.0 and 0.5")
 
@@ -314,7 +313,7 @@ def check_positive(who: str, name: str, value: float) -> None:
 
 
 def _check(**lengths: float) -> None:
-    """Check that all lengths are finite and positive."""
+    """Check that all dimensions are finite and positive."""
     for name, value in lengths.items():
         if not 0 < value < float("inf"):
             raise BadInput(f"section: {name} = {value:g} m must be finite and > 0")

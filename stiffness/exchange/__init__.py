@@ -1,5 +1,4 @@
-"""Import of links from finite-element programs, and export to them.
+"""Import and export of links for finite element programs.
 
-Start with ``import_link.py``.  ``two_interfaces.py`` defines the matrix of a body with
-two interfaces.
+Start with ``import_link.py`` and ``export_link.py``.
 """

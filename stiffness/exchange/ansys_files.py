@@ -1,13 +1,14 @@
-"""Ansys files: Harwell-Boeing matrices, and the degrees of freedom of their rows.
+"""Reader of Harwell-Boeing matrices and mapping files from Ansys.
 
-Ansys orders the rows of a matrix internally. A mapping file next to the matrix, with
-the same name and the suffix ``.mapping``, states this order. It is written
+Ansys writes the rows of a matrix in an internal order. This order is read from a
+mapping file, which has the name of the matrix file and the suffix ``.mapping``. Ansys
+writes this file
 
-- either by ``HBMAT,name,,,ASCII,STIFF,NO,YES``, as lines of row, node and label
-  (``UX``, ...);
-- or by ``*VEC,map,I,IMPORT,FULL,file.full,BACK`` and ``*EXPORT,map,MMF,name.mapping``,
-  as a Matrix Market vector of nodes, for each of which the matrix contains all degrees
-  of freedom in sequence.
+- with the command ``HBMAT,name,,,ASCII,STIFF,NO,YES``, as lines with row, node and
+  label such as ``UX``,
+- or with the commands ``*VEC,map,I,IMPORT,FULL,file.full,BACK`` and
+  ``*EXPORT,map,MMF,name.mapping``, as a Matrix Market vector of nodes. All rows of a
+  node are then consecutive.
 
 Sources:
     Ansys Command Reference, HBMAT, *EXPORT, *VEC; Duff, Grimes, Lewis (1992), Users'
@@ -31,21 +32,21 @@ _NUMBER = re.compile(r"[+-]?\d+(?:\.\d*)?(?:[ED][+-]?\d+)?|[+-]?\.\d+(?:[ED][+-]
 
 
 def harwell_boeing(path: Path, text: str) -> csr_array:
-    """Read an assembled real matrix, of which type RSA stores only one half.
+    """Read a real assembled matrix from the text of a Harwell-Boeing file.
 
-    The reader in SciPy 1.17 rejects three features of files written by ``HBMAT``: type
-    RSA, right-hand sides, and exponents with a D.
+    The reader of SciPy 1.17 is not used, because it does not support type RSA,
+    right-hand sides, or exponents with the letter D.
 
     Args:
         path: path of the file, for error messages.
         text: text of the file.
 
     Returns:
-        (n, n) matrix with both halves.
+        (n, n) complete matrix.
 
     Raises:
-        BadInput: the file is of a different type, or its length is inconsistent with
-            its header.
+        BadInput: the matrix has a different type, or the length of the file is
+            inconsistent with its header.
     """
     lines = text.split("\n")
     try:
@@ -93,12 +94,12 @@ def harwell_boeing(path: Path, text: str) -> csr_array:
 
 
 def both_halves(matrix: csr_array) -> csr_array:
-    """Complete a symmetric matrix of which one half is given."""
+    """Complete a symmetric matrix from its upper or lower triangle."""
     return csr_array(matrix + matrix.T - diags_array(matrix.diagonal()))
 
 
 def _fields(path: Path, lines: list[str], width: int) -> NDArray:
-    """Parse the numbers in fields of a fixed width."""
+    """Parse numbers in fields of a fixed width."""
     words = [
         line[k : k + width].strip()
         for line in lines
@@ -117,10 +118,11 @@ def read_mapping(path: Path) -> list[int] | list[tuple[int, int]]:
         path: mapping file.
 
     Returns:
-        Node and direction (1 to 6) of each row, or the nodes in row order.
+        Either node and direction (1 to 6) of each row, or the nodes in the order of
+        their rows.
 
     Raises:
-        BadInput: the file has neither of the two forms.
+        BadInput: the file is invalid.
     """
     text = read_text(path)
     lines = [line for line in text.split("\n") if line.strip()]
@@ -139,7 +141,7 @@ def read_mapping(path: Path) -> list[int] | list[tuple[int, int]]:
     for line in lines:
         words = line.split()
         if not words[0].isdecimal():
-            continue  # the line is a heading
+            continue  # this line is a heading
         if len(words) != 3:
             raise BadInput(
                 f"{path}: found {describe(line.strip())}, expected the number of a "
@@ -160,7 +162,7 @@ def read_mapping(path: Path) -> list[int] | list[tuple[int, int]]:
 
 
 def _whole(path: Path, word: str) -> int:
-    """Parse the number of a row or a node."""
+    """Parse a row number or a node number."""
     if not re.fullmatch("[0-9]{1,12}", word):
         raise BadInput(f"{path}: found {describe(word)}, expected a node number")
     return int(word)

@@ -1,4 +1,4 @@
-"""Condensation of a full matrix onto two interfaces, each a node or a rigid face.
+"""Condensation of a stiffness matrix onto two nodes or rigid faces.
 
 Sources:
     Guyan (1965), Reduction of stiffness and mass matrices, AIAA Journal 3, 380.
@@ -28,21 +28,20 @@ _ON = 1e-6
 
 
 def read_nodes(path: Path | str, unit: float) -> dict[int, NDArray]:
-    """Read node positions from lines with number, x, y and z.
+    """Read node positions from a file.
 
     Args:
-        path: file with numbers separated by commas or blanks, in which lines that begin
-            with ``*`` or ``#`` are ignored. In input files of Abaqus or CalculiX, the
-            lines after ``*NODE`` are read; in those of Nastran, the ``GRID`` lines; and
-            in named selections of Ansys Workbench, the lines below the heading, where
-            decimal commas are accepted.
+        path: file with node number, x, y and z in each line, separated by commas or
+            blanks. Lines that begin with ``*`` or ``#`` are ignored. Input files of
+            Abaqus, CalculiX or Nastran and named selections of Ansys Workbench are also
+            accepted.
         unit: [m] unit of length in the file.
 
     Returns:
-        (3,) [m] position of each node, by node number.
+        Dictionary from node numbers to positions, (3,) [m].
 
     Raises:
-        BadInput: a line has a different form.
+        BadInput: a line is invalid.
     """
     nodes: dict[int, NDArray] = {}
     text = read_text(path)
@@ -70,7 +69,7 @@ def read_nodes(path: Path | str, unit: float) -> dict[int, NDArray]:
 
 
 def _node_lines(text: str) -> Iterator[tuple[int, list[str], str]]:
-    """Yield number, words (node, x, y, z) and text of each line with a node."""
+    """Yield line number, words (node, x, y, z) and text for each node."""
     if _GRID.search(text):
         yield from _grids(text)
         return
@@ -90,7 +89,7 @@ def _node_lines(text: str) -> Iterator[tuple[int, list[str], str]]:
 
 
 def _grids(text: str) -> Iterator[tuple[int, list[str], str]]:
-    """Yield Nastran's ``GRID`` lines, two for a node with wide fields."""
+    """Yield line number, words and text of Nastran's ``GRID`` entries."""
     lines = text.split("\n")
     for number, line in enumerate(lines, 1):
         if _GRID.match(line):
@@ -98,28 +97,29 @@ def _grids(text: str) -> Iterator[tuple[int, list[str], str]]:
             if head.endswith("*") and number < len(lines):
                 fields = fields[:4] + bulk_fields(lines[number])[1]
             node, system, *place = [*fields, "", ""]
-            # coordinate systems other than the basic one are rejected
+            # no coordinates are yielded for other coordinate systems, so that they are
+            # rejected
             yield number, [node, *([] if system.strip("0") else place)], line
 
 
 def interface_rows(
     matrix: FileMatrix, asked: str, option: str, nodes: Mapping[int, NDArray] | None
 ) -> tuple[NDArray, NDArray, NDArray | None]:
-    """Find the rows of an interface, and their motions for its unit screws.
+    """Find the matrix rows of an interface and their displacements for unit screws.
 
     Args:
         matrix: matrix with the degrees of freedom of its rows.
-        asked: number of a node, or an interface as in ``stiffness fea``.
-        option: name of the option, for messages.
-        nodes: (3,) [m] positions by number; None if unknown.
+        asked: node number, or text of an interface such as ``"z=0"``.
+        option: name of the option, for error messages.
+        nodes: positions by node number, each (3,) [m]; None if unknown.
 
     Returns:
-        (k,) rows; (k, 6) their motions for unit screws [R T] at the interface's point;
-        and (3,) [m] this point, None if unknown.
+        Rows, (k,); their displacements for unit screws, (k, 6); and the reference point
+        of the screws, (3,) [m], or None if unknown.
 
     Raises:
-        BadInput: the node does not exist, a node lacks some of its six degrees of
-            freedom, or the interface has no nodes.
+        BadInput: the node does not exist or does not have six degrees of freedom, or
+            there are no nodes on the interface.
     """
     row = {freedom: k for k, freedom in enumerate(matrix.freedoms)}
     if asked.strip().isdigit():
@@ -169,7 +169,7 @@ def interface_rows(
 
 
 def _on(interface: Interface, places: NDArray) -> NDArray:
-    """Return (n,) bool, True for positions on an interface."""
+    """Return whether each position is on an interface, (n,)."""
     size = float(np.ptp(places, axis=0).max(initial=0.0)) or 1.0
     near = interface.distance(places) < _ON * size
     if interface.kind == "disc":
@@ -181,19 +181,19 @@ def _on(interface: Interface, places: NDArray) -> NDArray:
 def condensed(
     matrix: FileMatrix, ends: tuple[tuple[NDArray, NDArray], tuple[NDArray, NDArray]]
 ) -> tuple[NDArray, NDArray]:
-    """Condense a matrix onto two interfaces; other degrees of freedom are unloaded.
+    """Condense a stiffness matrix onto two interfaces.
 
     Args:
         matrix: (n, n) stiffness matrix.
-        ends: rows and motions of base and tip, from :func:`interface_rows`.
+        ends: rows and displacements of base and tip, from :func:`interface_rows`.
 
     Returns:
-        (12, 12) matrix, base first, and (n, 12) motions of all rows for unit screws of
-        the interfaces.
+        Condensed matrix, (12, 12), base before tip; and the displacements of all rows
+        for unit screws of the interfaces, (n, 12).
 
     Raises:
-        BadInput: the interfaces share rows, or some degrees of freedom are not
-            connected to them.
+        BadInput: the interfaces have common rows, or some nodes are not connected to
+            them.
     """
     from forcefit.stiffness.fem.sparse_solver import solve
 
@@ -225,6 +225,7 @@ def condensed(
                 f"{matrix.file}: found a singular stiffness between the "
                 "interfaces; expected a body in one piece that connects them"
             )
-    # computed from the energy of the fields, in which solution errors enter squared
+    # computed from the strain energy, because its error is quadratic in the solution
+    # error
     K12 = fields.T @ (K @ fields)
     return (K12 + K12.T) / 2, fields

@@ -1,4 +1,4 @@
-"""``forcefit stiffness convert``: export of a link as a matrix of two nodes."""
+"""Export of a link as a stiffness matrix of two nodes."""
 
 import io
 import json
@@ -14,21 +14,21 @@ from forcefit.stiffness.exchange.two_interfaces import both_ends
 from forcefit.stiffness.report.export import PROGRAMS, stiffness_for
 
 FORMATS = ("matrix-market", "abaqus", "calculix", "nastran", "numpy", *PROGRAMS)
-# row order that places translations before rotations at each node
+# indices that reorder rows to translations before rotations at each node
 _FEM = [3, 4, 5, 0, 1, 2, 9, 10, 11, 6, 7, 8]
 
 
 def read_link_results(path: Path | str) -> tuple[NDArray, NDArray]:
-    """Read K_E and the vector from tip to base from the ``--json`` results of a link.
+    """Read the stiffness of a link from a file written with ``--json``.
 
     Args:
         path: the JSON file.
 
     Returns:
-        K_E (6, 6) in SI units, and the vector (3,) [m] from tip to base.
+        Stiffness K_E in SI units, (6, 6), and the vector from tip to base, (3,) [m].
 
     Raises:
-        BadInput: the file does not contain the results of a link.
+        BadInput: the file does not contain the stiffness of a link.
     """
     try:
         content = json.loads(read_text(path))
@@ -43,7 +43,7 @@ def read_link_results(path: Path | str) -> tuple[NDArray, NDArray]:
         ) from None
     if K.shape != (6, 6) or offset.shape != (3,) or not np.isfinite(K).all():
         raise BadInput(f"{path}: stiffness: expected 6 rows of 6 finite numbers")
-    # products of the numbers must not overflow
+    # larger numbers could overflow in products
     if not max(np.abs(K).max(), np.abs(offset).max()) < 1e100:
         raise BadInput(
             f"{path}: found numbers above 1e100, expected the stiffness of a "
@@ -55,21 +55,20 @@ def read_link_results(path: Path | str) -> tuple[NDArray, NDArray]:
 def link_file(
     stiffness: NDArray, base_from_tip: NDArray, to: str, unit: str = "m"
 ) -> bytes:
-    """Format a link as a file for another program.
+    """Format the stiffness of a link as the text of a file for another program.
 
     Args:
-        stiffness: (6, 6) K_E at the tip, in SI units, rotations first.
+        stiffness: (6, 6) stiffness at the tip, in SI units, rotations first.
         base_from_tip: (3,) [m] vector from tip to base.
         to: name of the format, one of ``FORMATS``.
-        unit: unit of length in the file; forces are in N, rotations in rad.
+        unit: unit of length in the file. Forces are in N, and rotations in rad.
 
     Returns:
-        The text, with translations before rotations at each node; for ``exudyn``,
-        ``adams`` and ``mapdl``, the result of
+        The text. For ``exudyn``, ``adams`` and ``mapdl``, it is the result of
         :func:`forcefit.stiffness.report.export.stiffness_for`.
 
     Raises:
-        BadInput: the format or unit is unknown, or the format requires metres.
+        BadInput: the format or the unit is unknown, or the format requires metres.
     """
     for option, value, valid in (("--to", to, FORMATS), ("--unit", unit, LENGTHS)):
         if value not in valid:
@@ -95,19 +94,19 @@ def link_file(
 
 
 def _lower(K: NDArray) -> list[tuple[int, int, float]]:
-    """Return row, column and value of all entries in the lower half, by column."""
+    """Return row, column and value of the entries in the lower triangle."""
     return [(i, j, float(K[i, j])) for j in range(12) for i in range(j, 12)]
 
 
 def _matrix_market(K: NDArray) -> str:
-    """Format a symmetric Matrix Market file."""
+    """Format a symmetric matrix as a Matrix Market file."""
     rows = [f"{i + 1} {j + 1} {v!r}" for i, j, v in _lower(K)]
     head = "%%MatrixMarket matrix coordinate real symmetric\n% X Y Z RX RY RZ, twice"
     return "\n".join([head, f"12 12 {len(rows)}", *rows]) + "\n"
 
 
 def _user_element(K: NDArray) -> str:
-    """Format an Abaqus ``*USER ELEMENT``, with four numbers per line."""
+    """Format a matrix as an Abaqus ``*USER ELEMENT``."""
     lines = ["*USER ELEMENT,NODES=2,LINEAR", "** ELEMENT NODES", "** 1, 2",
              "1, 2, 3, 4, 5, 6", "*MATRIX,TYPE=STIFFNESS"]  # fmt: skip
     for i in range(12):
@@ -117,7 +116,7 @@ def _user_element(K: NDArray) -> str:
 
 
 def _five_columns(K: NDArray) -> str:
-    """Format lines of node, direction, node, direction and value."""
+    """Format a matrix as lines with node, direction, node, direction and value."""
     return "".join(
         f"{i // 6 + 1},{i % 6 + 1},{j // 6 + 1},{j % 6 + 1},{v!r}\n"
         for i, j, v in _lower(K)
@@ -125,7 +124,7 @@ def _five_columns(K: NDArray) -> str:
 
 
 def _dmig(K: NDArray) -> str:
-    """Format a Nastran DMIG (form 6, symmetric) in large fields."""
+    """Format a symmetric matrix as a Nastran DMIG entry with wide fields."""
     lines = ["DMIG    K2GG           0       6       2       0"]
     for j in range(12):
         lines.append(f"DMIG*   {'K2GG':16}{j // 6 + 1:16}{j % 6 + 1:16}")

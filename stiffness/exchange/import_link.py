@@ -1,4 +1,4 @@
-"""``forcefit stiffness convert``: import of K_E from matrices of other programs."""
+"""Import of a link from the stiffness matrix of another program."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -30,26 +30,27 @@ def import_link(
     unit: str = "m",
     order: str = ORDERS[0],
 ) -> LinkStiffness:
-    """Import a link from a stiffness matrix with 6, 12 or more degrees of freedom.
+    """Import a link from a file with its stiffness matrix.
 
     Args:
-        path: file of the stiffness matrix, see
+        path: file with the stiffness matrix, in a format of
             :mod:`forcefit.stiffness.exchange.matrix_file`.
-        mass: file of the mass matrix for the same degrees of freedom; None if unknown.
-        nodes: file with node positions, required for interfaces with several nodes. Its
-            node order applies to rows that the matrix file does not name.
-        base: held node, or held interface such as ``"z=0"`` [m].
-        tip: node or interface to which the screw refers.
-        unit: unit of length in all files; forces are in N, rotations in rad.
-        order: order of the six degrees of freedom of a node, if the file does not name
+        mass: file with the mass matrix for the same degrees of freedom, or None.
+        nodes: file with node positions, which is required if an interface has several
+            nodes. If the matrix file does not name its rows, they are in the order of
+            these nodes.
+        base: clamped node, or clamped interface such as ``"z=0"`` [m].
+        tip: loaded node or interface.
+        unit: unit of length in all files. Forces are in N, and rotations in rad.
+        order: order of the six degrees of freedom of a node in files that do not name
             them.
 
     Returns:
-        The link, expressed in the axes of the file.
+        The link, in the axes of the file.
 
     Raises:
         BadInput: a file is invalid, or the matrix is not the stiffness of a free
-            elastic body between the two interfaces.
+            elastic body.
     """
     for option, value, valid in (("--unit", unit, LENGTHS), ("--order", order, ORDERS)):
         if value not in valid:
@@ -91,7 +92,7 @@ def import_link(
             f"{mass}: found nodes or directions that {path} does not have, or too "
             "few; expected the same in both files"
         )
-    # a file that names degrees of freedom omits those without mass
+    # a mass matrix with named rows has no rows for degrees of freedom without mass
     moved = fields[[row[freedom] for freedom in heavy.freedoms]]
     M12 = moved.T @ (heavy.matrix @ moved)
     kilograms, centre, inertia = mass_of_both_ends(M12, link.base - link.tip)
@@ -103,7 +104,7 @@ def import_link(
 def _ends(
     matrix: FileMatrix, base: str, tip: str, places: Mapping[int, NDArray] | None
 ) -> list[tuple[NDArray, NDArray, NDArray | None]]:
-    """Find the rows, the motions and the points of base and tip."""
+    """Find the rows, the displacements and the reference points of base and tip."""
     return [
         interface_rows(matrix, asked, option, places)
         for asked, option in ((base, "--base"), (tip, "--tip"))
@@ -111,7 +112,7 @@ def _ends(
 
 
 def reordered(matrix: FileMatrix, order: str) -> FileMatrix:
-    """Reorder the degrees of freedom of a matrix as stated."""
+    """Reorder the degrees of freedom of a matrix."""
     if matrix.named or order == ORDERS[0]:
         return matrix
     freedoms = tuple((node, (d + 2) % 6 + 1) for node, d in matrix.freedoms)
@@ -119,16 +120,15 @@ def reordered(matrix: FileMatrix, order: str) -> FileMatrix:
 
 
 def in_metres(matrix: FileMatrix, length: float) -> FileMatrix:
-    """Convert a matrix to translations in metres and energies in joules.
+    """Convert a matrix to SI units.
 
     Args:
-        matrix: matrix with forces in N, rotations in rad and translations in units of
-            ``length``.
-        length: [m] unit of length in the matrix.
+        matrix: matrix with forces in N, rotations in rad and translations in multiples
+            of ``length``.
+        length: [m] unit of length of the matrix.
 
     Returns:
-        The matrix in SI units. Masses must be in consistent units, for example tonnes
-        with mm, N and s.
+        The matrix in SI units.
     """
     turns = np.array([direction > 3 for _, direction in matrix.freedoms])
     scale = np.where(turns, 1.0, 1.0 / length)

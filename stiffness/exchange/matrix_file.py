@@ -1,4 +1,4 @@
-"""Reader of matrices from other programs, with the degrees of freedom of their rows.
+"""Reader of stiffness and mass matrices from other programs.
 
 =================  ===============================================================
 file               written by
@@ -53,11 +53,11 @@ class FileMatrix:
     """A symmetric matrix from a file.
 
     Attributes:
-        file: name of the file, for messages.
-        matrix: (n, n) matrix, both halves.
-        freedoms: node and direction of each row; directions 1 to 3 are translations,
-            and 4 to 6 are rotations.
-        named: whether the file states the degree of freedom of each row.
+        file: name of the file, for error messages.
+        matrix: (n, n) complete matrix.
+        freedoms: node and direction of each row. Directions 1 to 3 are translations,
+            and directions 4 to 6 are rotations.
+        named: True if the file names the degree of freedom of each row.
     """
 
     file: str
@@ -72,23 +72,22 @@ def read_matrix(
     nodes: Sequence[int] | None = None,
     mapped: Path | str | None = None,
 ) -> FileMatrix:
-    """Read a matrix from a file, whose format is recognised from its content.
+    """Read a matrix from a file in one of several formats.
 
     Args:
-        path: file of the matrix.
-        which: ``"stiffness"`` or ``"mass"``, for files that contain both.
-        nodes: node order for rows that the file does not name; None for 1, 2, and so
-            on.
-        mapped: file of a matrix with the same rows; its ``.mapping`` is used if this
-            matrix has none.
+        path: file with the matrix.
+        which: ``"stiffness"`` or ``"mass"``, for files that contain both matrices.
+        nodes: order of the nodes if the file does not name its rows. None stands for 1,
+            2, 3 and so on.
+        mapped: file of another matrix with the same rows, whose mapping file is used if
+            this matrix has no mapping file.
 
     Returns:
-        The matrix. Unnamed rows are assigned to the ``nodes`` in order: three rows per
-        node, as for solids, if the number of rows agrees, otherwise six.
+        The matrix. If rows are not named, each node has three or six consecutive rows.
 
     Raises:
-        BadInput: the format is unknown; the matrix is not square, finite and
-            symmetric; or the degrees of freedom of its rows are unknown.
+        BadInput: the format is unknown, the matrix is not square, finite and symmetric,
+            or the degrees of freedom of its rows are unknown.
     """
     path = Path(path)
     ending = path.suffix.lower()
@@ -120,7 +119,7 @@ def read_matrix(
 
 
 def _mapped(path: Path, n: int) -> list[Freedom]:
-    """Read the degrees of freedom of n rows from the mapping file."""
+    """Read the degrees of freedom of all rows from a mapping file."""
     given = read_mapping(path)
     freedoms: list[Freedom] = []
     each = n // len(given)
@@ -143,13 +142,13 @@ def _checked(
     freedoms: list[Freedom] | None,
     nodes: Sequence[int] | None,
 ) -> FileMatrix:
-    """Check that a matrix is square, finite and symmetric; return it symmetrised."""
+    """Check that a matrix is square, finite and symmetric, and symmetrise it."""
     n = matrix.shape[0]
     if matrix.shape != (n, n) or not n:
         raise BadInput(
             f"{path}: found an array of shape {matrix.shape}, expected a square matrix"
         )
-    # products of these numbers must not overflow
+    # larger numbers could overflow in products
     if not (np.abs(matrix.data) < 1e100).all():
         raise BadInput(f"{path}: found a number that is not finite, or above 1e100")
     given = freedoms or _in_order(path, n, nodes)
@@ -169,7 +168,7 @@ def _checked(
 
 
 def _in_order(path: Path, n: int, nodes: Sequence[int] | None) -> list[Freedom]:
-    """Assign degrees of freedom to n unnamed rows, three or six per node."""
+    """Assign three or six unnamed rows to each node."""
     numbers = range(1, n // 6 + 1) if nodes is None else nodes
     for each in (3, 6):
         if n == each * len(numbers):
@@ -184,7 +183,7 @@ def _in_order(path: Path, n: int, nodes: Sequence[int] | None) -> list[Freedom]:
 
 
 def _numpy(path: Path) -> csr_array:
-    """Read a matrix from ``.npy`` or a sparse ``.npz``; reject pickled data."""
+    """Read a matrix from a NumPy file or a sparse SciPy file."""
     from scipy.sparse import load_npz
 
     try:
@@ -209,7 +208,7 @@ def _numpy(path: Path) -> csr_array:
 
 
 def _user_element(path: Path, text: str, which: str) -> tuple[csr_array, list[Freedom]]:
-    """Read ``*USER ELEMENT``: nodes (in comments), degrees of freedom, lower halves."""
+    """Read the degrees of freedom and the matrix of a ``*USER ELEMENT``."""
     nodes: list[int] = []
     lines: list[list[int]] = []
     values: dict[str, list[float]] = {"stiffness": [], "mass": []}
@@ -256,7 +255,7 @@ def _user_element(path: Path, text: str, which: str) -> tuple[csr_array, list[Fr
 
 
 def _columns(path: Path, text: str) -> tuple[csr_array, list[Freedom] | None]:
-    """Read lines of node, direction, node, direction, value; or row, column, value."""
+    """Read a matrix from lines with five or three columns."""
     named: dict[tuple[Freedom, Freedom], float] = {}
     unnamed: dict[tuple[int, int], float] = {}
     for number, line in enumerate(text.split("\n"), 1):
@@ -293,7 +292,7 @@ def _columns(path: Path, text: str) -> tuple[csr_array, list[Freedom] | None]:
 
 
 def _named_by(path: Path, n: int) -> list[Freedom]:
-    """Read the degrees of freedom of rows from CalculiX's ``.dof`` file."""
+    """Read the degrees of freedom of the rows from a ``.dof`` file of CalculiX."""
     words = read_text(path).split()
     freedoms: list[Freedom] = []
     for word in words:
@@ -312,7 +311,7 @@ def _named_by(path: Path, n: int) -> list[Freedom]:
 def _from_entries(
     path: Path, entries: dict[tuple[Freedom, Freedom], float]
 ) -> tuple[csr_array, list[Freedom]]:
-    """Build a matrix from entries of one half or both halves."""
+    """Build a symmetric matrix from the entries of one or both triangles."""
     freedoms = sorted({freedom for pair in entries for freedom in pair})
     if not freedoms or len(freedoms) > LARGEST:
         raise BadInput(f"{path}: found no entries of a matrix")
@@ -323,8 +322,8 @@ def _from_entries(
 def _of_rows(
     entries: Mapping[tuple[Any, Any], float], row: Mapping[Any, int]
 ) -> csr_array:
-    """Build a matrix from entries with named degrees of freedom of row and column."""
-    # a missing half is the transpose of the other half
+    """Build a symmetric matrix from entries with named rows and columns."""
+    # a missing triangle is the transpose of the given triangle
     whole = {**{(b, a): v for (a, b), v in entries.items()}, **entries}
     i, j = [row[a] for a, _ in whole], [row[b] for _, b in whole]
     shape = (len(row), len(row))

@@ -1,4 +1,4 @@
-"""Reader of Matrix Market files with real square matrices, sparse or full.
+"""Reader of Matrix Market files with real square matrices.
 
 Sources:
     Boisvert, Pozo, Remington (1996), The Matrix Market exchange formats, NISTIR 5935.
@@ -24,20 +24,19 @@ _MARKET = (
 def matrix_market(path: Path, text: str) -> csr_array:
     """Read a square matrix from the text of a Matrix Market file.
 
-    SciPy 1.17 is not used, because it silently reads 4D3 as 4, and the entry "2 1.5 1"
-    as 0.5 in column 1. Checking every line beforehand would take as long as this
-    function.
+    The reader of SciPy 1.17 is not used, because it misreads some invalid lines and
+    exponents with the letter D without an error.
 
     Args:
         path: path of the file, for error messages.
         text: text of the file.
 
     Returns:
-        (n, n) matrix; a missing half is the transpose of the other half.
+        (n, n) matrix. A missing triangle is the transpose of the given triangle.
 
     Raises:
-        BadInput: the file is of a different type, or its length is inconsistent with
-            its header.
+        BadInput: the matrix has a different type, or the length of the file is
+            inconsistent with its header.
     """
     head, *lines = text.split("\n")
     words = tuple(head.lower().split()[1:])
@@ -71,7 +70,7 @@ def matrix_market(path: Path, text: str) -> csr_array:
             raise BadInput(f"{path}: found {len(rest)} numbers, expected {expected}")
         j, i = np.indices((n, n)) if whole else np.triu_indices(n)  # in column order
         matrix = csr_array(coo_array((rest, (i.ravel(), j.ravel())), shape=(n, n)))
-    # Ansys writes only one half, although the header declares a general matrix
+    # Ansys writes only one triangle, although the header declares a general matrix
     half = not triu(matrix, 1).nnz or not tril(matrix, -1).nnz
     by_ansys = re.search(r"^%.*ANSYS", text, re.M | re.I)
     return (
@@ -81,7 +80,7 @@ def matrix_market(path: Path, text: str) -> csr_array:
 
 
 def _numbers(path: Path, lines: list[str]) -> NDArray:
-    """Parse all numbers in the lines."""
+    """Parse the numbers in all lines."""
     words = [word for line in lines for word in line.split()]
     try:
         return np.array(words, dtype=float)
@@ -90,7 +89,7 @@ def _numbers(path: Path, lines: list[str]) -> NDArray:
 
 
 def _size(path: Path, sizes: NDArray) -> int:
-    """Parse the number of rows of a square matrix from the line of sizes."""
+    """Parse the number of rows from the line with the matrix sizes."""
     rows, columns = (*sizes.tolist(), 0.0, 0.0)[:2]
     if not rows == columns == round(min(rows, 2.0 * LARGEST)) > 0 or rows > LARGEST:
         raise BadInput(

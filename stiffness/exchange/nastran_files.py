@@ -1,12 +1,10 @@
-"""Nastran bulk data: the fields of a line, and matrices given by ``DMIG``.
+"""Reader of Nastran bulk data lines and ``DMIG`` matrices.
 
-Fields have eight characters, or sixteen if the first field ends with ``*``, or are
-separated by commas or blanks. A line with commas may have more than eight fields.
+Fields are separated by commas or blanks, or have a fixed width of eight characters. The
+width is sixteen if the first field ends with ``*``.
 
 Sources:
-    MSC Nastran Quick Reference Guide: Bulk Data, free and fixed fields; DMIG (form 6
-    contains one half); EXTSEOUT, whose punch file contains KAAX, K4AAX (structural
-    damping), BAAX (viscous damping) and MAAX.
+    MSC Nastran Quick Reference Guide: Bulk Data, DMIG, EXTSEOUT.
 """
 
 import re
@@ -19,7 +17,7 @@ from forcefit.stiffness.exchange.real_numbers import real, whole
 Freedom = tuple[int, int]
 Entries = dict[tuple[Freedom, Freedom], float]
 DMIG = re.compile(r"^DMIG[*\s,]", re.M | re.I)
-# names that Nastran gives to matrices
+# matrix names used by Nastran
 _OWN_NAME = re.compile(r"(K4|K|B|M)2?(AAX?|GG|PP|LL|FF)")
 _WHAT = {"K": "stiffness", "M": "mass", "K4": "structural damping",
          "B": "viscous damping"}  # fmt: skip
@@ -29,12 +27,10 @@ def bulk_fields(line: str) -> tuple[str, list[str]]:
     """Split a line of bulk data into fields.
 
     Args:
-        line: line whose fields have a fixed width, or are separated by commas or
-        blanks.
+        line: line of bulk data.
 
     Returns:
-        The first field in capitals, including ``*``, and the remaining fields: four or
-        eight of fixed width, otherwise all.
+        The first field in capitals, and the other fields.
     """
     if "," in line:
         head, *fields = [word.strip() for word in line.split(",")]
@@ -43,13 +39,13 @@ def bulk_fields(line: str) -> tuple[str, list[str]]:
     width = 16 if "*" in head else 8
     fields = [line[k : k + width].strip() for k in range(8, 72, width)]
     if any(re.search(r"\s", field) for field in (head, *fields)):
-        # a fixed-width field contains no blank between characters
+        # fields of fixed width do not contain inner blanks
         head, *fields = line.split()
     return head.upper(), fields
 
 
 def dmig_entries(path: Path | str, text: str, which: str) -> Entries:
-    """Read the entries of the stiffness or mass matrix in a file.
+    """Read the entries of the stiffness or mass matrix from the text of a file.
 
     Args:
         path: path of the file, for error messages.
@@ -57,11 +53,11 @@ def dmig_entries(path: Path | str, text: str, which: str) -> Entries:
         which: ``"stiffness"`` or ``"mass"``.
 
     Returns:
-        Value by pair of degrees of freedom (row, column), for one half or both.
+        Dictionary from pairs of degrees of freedom (row, column) to values.
 
     Raises:
-        BadInput: the file does not contain exactly one matrix of this kind, or the
-            matrix is not square and real.
+        BadInput: the file does not contain exactly one such matrix, or the matrix is
+            not square and real.
     """
     matrices: dict[str, Entries] = {}
     forms: dict[str, str] = {}
@@ -74,7 +70,7 @@ def dmig_entries(path: Path | str, text: str, which: str) -> Entries:
         if head.rstrip("*") == "DMIG":
             name, node, direction = (fields + [""] * 3)[:3]
             entries = matrices.setdefault(name.upper(), {})
-            if node in {"0", ""}:  # the header states form and types
+            if node in {"0", ""}:  # this line is the header
                 forms[name.upper()], entries = direction, None
                 continue
             column = whole(path, node), max(1, whole(path, direction or "0"))
@@ -95,22 +91,21 @@ def dmig_entries(path: Path | str, text: str, which: str) -> Entries:
 def _terms(
     path: Path | str, fields: list[str], packed: bool
 ) -> list[tuple[Freedom, float]]:
-    """Parse rows and values from the terms of a column.
+    """Parse the terms in a line of a matrix column.
 
-    A term consists of node, direction, real part and imaginary part.
+    A term consists of node, direction, real part and imaginary part of an entry.
 
     Args:
         path: path of the file, for error messages.
-        fields: fields of a line after the fields that name the column.
-        packed: whether fields are separated by blanks, so that no field is empty and
-            imaginary parts are absent.
+        fields: fields of the line without those that name the column.
+        packed: True if fields are separated by blanks, so that terms have no imaginary
+            part.
 
     Returns:
         Row and value of each term.
 
     Raises:
-        BadInput: the line ends within a term, a number is invalid, or a term is
-            complex.
+        BadInput: a term is incomplete or complex, or a number is invalid.
     """
     terms, waiting = [], list(fields)
     while waiting:
@@ -139,7 +134,7 @@ def _terms(
 def _chosen(
     path: Path | str, names: Iterable[str], forms: Mapping[str, str], which: str
 ) -> str:
-    """Return the name of the stiffness or mass matrix, of which only one may exist."""
+    """Return the name of the stiffness or mass matrix in a file."""
     names = list(names)
     initial = {kind: letter for letter, kind in _WHAT.items()}[which]
     found = [name for name in names if forms.get(name, "") in {"1", "6", ""}]
@@ -159,6 +154,6 @@ def _chosen(
 
 
 def _kind(name: str) -> str | None:
-    """Return the kind of a matrix from its Nastran name, or None if unknown."""
+    """Return the kind of a matrix from its name in Nastran, or None if unknown."""
     match = _OWN_NAME.fullmatch(name)
     return _WHAT[match[1]] if match else None

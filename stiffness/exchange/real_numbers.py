@@ -1,4 +1,4 @@
-"""Reader of numbers written by Fortran, with a D or no letter before the exponent."""
+"""Conversion of numbers in the format of Fortran, such as 1.5D3 and 1.5+3."""
 
 import re
 from pathlib import Path
@@ -9,14 +9,14 @@ _REAL = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+))(?:[EeDd]?([+-]?\d+))?")
 
 
 def real(path: Path | str, word: str) -> float:
-    """Convert a number written by Fortran to a float.
+    """Convert a text in the format of Fortran to a number.
 
     Args:
         path: path of the file, for error messages.
-        word: text of the number, with or without surrounding blanks.
+        word: text of the number.
 
     Returns:
-        The value of the number.
+        The number.
 
     Raises:
         BadInput: the text is not a number.
@@ -29,14 +29,14 @@ def real(path: Path | str, word: str) -> float:
 
 
 def whole(path: Path | str, word: str) -> int:
-    """Convert a text from a file to an integer.
+    """Convert a text to an integer.
 
     Args:
         path: path of the file, for error messages.
-        word: text of the number, with or without surrounding blanks.
+        word: text of the number.
 
     Returns:
-        The value of the number.
+        The number.
 
     Raises:
         BadInput: the text is not an integer.

@@ -1,10 +1,10 @@
-"""Matrix of a free body with two interfaces, each with six degrees of freedom.
+"""Stiffness matrix of a free body with two interfaces.
 
 ======  ============  =======================================================
 symbol  shape         meaning
 ======  ============  =======================================================
 K12     (12, 12)      stiffness matrix of the screws [R T] of base and tip
-K       (6, 6)        K_E: block of K12 for the tip, with the base held
+K       (6, 6)        K_E: block of K12 for the tip, base clamped
 X       (6, 6)        rigid motion from base to tip: K12 [s; X s] = 0
 ======  ============  =======================================================
 """
@@ -16,20 +16,21 @@ from forcefit.inputs.errors import BadInput
 from forcefit.stiffness.link import LinkStiffness, check_definite, inverted
 from forcefit.stiffness.screws import screw_map, skew
 
-# residual wrench caused by numbers with seven digits, relative to the scale of K12
+# largest accepted residual wrench of a rigid motion, relative to the entries of K12;
+# files with seven digits cause smaller residuals
 _BALANCED = 1e-5
 _FARTHEST = 1e6  # [m] largest accepted distance between base and tip
 
 
 def both_ends(stiffness: ArrayLike, base_from_tip: ArrayLike) -> NDArray:
-    """Compute the matrix K12 of a link from K_E.
+    """Compute the stiffness matrix K12 of both interfaces from K_E.
 
     Args:
         stiffness: (6, 6) K_E at the tip.
         base_from_tip: (3,) [m] vector from tip to base.
 
     Returns:
-        (12, 12) matrix K12, base before tip, with rotations before translations.
+        (12, 12) matrix K12, base before tip, rotations before translations.
     """
     K = np.asarray(stiffness, dtype=float)
     X = screw_map(base_from_tip)
@@ -43,20 +44,22 @@ def link_of_both_ends(
     base: ArrayLike | None = None,
     tip: ArrayLike | None = None,
 ) -> LinkStiffness:
-    """Build the link described by a matrix of two interfaces.
+    """Create a link from the stiffness matrix of its two interfaces.
 
     Args:
-        K12: (12, 12) matrix in SI units, rotations first at each interface.
-        who: name of the file, for messages.
-        base: (3,) [m] point of the base; None to compute it from the matrix.
-        tip: (3,) [m] point of the tip; give both ``base`` and ``tip``, or neither.
+        K12: (12, 12) matrix in SI units, base before tip, rotations before
+            translations.
+        who: name of the file, for error messages.
+        base: (3,) [m] reference point of the base. If None, its position relative to
+            the tip is computed from the matrix.
+        tip: (3,) [m] reference point of the tip; None if ``base`` is None.
 
     Returns:
-        The link, with its tip at the origin if the points are unknown.
+        The link. If the points are unknown, the tip is at the origin.
 
     Raises:
-        BadInput: K_E is not a stiffness, or the matrix resists rigid motions because
-            the body is held elsewhere.
+        BadInput: K_E is not positive definite, or the matrix is not that of a free
+            body.
     """
     K12 = np.asarray(K12, dtype=float)
     K = K12[6:, 6:]
@@ -93,15 +96,15 @@ def link_of_both_ends(
 def mass_of_both_ends(
     M12: ArrayLike, offset: ArrayLike
 ) -> tuple[float, NDArray, NDArray]:
-    """Compute mass, centre of mass and inertia from a mass matrix of two interfaces.
+    """Compute mass, centre of mass and inertia from the mass matrix of two interfaces.
 
     Args:
-        M12: (12, 12) matrix in SI units, rotations first at each interface.
+        M12: (12, 12) mass matrix in SI units, in the order of K12.
         offset: (3,) [m] vector from tip to base.
 
     Returns:
-        Mass [kg]; centre of mass (3,) [m] relative to the tip; inertia (3, 3) [kg m^2]
-        about the centre.
+        Mass [kg]; centre of mass relative to the tip, (3,) [m]; and inertia about the
+        centre of mass, (3, 3) [kg m^2].
 
     Raises:
         BadInput: the mass is not positive.
@@ -111,7 +114,7 @@ def mass_of_both_ends(
     mass = float(np.trace(M[3:, 3:]) / 3)
     if not mass > 0:
         raise BadInput(f"the mass matrix: found a mass of {mass:g} kg, expected > 0")
-    # v = t + w x c, so the block below the diagonal is -m [c]x
+    # the velocity of the centre c is t + w x c, so the block of t and w is -m [c]x
     arm = -M[3:, :3] / mass
     centre = np.array([arm[2, 1] - arm[1, 2], arm[0, 2] - arm[2, 0],
                        arm[1, 0] - arm[0, 1]]) / 2  # fmt: skip

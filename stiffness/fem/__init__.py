@@ -1,4 +1,4 @@
-"""K_E by finite elements: tetrahedra, condensation, error estimate and stress.
+"""Stiffness and stress of a link by finite elements.
 
-Start with ``fea.py``, which refines the mesh until the estimated error is small enough.
+Start with ``fea.py``, which refines a mesh until the required accuracy is reached.
 """

@@ -1,12 +1,13 @@
-"""One step of adaptive refinement: solve, estimate the error, mark, refine.
+"""One step of adaptive mesh refinement.
 
-The error indicator (:mod:`forcefit.stiffness.fem.error_indicator`) is multiplied by an
-effectivity index, which is the change of the stiffness in the last refinement divided
-by the change of the indicator.
+The error estimate is the error indicator of
+:mod:`forcefit.stiffness.fem.error_indicator` times an effectivity index. This index is
+the change of the stiffness in the last refinement divided by the change of the
+indicator.
 
-K_h is an upper bound on the exact stiffness K, and the estimate E bounds the
-difference, so K lies between K_h - E and K_h. The midpoint of this interval is
-returned, because its error is at most half of E on the same mesh.
+The stiffness K_h on a mesh is an upper bound on the exact stiffness K. If E is an upper
+bound on the error, K is between K_h - E and K_h. The result is the midpoint of this
+interval, whose error is at most E / 2.
 """
 
 from collections.abc import Callable, Sequence
@@ -44,8 +45,8 @@ from forcefit.stiffness.mesh.refine import refine
 from forcefit.stiffness.mesh.regions import is_jagged
 from forcefit.stiffness.mesh.solid import Solid
 
-# Effectivity index assumed on the first mesh, where it cannot be computed. Measured
-# values range from 0.6 to 1.1 on the training parts of
+# Effectivity index on the first mesh, where it cannot be computed. Computed indices
+# range from 0.6 to 1.1 for the training parts of
 # benchmarks/evidence/stiffness_random_parts.py.
 DEFAULT_EFFECTIVITY = 2.0
 SAFETY_FACTOR = 1.3
@@ -53,17 +54,19 @@ SAFETY_FACTOR = 1.3
 
 @dataclass(frozen=True, eq=False)
 class Level:
-    """Solution on one mesh.
+    """Solution on a mesh.
 
     Attributes:
-        solid: solid of straight tetrahedra.
-        mesh: cubic elements, which are parts of the tetrahedra along singular edges.
+        solid: straight tetrahedra.
+        mesh: cubic elements. Tetrahedra at singular edges are divided into several
+            elements.
         material: (t, 3) lambda [Pa], mu [Pa], density [kg/m^3] of each element.
         solution: condensed stiffness and fields.
-        errors: (s, 6, 6) local error indicators: contribution of each tetrahedron of
-            the solid to K_h - K, before multiplication by the effectivity index.
-        geometry_errors: (s, 6, 6) local geometry errors of curved elements.
-        volume_error: [1] relative difference of the volumes of elements and part.
+        errors: (s, 6, 6) error indicator of each tetrahedron: its contribution to K_h -
+            K, without the effectivity index.
+        geometry_errors: (s, 6, 6) error of each tetrahedron due to its approximate
+            geometry.
+        volume_error: [1] relative difference between the volumes of mesh and part.
     """
 
     solid: Solid
@@ -75,7 +78,7 @@ class Level:
     volume_error: float = 0.0
 
     def totals(self) -> tuple[NDArray, NDArray, NDArray]:
-        """Return the (6, 6) stiffness, its indicated error and its geometry error."""
+        """Return stiffness, error indicator and geometry error, each (6, 6)."""
         return (
             self.solution.stiffness,
             self.errors.sum(axis=0),
@@ -90,21 +93,22 @@ def solve_level(
     interface: str,
     check: Callable[[int], None] | None = None,
 ) -> Level:
-    """Compute the stiffness, fields and local error indicators on one mesh.
+    """Compute the stiffness and the error indicators on a mesh.
 
     Args:
-        solid: straight tetrahedra, of which those that would be inverted when curved,
-            or that touch two singular edges, are bisected first.
-        materials: materials; the first fills the link, later ones fill their regions.
-        centers: (2, 3) [m] centres of base and tip.
+        solid: straight tetrahedra. Tetrahedra that would be inverted when curved, or
+            that touch two singular edges, are bisected first.
+        materials: materials. The first is the material of the whole link, except in the
+            regions of the others.
+        centers: (2, 3) [m] centres of the base and the tip interface.
         interface: kind of the interfaces, one of ``KINDS``.
-        check: callback that receives the number of unknowns before the solution.
+        check: callback that is called with the number of unknowns before the solution.
 
     Returns:
-        The solution on cubic elements with a layer along the singular edges.
+        The solution.
 
     Raises:
-        BadInput: no material fills the link.
+        BadInput: no material is given for the whole link.
     """
     regions = regions_of(materials)
     finer = split_joining_edges(refine_inverted(solid, ORDER), ENDS, regions)
@@ -123,14 +127,14 @@ def solve_level(
     indicated = error_matrices(
         mesh, solution.fields, lam, mu, singular, solution.stiffness
     )
-    # at singular edges s_3 is reliable, whereas tractions overestimate the error by a
+    # no residual tractions at singular edges, where they overestimate the error by a
     # factor of 2
     free = np.flatnonzero((mesh.patch > max(ENDS)) & ~singular[mesh.owner])
     residual = np.zeros_like(indicated)
     tractions = traction_errors(mesh, solution.fields, lam, mu, free)
     np.add.at(residual, mesh.owner[free], tractions)
     sizes = 1 / np.diag(solution.stiffness)
-    # two indicators, inside and at the surface, estimate the same error; use the larger
+    # both indicators estimate the same error, so the larger one is used
     larger = np.einsum("tii,i->t", residual - indicated, sizes) > 0
     indicated[larger] = residual[larger]
     errors, geometry = np.zeros((2, len(solid.cells), 6, 6))
@@ -151,16 +155,14 @@ def solve_level(
 def estimated_error(
     history: Sequence[tuple[NDArray, NDArray, NDArray]],
 ) -> tuple[NDArray, float]:
-    """Estimate the error of the stiffness on the last mesh.
+    """Estimate the error of the stiffness on the finest mesh.
 
     Args:
-        history: totals of the :class:`Level` of each mesh, finest last.
+        history: result of :func:`totals` for each mesh, from coarse to fine.
 
     Returns:
-        (6, 6) estimate of K_h minus the exact stiffness, without the geometry error,
-        and the effectivity index of the worst motion. The index is the change of the
-        stiffness in the last refinement divided by the change of the indicated error,
-        times a safety factor.
+        Estimate of K_h - K without the geometry error, (6, 6), and the largest
+        effectivity index, including a safety factor.
     """
     K, indicated, _ = history[-1]
     factors = np.full(6, DEFAULT_EFFECTIVITY)
@@ -170,8 +172,7 @@ def estimated_error(
         effectivity = np.full(6, DEFAULT_EFFECTIVITY)
         np.divide(np.diag(coarse - K), drop, out=effectivity, where=drop > 0)
         factors = SAFETY_FACTOR * np.clip(effectivity, 1.0, 2 * DEFAULT_EFFECTIVITY)
-    # one index per motion, because errors in torsion and in bending occur at different
-    # places
+    # one index for each motion, because bending and torsion have different errors
     root = np.sqrt(factors)
     estimate = np.outer(root, root) * indicated
     worst = int(np.argmax(np.diag(estimate) / np.diag(K)))
@@ -181,33 +182,36 @@ def estimated_error(
 def middle_stiffness(
     K_h: NDArray, E: NDArray, geometry: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Return the midpoint of the interval that contains the exact stiffness.
+    """Return the midpoint between upper and lower bound on the exact stiffness.
 
     Args:
-        K_h: (6, 6) stiffness of a mesh, an upper bound except for the geometry error.
-        E: (6, 6) estimate of the error of K_h, positive semidefinite.
-        geometry: (6, 6) indicated geometry error, of either sign.
+        K_h: (6, 6) stiffness on a mesh, which is the upper bound.
+        E: (6, 6) estimated error of K_h, positive semidefinite.
+        geometry: (6, 6) estimated error due to the approximate geometry, of either
+            sign.
 
     Returns:
-        (6, 6) stiffness K_h - E / 2, and (6, 6) magnitude of its error. If less than
-        half of K_h would remain for a motion, a smaller part of E is subtracted there.
+        Stiffness K_h - E / 2, (6, 6), and the magnitude of its error, (6, 6). For a
+        motion with a large error, less is subtracted, so that at least half of K_h
+        remains.
     """
     largest = eigh(scaled(E, K_h), scaled(K_h, K_h), eigvals_only=True)[-1]
     part = 0.5 / max(1.0, largest)
-    # geometry errors of opposite sign may cancel in K, but not in the estimate
+    # the geometry error may be positive or negative, so its magnitude is added
     return K_h - part * E, (1 - part) * E + np.abs(geometry)
 
 
 def refine_level(level: Level, growth: float) -> Solid:
-    """Bisect the elements with the largest local error indicators.
+    """Bisect the elements with the largest error indicators.
 
     Args:
         level: the mesh to refine.
-        growth: factor on the number of selected elements. A conforming mesh requires
-            that neighbours are bisected too, so the total factor is about growth^2.
+        growth: factor by which the bisection of selected elements increases the number
+            of elements. Their neighbours are bisected too, so that the mesh is
+            conforming, and the total factor is about growth^2.
 
     Returns:
-        The finer mesh.
+        The refined mesh.
     """
     shares = np.einsum(
         "tii,i->t",
@@ -217,8 +221,8 @@ def refine_level(level: Level, growth: float) -> Solid:
     shares = np.maximum(shares, 1e-12 * shares.max())
 
     def halvings(limit: float) -> NDArray:
-        # the error of an element decreases as h^4 to h^7, and thus by at least 2^1.5
-        # per bisection
+        # A bisection reduces the error of an element by at least a factor of 2^1.5. The
+        # error is proportional to h^4 to h^7.
         return np.clip(np.round(np.log2(shares) / 1.5 - limit), 0, 6).astype(int)
 
     low, high = -200.0, 200.0

@@ -1,17 +1,16 @@
-"""Static condensation of a solid onto two interfaces of six degrees of freedom each.
+"""Static condensation of a meshed link onto its two interfaces.
 
-The interface kind determines how a joint is coupled to the surface:
+The kind of the interfaces determines how the joints are coupled to the surface:
 
-- ``rigid`` (RBE2): all nodes of an interface move with the joint as a rigid body, as if
-  the interface were bolted to a much stiffer part.
-- ``distributing`` (RBE3): the base is rigid, while the wrench at the tip is distributed
-  over the interface as tractions that vary linearly.  The tip interface can deform.
-  Its screw is the mean motion of the interface, which is the rigid motion that fits the
-  displacements best in the least-squares sense over the area.
-- ``distributing-both``: both interfaces are distributing, so the stiffness does not
-  depend on which end is the tip.
+- ``rigid`` (RBE2): all nodes of an interface move as a rigid body, as if the interface
+  were bolted to a much stiffer part.
+- ``distributing`` (RBE3): the base is rigid, and the tip interface can deform. The tip
+  wrench is distributed over the interface as linearly varying tractions. The tip screw
+  is the rigid motion that fits the displacements of the interface in the least-squares
+  sense.
+- ``distributing-both``: both interfaces can deform.
 
-Each kind is more compliant than the previous one.
+The stiffness decreases from the first kind to the last.
 """
 
 from dataclasses import dataclass, replace
@@ -30,10 +29,10 @@ KINDS = ("rigid", "distributing", "distributing-both")
 
 @dataclass(frozen=True, eq=False)
 class Condensed:
-    """Stiffness of a link on one mesh, with its displacement fields.
+    """Stiffness of a link on a mesh, and its displacement fields.
 
     Attributes:
-        stiffness: (6, 6) stiffness at the tip's centre, with the base held.
+        stiffness: (6, 6) stiffness at the centre of the tip, with the base clamped.
         fields: (n, 3, 6) [m] displacements for unit screws of the tip.
         unknowns: number of unknowns in the solved system.
         kind: kind of the interfaces, one of ``KINDS``.
@@ -55,14 +54,14 @@ def condense(
     """Condense a meshed link onto its interfaces.
 
     Args:
-        mesh: tetrahedra; patch 0 is the base, patch 1 the tip.
-        lam: (t,) [Pa] Lame's first constant.
-        mu: (t,) [Pa] shear modulus.
+        mesh: elements. Patch 0 is the base, and patch 1 is the tip.
+        lam: (t,) [Pa] Lame's first constant of each element.
+        mu: (t,) [Pa] shear modulus of each element.
         centers: (2, 3) [m] centres of base and tip.
         kind: kind of the interfaces, one of ``KINDS``.
 
     Returns:
-        The stiffness and its fields.
+        The stiffness and the displacement fields.
     """
     upper = assemble(mesh, lam, mu)
     if kind == "rigid":
@@ -73,11 +72,11 @@ def condense(
 
 
 def rigid_motions(points: NDArray, center: NDArray) -> NDArray:
-    """Return the displacements of points for unit screws about a centre.
+    """Return the displacements of points for unit screws.
 
     Args:
         points: (n, 3) [m] points.
-        center: (3,) [m] centre of the screws.
+        center: (3,) [m] reference point of the screws.
 
     Returns:
         (n, 3, 6) displacements.
@@ -87,12 +86,12 @@ def rigid_motions(points: NDArray, center: NDArray) -> NDArray:
 
 
 def _product(upper: csr_array, fields: NDArray) -> NDArray:
-    """Multiply K, given by its upper triangle, by displacement fields."""
+    """Multiply the matrix with this upper triangle by displacement fields."""
     return upper @ fields + upper.T @ fields - upper.diagonal()[:, None] * fields
 
 
 def _rigid(mesh: Elements, upper: csr_array, tip_center: NDArray) -> Condensed:
-    """Solve for fixed base nodes, with tip nodes moved by unit screws."""
+    """Solve for rigid interfaces."""
     fields = np.zeros((len(mesh.nodes), 3, 6))
     base = np.unique(mesh.faces[mesh.patch == 0])
     tip = np.unique(mesh.faces[mesh.patch == 1])
@@ -103,7 +102,8 @@ def _rigid(mesh: Elements, upper: csr_array, tip_center: NDArray) -> Condensed:
     flat = fields.reshape(-1, 6)
     loads = -_product(upper, flat)[free]
     flat[free] = solve(upper[free][:, free], loads)
-    # computed from the energy of the fields, in which solution errors enter squared
+    # computed from the strain energy, because its error is quadratic in the solution
+    # error
     K = flat.T @ _product(upper, flat)
     return Condensed((K + K.T) / 2, fields, int(free.sum()))
 
@@ -111,7 +111,7 @@ def _rigid(mesh: Elements, upper: csr_array, tip_center: NDArray) -> Condensed:
 def _distributing_tip(
     mesh: Elements, upper: csr_array, tip_center: NDArray
 ) -> Condensed:
-    """Solve for fixed base nodes, with wrenches distributed over the tip."""
+    """Solve for a rigid base and a distributing tip."""
     flat = _distributed_loads(mesh, 1, tip_center).reshape(-1, 6)
     free = np.ones(len(mesh.nodes), dtype=bool)
     free[np.unique(mesh.faces[mesh.patch == 0])] = False
@@ -120,7 +120,7 @@ def _distributing_tip(
 
 
 def _distributing_both(mesh: Elements, upper: csr_array, centers: NDArray) -> Condensed:
-    """Solve for wrenches distributed over the tip and over the base."""
+    """Solve for two distributing interfaces."""
     base, tip = (_distributed_loads(mesh, k, centers[k]) for k in (0, 1))
     # unit wrenches at the tip and their reactions at the base
     to_base = screw_map(centers[0] - centers[1])
@@ -129,12 +129,12 @@ def _distributing_both(mesh: Elements, upper: csr_array, centers: NDArray) -> Co
     supports = _isostatic_supports(mesh)
     free = np.ones(len(flat), dtype=bool)
     free[supports] = False
-    # motion of the tip relative to the mean motion of the base, with unloaded supports
+    # the supports are unloaded, and the motion of the tip is relative to the base
     return _from_loads(upper, flat, free)
 
 
 def _from_loads(upper: csr_array, loads: NDArray, free: NDArray) -> Condensed:
-    """Compute the stiffness from the work of six load cases on their displacements."""
+    """Compute the stiffness from the displacements under unit wrenches."""
     u = np.zeros_like(loads)
     u[free] = solve(upper[free][:, free], loads[free])
     C = loads.T @ u
@@ -144,7 +144,7 @@ def _from_loads(upper: csr_array, loads: NDArray, free: NDArray) -> Condensed:
 
 
 def _distributed_loads(mesh: Elements, patch: int, center: NDArray) -> NDArray:
-    """Return (n, 3, 6) nodal loads of unit wrenches; transposed, mean motions."""
+    """Return the nodal loads of unit wrenches on an interface, (n, 3, 6)."""
     faces = mesh.faces[mesh.patch == patch]
     nodes, index = np.unique(faces, return_inverse=True)
     index = index.reshape(faces.shape)
@@ -161,7 +161,7 @@ def _distributed_loads(mesh: Elements, patch: int, center: NDArray) -> NDArray:
 
 
 def _isostatic_supports(mesh: Elements) -> NDArray:
-    """Return the (6,) unknowns fixed by an isostatic support at three distant nodes."""
+    """Return the six unknowns that are fixed by a statically determinate support."""
     points = mesh.nodes
     first = int(np.argmin(points @ [1.0, 0.3, 0.1]))
     apart = np.linalg.norm(points - points[first], axis=1)
@@ -170,8 +170,8 @@ def _isostatic_supports(mesh: Elements) -> NDArray:
     off = np.linalg.norm(np.cross(points - points[first], line), axis=1)
     third = int(np.argmax(off))
     normal = np.abs(np.cross(points[third] - points[first], line))
-    # the second node can move along the line from the first node; the third node is
-    # fixed only normal to the plane of the three nodes
+    # The second node can move along the line to the first node. The third node is fixed
+    # only normal to the plane of the three nodes.
     second_fixed = [3 * second + d for d in range(3) if d != np.argmax(np.abs(line))]
     third_fixed = 3 * third + int(np.argmax(normal))
     return np.array([*(3 * first + d for d in range(3)), *second_fixed, third_fixed])

@@ -4,16 +4,15 @@ r"""Isoparametric tetrahedra for linear elasticity.
 symbol meaning                                                    shape
 ====== ========================================================== ==========
 N      shape functions at quadrature points                       (q, m)
-G      their gradients in space                                   (t, q, m, 3)
-w      quadrature weights times the Jacobian's determinant        (t, q)
+G      gradients of N with respect to position                    (t, q, m, 3)
+w      quadrature weights times the Jacobian determinant          (t, q)
 ====== ========================================================== ==========
 
-The m nodes of an element are those of its lattice
-(:mod:`forcefit.stiffness.mesh.lagrange`): 20 in a cubic tetrahedron, 10 in a quadratic
-one. The stiffness is assembled for all elements at once from scalar gradients: K[ai,
-bj] = sum_q w (lam G_ai G_bj + mu G_aj G_bi + mu d_ij G_a . G_b).  This is much faster
-than evaluating a weak form. Straight tetrahedra are integrated exactly; for curved
-ones, the quadrature rule is exact for two more degrees.
+A cubic tetrahedron has m = 20 nodes, and a quadratic tetrahedron has 10
+(:mod:`forcefit.stiffness.mesh.lagrange`). The stiffness of nodes a, b in the directions
+i, j is K[ai, bj] = sum_q w (lam G_ai G_bj + mu G_aj G_bi + mu d_ij G_a . G_b). The
+quadrature is exact for straight tetrahedra. For curved tetrahedra, the degree of the
+quadrature rule is higher by two.
 """
 
 from collections.abc import Iterator
@@ -36,8 +35,8 @@ from forcefit.stiffness.mesh.lagrange import (
 from forcefit.stiffness.mesh.quadrature import quadrature
 from forcefit.stiffness.mesh.solid import Solid
 
-# cubic, because quadratic elements require several times more unknowns for an error of
-# 0.1 %
+# order of the elements; for an error of 0.1 %, quadratic elements need many more
+# unknowns than cubic elements
 ORDER = 3
 # derivatives of the barycentric coordinates with respect to the reference coordinates
 _COORDINATES = np.vstack([-np.ones(3), np.eye(3)])
@@ -46,16 +45,18 @@ _CHUNK = 3_600_000  # element-matrix entries per batch, 30 MB
 
 @dataclass(frozen=True, eq=False)
 class Elements:
-    """Isoparametric tetrahedra of a solid.
+    """Isoparametric tetrahedral elements of a solid.
 
     Attributes:
         order: order of the polynomials, 2 or 3.
-        nodes: (n, 3) [m] nodes, corners first, with boundary nodes on the exact shapes.
-        cells: (t, m) nodes of each tetrahedron.
-        faces: (f, k) nodes of each boundary triangle.
-        patch: (f,) patch number of each face; 0 is the base interface, 1 the tip.
-        owner: (f,) tetrahedron of each boundary triangle.
-        curved: (t,) bool, True for a curved tetrahedron.
+        nodes: (n, 3) [m] positions of the nodes, corners first. Boundary nodes are on
+            the exact shapes.
+        cells: (t, m) indices of the nodes of each element.
+        faces: (f, k) indices of the nodes of each boundary face.
+        patch: (f,) patch number of each boundary face. Patch 0 is the base interface,
+            and patch 1 is the tip interface.
+        owner: (f,) index of the element with each boundary face.
+        curved: (t,) bool, True for a curved element.
     """
 
     order: int
@@ -68,15 +69,15 @@ class Elements:
 
 
 class Chunk(NamedTuple):
-    """A batch of elements and their quadrature.
+    """Quadrature data for a batch of elements.
 
     Attributes:
         part: (c,) indices of the elements.
         L: (q, 4) barycentric coordinates of the quadrature points.
-        weights: (q,) on the reference element.
+        weights: (q,) quadrature weights on the reference element.
         N: (q, m) shape functions.
-        G: (c, q, m, 3) [1/m] gradients of the shape functions in space.
-        w: (c, q) [m^3] quadrature weights in space.
+        G: (c, q, m, 3) [1/m] gradients of the shape functions with respect to position.
+        w: (c, q) [m^3] quadrature weights times the Jacobian determinant.
     """
 
     part: NDArray
@@ -90,13 +91,13 @@ class Chunk(NamedTuple):
 def isoparametric(
     solid: Solid, order: int = ORDER, parts: Parts | None = None
 ) -> Elements:
-    """Create isoparametric elements with boundary nodes on the exact shapes.
+    """Create isoparametric elements from straight tetrahedra.
 
     Args:
-        solid: the straight tetrahedra.
+        solid: straight tetrahedra.
         order: order of the polynomials, 2 or 3.
-        parts: pieces into which the tetrahedra are cut, each of which becomes an
-            element.
+        parts: tetrahedra into which those of the solid are divided. If None, each
+            tetrahedron of the solid becomes an element.
 
     Returns:
         The elements.
@@ -105,7 +106,7 @@ def isoparametric(
     cells, count = numbered(parts.corners, order)
     nodes = np.zeros((count, 3))
     L = (lattice(order) / order) @ parts.places
-    # only a few different cuts occur, so pieces with the same cut are treated together
+    # tetrahedra that are divided in the same way are treated together
     cuts = parts.places.reshape(len(L), 16)
     _, first, cut = np.unique(cuts, axis=0, return_index=True, return_inverse=True)
     for k, example in enumerate(first):
@@ -113,7 +114,7 @@ def isoparametric(
         N, _ = shape_functions(order, L[example])
         corners = whole.nodes[whole.cells[parts.parent[members]]]
         nodes[cells[members]] = np.einsum("na,tax->tnx", N, corners)
-    # a face of a piece is on the boundary if it is part of a boundary face of the
+    # a face of an element is on the boundary if it is part of a boundary face of the
     # tetrahedron
     faces, patch, owner = [], [], []
     for side, on in zip(FACES, face_nodes(order), strict=True):
@@ -136,11 +137,12 @@ def isoparametric(
 
 
 def integration(mesh: Elements, some: NDArray | None = None) -> Iterator[Chunk]:
-    """Yield the quadrature points and weights of the elements in batches.
+    """Yield quadrature data for the elements in batches.
 
     Args:
-        mesh: the tetrahedra.
-        some: (t,) bool, True for selected elements; all elements if absent.
+        mesh: the elements.
+        some: (t,) bool, True for selected elements. By default, all elements are
+            selected.
 
     Yields:
         A :class:`Chunk`.
@@ -159,7 +161,7 @@ def integration(mesh: Elements, some: NDArray | None = None) -> Iterator[Chunk]:
 
 
 def _chunks(members: NDArray, nodes: int) -> Iterator[NDArray]:
-    """Yield groups of elements whose matrices fit into one batch of memory."""
+    """Yield indices of elements in batches of limited memory."""
     step = max(1, _CHUNK // (9 * nodes**2))
     for first in range(0, len(members), step):
         yield members[first : first + step]
@@ -168,15 +170,16 @@ def _chunks(members: NDArray, nodes: int) -> Iterator[NDArray]:
 def gradients_on_faces(
     mesh: Elements, faces: NDArray
 ) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-    """Return quadrature data for integrals of stresses over boundary triangles.
+    """Return quadrature data for integrals of stresses over boundary faces.
 
     Args:
-        mesh: the tetrahedra.
-        faces: (f,) indices of boundary triangles.
+        mesh: the elements.
+        faces: (f,) indices of the boundary faces.
 
     Returns:
-        Positions (f, q, 3) [m], outward normals (f, q, 3), weights (f, q) [m^2], and
-            gradients (f, q, m, 3) [1/m] of the owners' shape functions.
+        Positions of the quadrature points, (f, q, 3) [m]; outward normals, (f, q, 3);
+        weights, (f, q) [m^2]; and gradients of the shape functions in the adjacent
+        elements, (f, q, m, 3) [1/m].
     """
     N, area = _face_vectors(mesh, mesh.faces[faces])
     size = np.linalg.norm(area, axis=2)
@@ -192,8 +195,7 @@ def gradients_on_faces(
         slope = shape_functions(mesh.order, L)[1]
         inverse = np.linalg.inv(_jacobians(slope, mesh.nodes[cells[members]]))
         G[members] = slope @ inverse
-        # the coordinate of the opposite corner increases inward, also in curved
-        # elements
+        # the barycentric coordinate of the opposite corner increases inward
         (opposite,) = set(range(4)) - set(side)
         inward[members] = _COORDINATES[opposite] @ inverse
     outward = -np.sign(np.einsum("tqx,tqx->tq", area, inward))
@@ -201,7 +203,7 @@ def gradients_on_faces(
 
 
 def _jacobians(dN: NDArray, corners: NDArray) -> NDArray:
-    """Return (c, q, 3, 3) derivatives of position by reference coordinate (axis 2)."""
+    """Return derivatives of position by reference coordinates, (c, q, 3, 3) [m]."""
     q, m, _ = dN.shape
     flat = dN.transpose(0, 2, 1).reshape(3 * q, m) @ corners
     return np.asarray(flat.reshape(len(corners), q, 3, 3)).swapaxes(2, 3)
@@ -213,11 +215,11 @@ def node_gradients(
     """Yield the gradients of the shape functions at the nodes of each element.
 
     Args:
-        mesh: the tetrahedra.
-        members: (c,) indices of the elements; all if absent.
+        mesh: the elements.
+        members: (c,) indices of the elements. By default, all elements are selected.
 
     Yields:
-        Indices (c,) of elements, and gradients (c, m, m, 3) [1/m] with the axes
+        Indices of elements, (c,); and gradients, (c, m, m, 3) [1/m], with the axes
         element, node, shape function and direction.
     """
     dN = shape_functions(mesh.order, lattice(mesh.order) / mesh.order)[1]
@@ -227,34 +229,34 @@ def node_gradients(
 
 
 def triangle_areas(mesh: Elements, faces: NDArray) -> tuple[NDArray, NDArray]:
-    """Return quadrature data for integrals over curved triangles.
+    """Return quadrature data for integrals over boundary faces.
 
     Args:
-        mesh: the mesh with the triangles' nodes.
-        faces: (f, k) nodes of triangles.
+        mesh: the elements.
+        faces: (f, k) indices of the nodes of each face.
 
     Returns:
-        Shape functions (q, k) at the quadrature points and weights (f, q) [m^2].
+        Shape functions at the quadrature points, (q, k); and weights, (f, q) [m^2].
     """
     N, area = _face_vectors(mesh, faces)
     return N, np.linalg.norm(area, axis=2)
 
 
 def _face_vectors(mesh: Elements, faces: NDArray) -> tuple[NDArray, NDArray]:
-    """Return shape functions (q, k) and weights (f, q, 3) [m^2] along the normals."""
+    """Return shape functions, (q, k), and weighted normals, (f, q, 3) [m^2]."""
     N, dN, weights = triangle_rule(mesh.order)
     J = np.einsum("qai,tax->tqix", dN, mesh.nodes[faces])
     return N, np.cross(J[:, :, 0], J[:, :, 1]) * weights[:, None]
 
 
 def triangle_rule(order: int) -> tuple[NDArray, NDArray, NDArray]:
-    """Return a triangle quadrature that is exact for products of two shape functions.
+    """Return a triangle quadrature rule for products of two shape functions.
 
     Args:
         order: order of the polynomials.
 
     Returns:
-        Shape functions (q, k), their gradients (q, k, 2) and weights (q,).
+        Shape functions, (q, k); their gradients, (q, k, 2); and weights, (q,).
     """
     L, weights = quadrature(2 * order, corners=3)
     N, dN = shape_functions(order, L)
@@ -269,7 +271,7 @@ def lame(E: float, nu: float) -> tuple[float, float]:
         nu: [-] Poisson's ratio.
 
     Returns:
-        lambda and mu [Pa].
+        Lame's constants lambda and mu [Pa].
     """
     return E * nu / ((1 + nu) * (1 - 2 * nu)), E / (2 * (1 + nu))
 
@@ -278,13 +280,13 @@ def assemble(mesh: Elements, lam: NDArray, mu: NDArray) -> csr_array:
     """Assemble the stiffness matrix of all elements.
 
     Args:
-        mesh: the tetrahedra.
+        mesh: the elements.
         lam: (t,) [Pa] Lame's first constant of each element.
         mu: (t,) [Pa] shear modulus of each element.
 
     Returns:
-        (3n, 3n) [N/m] upper triangle of the matrix; row 3 i + k is direction k of node
-        i.
+        Upper triangle of the matrix, (3n, 3n) [N/m]. Row 3 i + k belongs to direction k
+        of node i.
     """
     cells, count = mesh.cells, np.int64(len(mesh.nodes))
     a, b = np.triu_indices(cells.shape[1])
@@ -299,8 +301,7 @@ def assemble(mesh: Elements, lam: NDArray, mu: NDArray) -> csr_array:
         block = np.where(swapped[part, None], turned, block)
         place = position[part].ravel()
         for k in range(9):
-            # np.bincount would allocate sums for all pairs between the first and last
-            # pair in the batch
+            # np.bincount would need too much memory here
             np.add.at(values[k], place, block[:, k].ravel())
     return _upper(values, code // count, code % count, int(count))
 
@@ -308,16 +309,17 @@ def assemble(mesh: Elements, lam: NDArray, mu: NDArray) -> csr_array:
 def _node_blocks(
     mesh: Elements, lam: NDArray, mu: NDArray, a: NDArray, b: NDArray
 ) -> Iterator[tuple[NDArray, NDArray]]:
-    """Yield element indices (c,) and stiffnesses (c, 9, p) of node pairs a, b."""
+    """Yield element indices, (c,), and stiffness blocks of node pairs, (c, 9, p)."""
     L, weights = quadrature(2 * (mesh.order - 1))
     _, dN = shape_functions(mesh.order, L)
-    # integrals of products of derivatives, in the coordinates of a straight element
+    # integrals of products of derivatives with respect to reference coordinates
     own = np.einsum("q,qpx,qpy->xyp", weights, dN[:, a], dN[:, b]).reshape(9, -1)
     for part in _chunks(np.flatnonzero(~mesh.curved), dN.shape[1]):
         corners = mesh.nodes[mesh.cells[part, :4]]
         J = (corners[:, 1:] - corners[:, :1]).swapaxes(1, 2)
         inverse, size = np.linalg.inv(J), np.abs(np.linalg.det(J))
-        # [c, i, j, x, y]: coefficient of the derivatives along x and y in G_ai G_bj
+        # turn[c, i, j, x, y] is the factor of the derivatives with respect to reference
+        # coordinates x and y in G_ai G_bj
         turn = np.einsum("c,cxi,cyj->cijxy", size, inverse, inverse)
         yield part, _hooke(turn.reshape(-1, 3, 3, 9), lam[part], mu[part]) @ own
     for part, _, _, _, G, w in integration(mesh, mesh.curved):
@@ -329,7 +331,7 @@ def _node_blocks(
 
 
 def _hooke(S: NDArray, lam: NDArray, mu: NDArray) -> NDArray:
-    """Return (c, 9, p) lam S_ij + mu S_ji + mu d_ij S_kk for S (c, 3, 3, p)."""
+    """Return lam S_ij + mu S_ji + mu d_ij S_kk, (c, 9, p)."""
     m = mu[:, None, None, None]
     block = lam[:, None, None, None] * S + m * S.swapaxes(1, 2)
     block[:, range(3), range(3)] += m[:, 0] * np.trace(S, axis1=1, axis2=2)[:, None]
@@ -337,11 +339,11 @@ def _hooke(S: NDArray, lam: NDArray, mu: NDArray) -> NDArray:
 
 
 def _upper(values: NDArray, row: NDArray, column: NDArray, count: int) -> csr_array:
-    """Build the upper triangle from the (9, k) blocks of node pairs, row by row."""
+    """Build the upper triangle of the matrix from the blocks of node pairs."""
     start = np.searchsorted(row, np.arange(count + 1))
     width = np.diff(start)
-    # a node's diagonal block comes first; its second row lacks one entry, its third row
-    # two
+    # The diagonal block of a node comes first. Of this block, the first row has three
+    # entries, the second row two, and the third row one.
     indptr = np.zeros(3 * count + 1, dtype=np.int32)
     lengths = np.stack([3 * width, 3 * width - 1, 3 * width - 2], axis=1)
     indptr[1:] = np.cumsum(lengths.ravel())

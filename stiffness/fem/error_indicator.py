@@ -1,28 +1,26 @@
-r"""Element-wise a posteriori error indicator for a finite element stiffness.
+r"""A posteriori error indicator for the stiffness on a mesh.
 
-The stiffness of cubic elements exceeds the exact one by the energy of the
-discretisation error. The stresses in a cubic element are quadratic and are split into a
-constant mean, a linear part of energy s_2, and a quadratic part of energy s_3. Assume
-that the error e_p of elements of degree p decreases as p^-b. Then the decay s_3 / s_2 =
-(e_2 - e_3) / (e_1 - e_2) determines b, and thus the ratio e_3 / (e_2 - e_3) of the
-remaining error to s_3. This ratio is nearly zero in a smooth field, and one or more
-otherwise. For elements at a singular edge it is set to 1.2.
+The error of the stiffness is the energy of the discretisation error. The stresses in a
+cubic element are the sum of a constant part, a linear part with energy s_2, and a
+quadratic part with energy s_3. Assume that the error e_p of elements of degree p is
+proportional to p^-b. The exponent b follows from s_3 / s_2 = (e_2 - e_3) / (e_1 - e_2).
+The error is then s_3 times the ratio e_3 / (e_2 - e_3), which is nearly zero in a
+smooth field. At a singular edge, this ratio is set to 1.2.
 
 At the free edge of a twisted plate, the stresses change direction within a boundary
-layer, whose width is a third of the wall thickness. An element much wider than the wall
-does not resolve this layer: the large linear stresses of the plate increase s_2 and
-thus suggest a smooth field, but residual tractions t remain on the free surface. They
-are balanced by a surface field of half wavelength l, the smallest height of the face,
-which decays as exp(-pi x / l) and whose energy is the integral of t^2 / (2 mu) l / pi.
-The indicator is the larger of the two estimates.
+layer, whose width is a third of the wall thickness. Elements much wider than the wall
+do not resolve this layer. The error is then underestimated, but residual tractions t
+act on the free surface. A stress field that balances them decays with depth x as
+exp(-pi x / l), where l is the smallest height of the face. Its energy is the integral
+of t^2 / (2 mu) l / pi over the surface. The indicator is the larger of these two
+estimates.
 
-The indicator does not include the geometry error, that is, the distance of the curved
-elements from the exact shapes; see :func:`geometry_errors`.
+The error due to the approximate geometry is estimated by :func:`geometry_errors`.
 
 Sources:
-    Mavriplis (1990) for an error estimate from the decay of an element's coefficients;
-    Schwab (1998), p- and hp-Finite Element Methods, for the rate p^-b;
-    Friedrichs & Dressler (1961) for the layer at a plate's free edge.
+    Mavriplis (1990) for the estimate from the decay of coefficients; Schwab (1998), p-
+    and hp-Finite Element Methods, for the rate p^-b; Friedrichs & Dressler (1961) for
+    the boundary layer of a plate.
 """
 
 from collections.abc import Callable, Sequence
@@ -35,13 +33,13 @@ from forcefit.stiffness.surface.primitives import Plane, Shape
 from forcefit.stiffness.surface.true_surface import TrueSurface
 
 VOIGT = np.array([[0, 0], [1, 1], [2, 2], [1, 2], [0, 2], [0, 1]])
-_SAME_MODULUS = 1e-6  # relative difference below which moduli count as equal
+_SAME_MODULUS = 1e-6  # relative difference below which moduli are treated as equal
 _CHUNK = 1024  # number of faces in a batch
-# ratio of the remaining error e_3 to the indicator s_3 at a singular edge,
-# calibrated on the example links in meshes/
+# ratio of the error e_3 to the energy s_3 at a singular edge, calibrated on the links
+# in meshes/
 _SINGULAR_SHARE = 1.2
-# ratio of the remaining error to s_3, as a function of s_3 / s_2, for rates from p^-0.1
-# to p^-40
+# ratio of the error e_3 to the energy s_3 as a function of s_3 / s_2, for exponents b
+# from 0.1 to 40
 _RATES = np.geomspace(40.0, 0.1, 400)
 _DECAY = (2**-_RATES - 3**-_RATES) / (1 - 2**-_RATES)
 _REMAINDER = np.minimum(3**-_RATES / (2**-_RATES - 3**-_RATES), 3.0)
@@ -58,16 +56,16 @@ def error_matrices(
     """Estimate the contribution of each element to the error of the stiffness.
 
     Args:
-        mesh: cubic tetrahedra.
-        fields: (n, 3, k) [m] displacements of k unit load cases.
-        lam: (t,) [Pa] Lame's first constant.
-        mu: (t,) [Pa] shear modulus.
+        mesh: cubic elements.
+        fields: (n, 3, k) [m] displacement fields of the load cases.
+        lam: (t,) [Pa] Lame's first constant of each element.
+        mu: (t,) [Pa] shear modulus of each element.
         singular: (t,) bool, True for an element that touches a singular edge.
-        stiffness: (k, k) stiffness of the load cases, by which their energies are
-            scaled.
+        stiffness: (k, k) stiffness matrix of the load cases.
 
     Returns:
-        (t, k, k) [unit of the stiffness] contributions, whose sum estimates K_h - K.
+        Contribution of each element, (t, k, k), in the unit of the stiffness. Their sum
+        is an estimate of K_h - K.
     """
     errors = np.zeros((len(mesh.cells), *stiffness.shape))
     for part, L, weights, _, G, w in integration(mesh):
@@ -93,17 +91,17 @@ def error_matrices(
 def traction_errors(
     mesh: Elements, fields: NDArray, lam: NDArray, mu: NDArray, free: NDArray
 ) -> NDArray:
-    """Compute the energies of fields that balance residual surface tractions.
+    """Compute the energies of stress fields that balance residual surface tractions.
 
     Args:
-        mesh: the tetrahedra.
-        fields: (n, 3, k) [m] displacements of k unit load cases.
-        lam: (t,) [Pa] Lame's first constant.
-        mu: (t,) [Pa] shear modulus.
-        free: (f,) indices of boundary triangles on which no load acts.
+        mesh: the elements.
+        fields: (n, 3, k) [m] displacement fields of the load cases.
+        lam: (t,) [Pa] Lame's first constant of each element.
+        mu: (t,) [Pa] shear modulus of each element.
+        free: (f,) indices of the boundary faces without a load.
 
     Returns:
-        (f, k, k) [unit of the stiffness] energies.
+        Energies, (f, k, k), in the unit of the stiffness.
     """
     cases = fields.shape[2]
     errors = np.zeros((len(free), cases, cases))
@@ -123,7 +121,7 @@ def traction_errors(
 
 
 def _smallest_height(mesh: Elements, faces: NDArray) -> NDArray:
-    """Return (f,) [m] the smaller of triangle height and element depth."""
+    """Return the smallest height of each face and its element, (f,) [m]."""
     a, b, c = np.moveaxis(mesh.nodes[mesh.faces[faces, :3]], 1, 0)
     across = np.cross(b - a, c - a)
     twice = np.linalg.norm(across, axis=1)
@@ -142,24 +140,26 @@ def geometry_errors(
     mu: NDArray,
     surface: TrueSurface | None = None,
 ) -> NDArray:
-    """Estimate the error of the stiffness due to deviations from the exact shapes.
+    """Estimate the error of the stiffness due to the approximate geometry.
 
     Args:
-        mesh: the tetrahedra.
-        shapes: shapes of the patches.
-        fields: (n, 3, k) [m] displacements of k unit load cases.
-        lam: (t,) [Pa] Lame's first constant.
-        mu: (t,) [Pa] shear modulus.
-        surface: surface used for patches that join others smoothly, where an element
-            may lie on both sides of the border. If None, each face is compared with the
+        mesh: the elements.
+        shapes: exact shapes of the patches.
+        fields: (n, 3, k) [m] displacement fields of the load cases.
+        lam: (t,) [Pa] Lame's first constant of each element.
+        mu: (t,) [Pa] shear modulus of each element.
+        surface: exact surface of the part, with which faces near a smooth border
+            between two patches are compared. If None, each face is compared with the
             shape of its patch.
 
     Returns:
-        (f, k, k) [unit of the stiffness] contribution of each boundary triangle: the
-        energy density times the distance to the shape, to first order.
+        Contribution of each boundary face, (f, k, k), in the unit of the stiffness. To
+        first order, it is the integral of the energy density times the distance from
+        the exact shape.
 
     Sources:
-        Hadamard (1908), for the derivative of the energy when a free surface moves.
+        Hadamard (1908) for the derivative of the energy with respect to a surface
+        displacement.
     """
     cases = fields.shape[2]
     errors = np.zeros((len(mesh.faces), cases, cases))
@@ -199,17 +199,17 @@ def material_errors(
     """Estimate the error of the stiffness due to elements that contain two materials.
 
     Args:
-        mesh: the tetrahedra.
-        fields: (n, 3, k) [m] displacements of k unit load cases.
-        lam: (t,) [Pa] Lame's first constant.
-        mu: (t,) [Pa] shear modulus.
-        shear_at: function that returns the shear modulus (n,) [Pa] at points (n, 3)
+        mesh: the elements.
+        fields: (n, 3, k) [m] displacement fields of the load cases.
+        lam: (t,) [Pa] Lame's first constant of each element.
+        mu: (t,) [Pa] shear modulus of each element.
+        shear_at: function that returns the shear modulus, (n,) [Pa], at points, (n, 3)
             [m].
 
     Returns:
-        (t, k, k) [unit of the stiffness] contributions, positive if an element is too
-        stiff. Each is the energy of the element's part in the other material, times the
-        ratio of the moduli.
+        Contribution of each element, (t, k, k), in the unit of the stiffness. It is the
+        energy in the volume of the second material times the ratio of the moduli, and
+        is positive if the element is too stiff.
     """
     cases = fields.shape[2]
     errors = np.zeros((len(mesh.cells), cases, cases))
@@ -217,8 +217,8 @@ def material_errors(
         places = np.einsum("qa,tax->tqx", N, mesh.nodes[mesh.cells[part]])
         own = mu[part][:, None]
         true = shear_at(places.reshape(-1, 3)).reshape(w.shape)
-        # tractions are continuous across the face, so the more compliant side stores
-        # more energy
+        # tractions are continuous at the border of the materials, so the more compliant
+        # material has the larger energy density
         ratio = np.maximum(own / true, true / own)
         sign = np.where(own > true, 1.0, -1.0) * (np.abs(ratio - 1) > _SAME_MODULUS)
         some = np.flatnonzero(sign.any(axis=1))
@@ -232,7 +232,7 @@ def material_errors(
 
 
 def _energy_roots(G: NDArray, u: NDArray, lam: NDArray, mu: NDArray) -> NDArray:
-    """Return (c, q, k, 7) roots of the energy density, deviatoric and bulk parts."""
+    """Return square roots of the parts of the energy density, (c, q, k, 7)."""
     count, points, nodes, _ = G.shape
     cases = u.shape[3]
     slope = u.transpose(0, 3, 2, 1).reshape(count, 1, 3 * cases, nodes) @ G
@@ -248,7 +248,7 @@ def _energy_roots(G: NDArray, u: NDArray, lam: NDArray, mu: NDArray) -> NDArray:
 
 
 def _energy_products(roots: NDArray, w: NDArray) -> NDArray:
-    """Integrate products of energy roots for pairs of load cases (c, k, k)."""
+    """Integrate the energy density of pairs of load cases, (c, k, k)."""
     count, _, cases, _ = roots.shape
     flat = (
         (roots * np.sqrt(w)[:, :, None, None]).swapaxes(1, 2).reshape(count, cases, -1)

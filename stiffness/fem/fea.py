@@ -1,9 +1,8 @@
-"""Finite element stiffness of a link from its surface, with an error estimate.
+"""Stiffness of a link by finite elements, with an error estimate.
 
-A surface is meshed into tetrahedra, on which the stiffness and its error estimate are
-computed (:mod:`forcefit.stiffness.fem.adaptive_step`). The elements that contribute
-most to the error are refined until the required accuracy is reached or the budget is
-exhausted.
+The link is given by its surface and meshed into tetrahedra. The elements that
+contribute most to the error are refined until the required accuracy is reached or the
+budget is exhausted (:mod:`forcefit.stiffness.fem.adaptive_step`).
 """
 
 import logging
@@ -53,19 +52,19 @@ from forcefit.stiffness.surface.surface import Surface, read_surface
 P = ParamSpec("P")
 R = TypeVar("R")
 _LOG = logging.getLogger("forcefit.finite_elements")
-_SETUP = 2.0  # [s] mesh-independent part of the solution time
-# fraction of the time budget for the mesher; the remaining time is for the solver
+_SETUP = 2.0  # [s] part of the solution time that does not depend on the mesh
+# fraction of the time limit that is available for the mesher
 _MESHER = 0.6
 
 
 @dataclass(frozen=True)
 class Budget:
-    """Limits on the computing cost of a solution.
+    """Limits on the time and memory of a computation.
 
     Attributes:
         seconds: [s] time after which no finer mesh is started.
-        unknowns: [-] largest number of unknowns, which limits the memory.
-        levels: [-] largest number of meshes, including the first one.
+        unknowns: [-] largest number of unknowns.
+        levels: [-] largest number of meshes, including the first mesh.
     """
 
     seconds: float = 300.0
@@ -75,14 +74,16 @@ class Budget:
 
 @dataclass(frozen=True)
 class FemOptions:
-    """Solution options: accuracy, interfaces and cost.
+    """Options of the finite element solution.
 
     Attributes:
-        accuracy: [-] required error of entries scaled by sqrt(K_ii K_jj).
-        interface: ``"rigid"``, ``"distributing"`` (the tip) or ``"distributing-both"``,
-            see :mod:`forcefit.stiffness.fem.condensation`.
-        budget: limits on the computing cost.
-        cache: folder in which meshes are stored; by default the user's cache folder.
+        accuracy: [-] largest accepted error of an entry K_ij, divided by sqrt(K_ii
+            K_jj).
+        interface: kind of the interfaces: ``"rigid"``, ``"distributing"`` or
+            ``"distributing-both"``, see :mod:`forcefit.stiffness.fem.condensation`.
+        budget: limits on time and memory.
+        cache: folder in which meshes are stored. The default is the user's cache
+            folder.
     """
 
     accuracy: float = 0.005
@@ -106,11 +107,11 @@ _STANDARD = FemOptions()
 
 @dataclass(frozen=True, eq=False)
 class MeshedLink:
-    """A link and its solution on the finest mesh, from which stresses are computed.
+    """A link and its solution on the finest mesh.
 
     Attributes:
-        link: stiffness with its error, mesh report and mass properties.
-        level: finest mesh with its stiffness, fields and materials.
+        link: stiffness of the link, with its error and the mass properties.
+        level: finest mesh with its solution and materials.
         centers: (2, 3) [m] centres of the base and the tip interface.
     """
 
@@ -122,7 +123,7 @@ class MeshedLink:
 
 
 def _accepting_material(function: Callable[P, R]) -> Callable[P, R]:
-    """Make a function accept a material as in the last release."""
+    """Make a function accept the material arguments of the last release."""
 
     @wraps(function)
     def call(*args: P.args, **kwargs: P.kwargs) -> R:
@@ -149,14 +150,14 @@ def mesh_link(
     unit: str = "m",
     options: FemOptions = _STANDARD,
 ) -> LinkStiffness:
-    """Compute the stiffness of a single-material link from a surface file.
+    """Compute the stiffness of a link of one material from a surface file.
 
     Args:
-        surface: file of the closed surface (STL, OBJ, PLY, VTK, MSH, STEP).
-        base: held interface, in metres and surface axes; or a text such as ``"z=0"``,
-            see
+        surface: file with the closed surface of the link (STL, OBJ, PLY, VTK, MSH,
+            STEP).
+        base: clamped interface, or a text such as ``"z=0"`` [m], see
             :func:`forcefit.stiffness.surface.interface.parse_interface`.
-        tip: moving interface, in the same form.
+        tip: loaded interface, in the same form.
         E: [Pa] Young's modulus, > 0.
         nu: [-] Poisson's ratio, in (-1, 0.5).
         density: [kg/m^3] density; 0 for a link without mass.
@@ -164,15 +165,14 @@ def mesh_link(
         options: options of the solution.
 
     Returns:
-        The stiffness at the centre of the tip, in the axes of the surface.  The entry
-        ``reached`` of its ``mesh`` states whether the required accuracy was reached.
+        The stiffness at the centre of the tip, in the axes of the surface. The entry
+        ``reached`` of its ``mesh`` is True if the required accuracy was reached.
 
     Raises:
         BadInput: the file, an interface or a material constant is invalid.
 
     Sources:
-        Rivara (1984) for the bisection; :mod:`forcefit.stiffness.fem.error_indicator`
-        for the error.
+        Rivara (1984) for the bisection of elements.
     """
     material = Material(E, nu, density)
     shape = read_surface(Path(surface), unit)
@@ -192,23 +192,25 @@ def solve_link(
     options: FemOptions = _STANDARD,
     point_masses: Sequence[PointMass] = (),
 ) -> MeshedLink:
-    """Compute the stiffness of a link to a required accuracy.
+    """Compute the stiffness of a link with a required accuracy.
 
     Args:
         surface: surface of the link.
-        base: held interface.
-        tip: moving interface.
-        materials: the first material fills the link, and later ones fill their regions;
-            or one material for each solid in a STEP file.
+        base: clamped interface.
+        tip: loaded interface.
+        materials: materials. The first is the material of the whole link, except in the
+            regions of the others. In a STEP file, each solid may instead have its own
+            material.
         options: options of the solution.
-        point_masses: point masses, which contribute to mass, centre and inertia.
+        point_masses: point masses, which affect the mass properties but not the
+            stiffness.
 
     Returns:
-        The link and its finest mesh.
+        The link and its solution on the finest mesh.
 
     Raises:
         BadInput: an interface is invalid, the interfaces share an edge, no material is
-            given, or a material names a solid that does not exist.
+            given, or a solid does not exist.
     """
     start, busy = time.monotonic(), _processor_seconds()
     check_materials(materials)
@@ -234,17 +236,17 @@ def solve_link(
 def solve_bar(
     section: Mapping[str, float], material: Material, options: FemOptions = _STANDARD
 ) -> MeshedLink:
-    """Compute the stiffness of a bar of unit length along z, extruded directly.
+    """Compute the stiffness of a bar of unit length along z.
 
     Args:
-        section: lengths of the section relative to the bar's length, see
+        section: dimensions of the section divided by the length of the bar, see
             :func:`forcefit.stiffness.mesh.straight_bar.straight_bar`.
         material: material of the bar.
         options: options of the solution.
 
     Returns:
-        The bar and its finest mesh, with the base at z = 0 and the tip at z = 1. The
-        section's y and z are along x and y.
+        The bar and its solution on the finest mesh. The base is at z = 0, and the tip
+        at z = 1. The section's y and z axes are along x and y.
     """
     centers = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     first, start = straight_bar(section), time.monotonic()
@@ -260,18 +262,20 @@ def _refined(
     start: float,
     pace: float = 1.0,
 ) -> tuple[Level, NDArray, NDArray, dict[str, Any]]:
-    """Solve on successively finer meshes until accuracy or budget is reached.
+    """Refine the mesh until the accuracy or a limit of the budget is reached.
 
     Args:
-        first: coarsest mesh.
-        materials: materials; the first fills the link, later ones fill their regions.
-        centers: (2, 3) [m] centres of base and tip.
+        first: first mesh.
+        materials: materials. The first is the material of the whole link, except in the
+            regions of the others.
+        centers: (2, 3) [m] centres of the base and the tip interface.
         options: options of the solution.
-        start: [s] start of the time budget.
-        pace: [-] current slowdown of this machine relative to an idle one.
+        start: [s] time at which the computation started.
+        pace: [-] ratio of the current solution time to that on an idle machine.
 
     Returns:
-        The finest mesh, the (6, 6) stiffness, the magnitude of its error, and the cost.
+        Solution on the finest mesh; stiffness, (6, 6); magnitude of its error, (6, 6);
+        and data on the computing time.
     """
     accuracy, interface, budget = options.accuracy, options.interface, options.budget
     begun = time.monotonic()
@@ -284,14 +288,14 @@ def _refined(
     while True:
         E, factor = estimated_error(history)
         K, error = middle_stiffness(history[-1][0], E, history[-1][2])
-        # a relative volume error may cause the same relative error of K in every motion
+        # a relative error of the volume can cause the same relative error of K
         error = error + level.volume_error * np.diag(np.diag(K))
         worst = float(np.abs(scaled(error, K)).max())
         _LOG.info("%d unknowns, error %.2g", level.solution.unknowns, worst)
         if worst <= accuracy or len(history) == budget.levels:
             break
         if level.volume_error > max(accuracy, 0.7 * worst):
-            break  # the facets in the file limit the accuracy
+            break  # the facets of the surface limit the accuracy
         growth = _wanted_growth(history, sizes, worst / accuracy)
         pace = _pace(level.solution.unknowns, time.monotonic() - begun)
         solid = _affordable_mesh(level, growth, budget, start, pace)
@@ -314,18 +318,18 @@ def _refined(
 
 
 def interface_center(surface: Surface, interface: Interface, name: str) -> NDArray:
-    """Return the reference point for the screws of an interface.
+    """Return the reference point of an interface.
 
     Args:
         surface: surface of the link.
-        interface: interface of the link.
-        name: base or tip, for messages.
+        interface: the interface.
+        name: ``"base"`` or ``"tip"``, for error messages.
 
     Returns:
-        (3,) [m] given point of a disc or bore, or area centroid of a plane.
+        (3,) [m] given point of a disc or a bore, or centroid of a planar interface.
 
     Raises:
-        BadInput: no part of the surface lies on the interface.
+        BadInput: no part of the surface is on the interface.
     """
     members = triangles_on(surface, interface, name)
     if interface.kind != "plane":
@@ -333,8 +337,7 @@ def interface_center(surface: Surface, interface: Interface, name: str) -> NDArr
     areas = np.linalg.norm(surface.normals()[members], axis=1)
     corners = surface.points[surface.triangles[members]]
     center = np.average(corners.mean(axis=1), axis=0, weights=areas)
-    # STL coordinates are single precision, so the centre is moved exactly onto the
-    # plane
+    # coordinates in STL files are rounded, so the centre is moved onto the plane
     height = (center - interface.point) @ interface.direction
     center = center - height * interface.direction
     return np.where(np.abs(center) < 1e-12 * surface.diagonal, 0.0, center)
@@ -347,22 +350,23 @@ def first_mesh(
     budget: Budget,
     cache: Path | str | None = None,
 ) -> Solid:
-    """Create a coarse starting mesh that resolves the walls of the part.
+    """Create a coarse mesh that follows the surface of the part.
 
     Args:
         surface: surface of the link.
-        base: the held interface.
-        tip: the moving interface.
-        budget: budget, whose time limits the mesher.
-        cache: folder in which meshes are stored; by default the user's cache folder.
+        base: clamped interface.
+        tip: loaded interface.
+        budget: limits on time and memory.
+        cache: folder in which meshes are stored. The default is the user's cache
+            folder.
 
     Returns:
-        The solid.
+        The mesh.
 
     Raises:
         BadInput: no part of the surface is on an interface.
-        MeshFailed: three attempts did not produce a usable mesh, or the time is
-            exhausted.
+        MeshFailed: three attempts did not result in a usable mesh, or the time limit
+            was exceeded.
     """
     wall = 2 * surface.volume / surface.area / surface.diagonal
     envelope, edge = min(2e-3, wall / 8), 0.1 * surface.diagonal
@@ -396,18 +400,18 @@ def first_mesh(
 
 
 def _pace(unknowns: int, seconds: float) -> float:
-    """Return the ratio of measured to expected solution time, at least 1."""
+    """Return the ratio of actual to expected solution time, at least 1."""
     return max(1.0, (seconds - _SETUP) / expected_cost(unknowns)[1])
 
 
 def _processor_seconds() -> float:
-    """Return the processor time [s] of this process and its finished children."""
+    """Return the processor time of this process and its finished children [s]."""
     return sum(os.times()[:4])
 
 
 def _pace_so_far(elapsed: float, busy: float) -> float:
     """Return the ratio of elapsed time to processor time, at least 1."""
-    # short times are unreliable; on Windows, the mesher's time is not measured
+    # short times are unreliable, and the time of the mesher is unknown on Windows
     if elapsed < _SETUP or os.name == "nt":
         return 1.0
     return max(1.0, elapsed / max(busy, 0.1 * elapsed))
@@ -416,7 +420,7 @@ def _pace_so_far(elapsed: float, busy: float) -> float:
 def _refuse_cost(
     unknowns: int, budget: Budget, spent: float, pace: float = 1.0
 ) -> None:
-    """Reject a first mesh on which the solution would exceed the budget."""
+    """Reject a first mesh whose solution would exceed the budget."""
     memory, seconds = expected_cost(unknowns)
     seconds *= pace
     if unknowns > budget.unknowns or spent + seconds > budget.seconds:
@@ -431,20 +435,20 @@ def _refuse_cost(
 def _wanted_growth(
     history: Sequence[tuple[NDArray, ...]], sizes: Sequence[int], excess: float
 ) -> float:
-    """Return the factor on the number of elements that divides the error by excess."""
-    rate = 1.3  # convergence rate in the number of elements; 2 for a smooth field
+    """Return the growth of the mesh that divides the error by ``excess``."""
+    rate = 1.3  # convergence rate with respect to the number of elements
     if len(history) > 1:
         before, now = (np.max(np.diag(e) / np.diag(K)) for K, e, _ in history[-2:])
         measured = math.log(max(before / now, 1.0)) / math.log(sizes[-1] / sizes[-2])
-        rate = min(max(measured, 1.0), 2.0)  # coarse meshes converge faster
+        rate = min(max(measured, 1.0), 2.0)  # the rate is higher for coarse meshes
     return float(np.clip((1.12 * excess) ** (1 / rate), 1.2, 6.0))
 
 
 def _affordable_mesh(
     level: Level, growth: float, budget: Budget, start: float, pace: float = 1.0
 ) -> Solid | None:
-    """Refine the mesh within the budget, by the wanted growth if possible."""
-    part = growth**0.55 - 1  # about as many elements are bisected as neighbours
+    """Refine the mesh by the wanted growth or as far as the budget permits."""
+    part = growth**0.55 - 1  # accounts for the bisected neighbours
     solid = refine_level(level, 1 + part)
     added = len(solid.cells) / len(level.solid.cells) - 1
     if not 0.85 < added / (growth - 1) < 1.08:
@@ -473,7 +477,7 @@ def _meshed(
     options: FemOptions,
     point_masses: Sequence[PointMass],
 ) -> MeshedLink:
-    """Return the link with all results on its finest mesh."""
+    """Create the link from the results on its finest mesh."""
     density = level.material[:, 2]
     mass, center, inertia = mass_properties(level.mesh, density, point_masses)
     link = LinkStiffness(

@@ -1,4 +1,4 @@
-"""Mass, centre of mass and inertia of a meshed link as a rigid body."""
+"""Mass properties of a meshed link."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,11 +11,11 @@ from forcefit.stiffness.fem.elements import Elements, integration
 
 @dataclass(frozen=True, eq=False)
 class PointMass:
-    """A point mass on the link, without effect on the stiffness.
+    """A point mass on a link.
 
     Attributes:
         mass: [kg] mass.
-        place: (3,) [m] position in the mesh's axes.
+        place: (3,) [m] position, in the axes of the mesh.
     """
 
     mass: float
@@ -28,13 +28,13 @@ def mass_properties(
     """Compute mass, centre of mass and inertia of the elements and point masses.
 
     Args:
-        mesh: the tetrahedra.
+        mesh: the elements.
         density: (t,) [kg/m^3] density of each element.
         point_masses: point masses to add to the elements.
 
     Returns:
-        Mass [kg], centre of mass (3,) [m], and inertia (3, 3) [kg m^2] about the centre
-        of mass; all zero if the mass is zero.
+        Mass [kg]; centre of mass, (3,) [m]; and inertia about the centre of mass, (3,
+        3) [kg m^2]. All are zero if the mass is zero.
     """
     origin = mesh.nodes.mean(axis=0)
     mass, first, second = 0.0, np.zeros(3), np.zeros((3, 3))

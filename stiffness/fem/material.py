@@ -1,4 +1,4 @@
-"""Materials of a link and the regions in which they apply."""
+"""Materials of a link and their regions."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -16,18 +16,19 @@ from forcefit.stiffness.mesh.regions import Region, region_of_places
 
 @dataclass(frozen=True, eq=False)
 class Material:
-    """An isotropic material and its region in the link.
+    """An isotropic material and its region in a link.
 
     Attributes:
         E: [Pa] Young's modulus.
         nu: [-] Poisson's ratio.
         density: [kg/m^3] density; 0 for a link without mass.
-        where: function that returns which points (n, 3) [m], in the mesh's axes, are in
-            the region of this material. Where regions overlap, the last material
-            applies. An element takes the material at its centre.
-        faces: faces of the region, along which the mesh is cut.
+        where: function of points, (n, 3) [m], that returns True for points in the
+            region of this material. In an overlap of regions, the last material is
+            used.
+        faces: faces of the region, at which elements are split.
         solid: name of the solid in a STEP file that consists of this material, or
-            ``one+other`` for two solids, in place of ``where`` and ``faces``.
+            ``one+other`` for two solids. It is used in place of ``where`` and
+            ``faces``.
     """
 
     E: float
@@ -49,16 +50,17 @@ def material_of_elements(
     """Evaluate the material of each element at its centre.
 
     Args:
-        mesh: the tetrahedra.
-        materials: materials; the first fills the link, later ones fill their regions.
-        cut_region: (t,) region of each element, counting only regions along whose
-            faces the mesh was cut; None if it was not cut.
+        mesh: the elements.
+        materials: materials. The first is the material of the whole link, except in the
+            regions of the others.
+        cut_region: (t,) number of the region of each element, for regions at whose
+            faces elements were split; None if no elements were split.
 
     Returns:
-        (t, 3) lambda [Pa], mu [Pa] and density [kg/m^3].
+        (t, 3) lambda [Pa], mu [Pa] and density [kg/m^3] of each element.
 
     Raises:
-        BadInput: no material is given, or the first one does not fill the link.
+        BadInput: no material is given, or the first has a region.
     """
     check_materials(materials)
     centers = mesh.nodes[mesh.cells[:, :4]].mean(axis=1)
@@ -70,31 +72,33 @@ def material_of_elements(
 
 
 def material_at(points: NDArray, materials: Sequence[Material]) -> NDArray:
-    """Evaluate the material at points of a link.
+    """Evaluate the material at points in a link.
 
     Args:
         points: (n, 3) [m] points.
-        materials: materials; the first fills the link, later ones fill their regions.
+        materials: materials. The first is the material of the whole link, except in the
+            regions of the others.
 
     Returns:
-        (n, 3) lambda [Pa], mu [Pa] and density [kg/m^3].
+        (n, 3) lambda [Pa], mu [Pa] and density [kg/m^3] at each point.
     """
     return _constants(materials)[region_of_places(points, regions_of(materials), None)]
 
 
 def _constants(materials: Sequence[Material]) -> NDArray:
-    """Return the (m, 3) lambda [Pa], mu [Pa] and density [kg/m^3] of materials."""
+    """Return lambda [Pa], mu [Pa] and density [kg/m^3] of each material, (m, 3)."""
     return np.array([(*lame(m.E, m.nu), m.density) for m in materials])
 
 
 def regions_of(materials: Sequence[Material]) -> tuple[Region, ...]:
-    """Return the regions of all materials except the first.
+    """Return the regions of all materials after the first.
 
     Args:
-        materials: materials; the first fills the link, later ones fill their regions.
+        materials: materials. The first is the material of the whole link, except in the
+            regions of the others.
 
     Returns:
-        The regions, of which later ones apply where they overlap.
+        The regions. In an overlap, the last region is used.
     """
     return tuple(
         Region(material.where or _everywhere, material.faces)
@@ -107,7 +111,7 @@ def _everywhere(points: NDArray) -> NDArray:
 
 
 def check_materials(materials: Sequence[Material]) -> None:
-    """Check that a link has a material.
+    """Check that there is at least one material.
 
     Args:
         materials: materials of the link.

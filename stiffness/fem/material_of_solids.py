@@ -1,4 +1,4 @@
-"""Regions of materials assigned to solids in a STEP file."""
+"""Materials of the solids in a STEP file."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -19,18 +19,18 @@ from forcefit.stiffness.surface.triangle_graph import TriangleGraph
 def placed_materials(
     surface: Surface, materials: Sequence[Material]
 ) -> tuple[Material, ...]:
-    """Find the region of each material that names solids in a STEP file.
+    """Find the region of each material that is assigned to solids in a STEP file.
 
     Args:
-        surface: surface of the link, with its solids.
-        materials: the first material fills the link, or each solid has a material.
+        surface: surface of the link.
+        materials: materials. Either the first is the material of the whole link, or
+            each solid has a material.
 
     Returns:
-        The materials, with regions in place of solid names.
+        The materials with regions in place of the names of solids.
 
     Raises:
-        BadInput: a named solid does not exist, solids overlap, or a solid has no
-            material.
+        BadInput: a solid does not exist, has no material or overlaps another solid.
     """
     named = [material for material in materials if material.solid]
     if not named:
@@ -61,14 +61,13 @@ def placed_materials(
         _placed(solids, names, material) if material.solid else material
         for names, material in zip(members, materials, strict=True)
     ]
-    # if each solid has a material, the first one also fills the space outside all
-    # solids
+    # if each solid has a material, the first is also used outside all solids
     first = replace(materials[0], solid="") if materials[0].solid else materials[0]
     return first, *placed[1:]
 
 
 def _members(name: str, solids: FilledSolids, material: Material) -> tuple[str, ...]:
-    """Return the names of the solids that consist of a material."""
+    """Return the names of the solids of a material."""
     text = material.solid
     names = (text,) if text in solids.names or not text else tuple(text.split("+"))
     for one in names if text else ():
@@ -81,7 +80,7 @@ def _members(name: str, solids: FilledSolids, material: Material) -> tuple[str, 
 def _placed(
     solids: FilledSolids, names: tuple[str, ...], material: Material
 ) -> Material:
-    """Replace solid names by the region and the boundary faces of the solids."""
+    """Replace the names of solids by their region and its faces."""
     triangles, within = solids.around(names)
     triangles = orient_shells(triangles)[0]
     used, index = np.unique(triangles, return_inverse=True)
@@ -98,7 +97,7 @@ def _placed(
 
 
 def _enclosed(bound: Surface, points: NDArray) -> NDArray:
-    """Return (n,) bool, True for points inside a closed surface."""
+    """Return whether each point is inside a closed surface, (n,)."""
     import pyvista
     from vtkmodules.util.numpy_support import vtk_to_numpy
     from vtkmodules.vtkFiltersModeling import vtkSelectEnclosedPoints

@@ -1,4 +1,4 @@
-"""Displacement fields of a meshed link under its own weight."""
+"""Displacements of a meshed link under its own weight."""
 
 from dataclasses import replace
 
@@ -13,15 +13,15 @@ from forcefit.stiffness.link import inverted
 
 
 def with_own_weight(solved: MeshedLink) -> MeshedLink:
-    """Add displacement fields due to own weight to the solution of a link.
+    """Add the displacements under unit gravity to the solution of a link.
 
     Args:
         solved: link solved on its finest mesh, with a density.
 
     Returns:
-        The link, whose solution now has nine fields (n, 3, 9): six [m] for unit screws
-            of the tip, and three [m per m/s^2] for unit gravity along x, y and z, with
-            the base held and the tip free.
+        The link with nine displacement fields, (n, 3, 9). The first six [m] are for
+        unit screws of the tip. The last three [m per m/s^2] are for unit gravity along
+        x, y and z with a clamped base and a free tip.
 
     Raises:
         BadInput: the link has no density, or both interfaces are distributing.
@@ -46,7 +46,7 @@ def with_own_weight(solved: MeshedLink) -> MeshedLink:
     upper = assemble(mesh, lam, mu)
     flat[free] = solve(upper[free][:, free], loads.reshape(-1, 3)[free])
     fields = flat.reshape(-1, 3, 3)
-    # because the tip is free, the weight does work on its motions
+    # add the motion of the free tip due to the weight
     if held.kind == "rigid":
         at_tip = np.einsum("nxk,nxg->kg", held.fields, loads)
         fields = fields + held.fields @ (inverted(held.stiffness) @ at_tip)
@@ -56,7 +56,7 @@ def with_own_weight(solved: MeshedLink) -> MeshedLink:
 
 
 def _nodal_masses(mesh: Elements, density: NDArray) -> NDArray:
-    """Integrate the density times each shape function (n,) [kg]."""
+    """Integrate the density times each shape function, (n,) [kg]."""
     masses = np.zeros(len(mesh.nodes))
     for part, _, _, N, _, w in integration(mesh, density > 0):
         share = (w * density[part, None]) @ N

@@ -1,4 +1,4 @@
-"""Text notation for parts of another material (boxes, solids) and point masses."""
+"""Text format of materials in a part of a link, and of point masses."""
 
 from functools import partial
 
@@ -22,19 +22,19 @@ _MASS = '"1.5/0,0,0.452", kilograms and a place in metres'
 
 
 def parse_part(option: str, text: str) -> Material:
-    """Parse a material that fills a box or solids in a STEP file.
+    """Parse the text of a material in a box or in solids of a STEP file.
 
     Args:
-        option: name of the option, for the error message.
-        text: ``x=a..b,y=a..b,z=a..b/young=..,poisson=..,density=..``, where omitted
-            axes are unbounded, or ``solid=one+other/young=..``. The density is
-            optional.
+        option: name of the option, for error messages.
+        text: ``x=a..b,y=a..b,z=a..b/young=..,poisson=..,density=..`` or
+            ``solid=one+other/young=..``. A box is unbounded along omitted axes, and the
+            density is optional.
 
     Returns:
         The material.
 
     Raises:
-        BadInput: the text does not have this form.
+        BadInput: the text has a different form.
     """
     region, slash, constants = text.rpartition("/")
     values = parse_assignments([constants], option) if slash else {}
@@ -56,7 +56,7 @@ def parse_part(option: str, text: str) -> Material:
 
 
 def _box(option: str, text: str, region: str) -> tuple[NDArray, NDArray]:
-    """Return the lower and upper corner of a box, infinite along omitted axes."""
+    """Return the lower and the upper corner of a box."""
     low, high = np.full(3, -np.inf), np.full(3, np.inf)
     for part in region.split(","):
         axis, _, span = (word.strip() for word in part.partition("="))
@@ -68,16 +68,16 @@ def _box(option: str, text: str, region: str) -> tuple[NDArray, NDArray]:
 
 
 def read_parts(link: Table) -> tuple[str, ...]:
-    """Read ``parts`` of a link's table, a list of texts for :func:`parse_part`.
+    """Read the key ``parts`` of a link in a TOML file.
 
     Args:
-        link: the table.
+        link: TOML table of the link.
 
     Returns:
-        The texts; an empty tuple if the key is absent.
+        The texts in the form of :func:`parse_part`, or an empty tuple.
 
     Raises:
-        BadInput: the value is not a list of such texts.
+        BadInput: the value is not a list of texts in this form.
     """
     given = link.get("parts", [])
     if not isinstance(given, list) or not all(isinstance(t, str) for t in given):
@@ -89,14 +89,14 @@ def read_parts(link: Table) -> tuple[str, ...]:
 
 
 def scaled_part(text: str, factor: float) -> str:
-    """Multiply Young's modulus in the text of a part by a factor.
+    """Multiply Young's modulus in the text of a material by a factor.
 
     Args:
-        text: text of :func:`parse_part`.
-        factor: [1] factor applied to the modulus.
+        text: text in the form of :func:`parse_part`.
+        factor: [1] factor on Young's modulus.
 
     Returns:
-        Text of the same part with the new modulus.
+        The text with the new modulus.
     """
     region, _, constants = text.rpartition("/")
     values = parse_assignments([constants], "part")
@@ -105,17 +105,17 @@ def scaled_part(text: str, factor: float) -> str:
 
 
 def parse_mass(option: str, text: str) -> PointMass:
-    """Parse a point mass such as ``1.5/0,0,0.452``.
+    """Parse the text of a point mass, such as ``1.5/0,0,0.452``.
 
     Args:
-        option: name of the option, for the error message.
-        text: mass and position.
+        option: name of the option, for error messages.
+        text: mass [kg] and position [m].
 
     Returns:
         The point mass.
 
     Raises:
-        BadInput: the text does not have this form.
+        BadInput: the text has a different form.
     """
     mass, _, place = text.partition("/")
     weight, point = comma_numbers(mass), comma_numbers(place)
@@ -125,7 +125,7 @@ def parse_mass(option: str, text: str) -> PointMass:
 
 
 def _planes(low: NDArray, high: NDArray) -> tuple[CutFace, ...]:
-    """Return the faces of a box, except those at infinity."""
+    """Return the finite faces of a box."""
     axes = np.eye(3)
     return tuple(
         CutFace(Plane(end[k] * axes[k], axes[k]))
@@ -136,5 +136,5 @@ def _planes(low: NDArray, high: NDArray) -> tuple[CutFace, ...]:
 
 
 def _inside(low: NDArray, high: NDArray, points: NDArray) -> NDArray:
-    """Return (n,) bool, True for points in a box."""
+    """Return whether each point is in a box, (n,)."""
     return np.asarray(((points >= low) & (points <= high)).all(axis=-1))

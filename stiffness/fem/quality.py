@@ -1,4 +1,4 @@
-"""Quality measures of tetrahedral meshes, for reports."""
+"""Quality measures of tetrahedral meshes."""
 
 from typing import Any
 
@@ -10,25 +10,24 @@ from forcefit.stiffness.mesh.lagrange import EDGES
 from forcefit.stiffness.mesh.solid import Solid, element_quality
 from forcefit.stiffness.surface.surface import directed_edges
 
-_FLAT = 0.01  # quality below which a tetrahedron is inaccurate and ill-conditioned
+_FLAT = 0.01  # quality below which a tetrahedron is reported as flat
 
 
 def mesh_report(solid: Solid, mesh: Elements) -> dict[str, Any]:
-    """Compute element counts, sizes and quality measures of a mesh.
+    """Compute the size and the quality measures of a mesh.
 
     Args:
-        solid: the straight tetrahedra.
-        mesh: elements of the solid, curved and with layers along singular edges.
+        solid: straight tetrahedra.
+        mesh: elements of the solid.
 
     Returns:
-        ``nodes`` and ``elements``; ``volume`` [m^3] and ``area`` [m^2] of the curved
-        elements; ``closed``, whether every boundary edge belongs to two faces;
+        Dictionary with ``nodes`` and ``elements``, their numbers; ``volume`` [m^3] and
+        ``area`` [m^2]; ``closed``, True if every boundary edge belongs to two faces;
         ``worst_quality`` and ``mean_quality``; ``smallest_angle`` and ``largest_angle``
         [rad] between two faces of a tetrahedron; ``flat_elements``, the number of
-        elements with a quality below 0.01; ``drawn_out``, whether the section of a bar
-        was extruded into long elements, which do not count as flat. Quality and angles
-        are evaluated before layers along singular edges are cut off, because these
-        layers are thin on purpose.
+        tetrahedra with a quality below 0.01; and ``drawn_out``, True for a bar of long
+        elements. Quality and angles are those of the straight tetrahedra, without the
+        thin layers along singular edges.
     """
     quality, angles = element_quality(solid), dihedral_angles(solid)
     edges = np.sort(directed_edges(solid.faces), axis=1)
@@ -52,11 +51,11 @@ def volume_error(solid: Solid, mesh: Elements) -> float:
     """Bound the relative difference between the volumes of the mesh and of the part.
 
     Args:
-        solid: the straight tetrahedra.
-        mesh: its elements.
+        solid: straight tetrahedra.
+        mesh: elements of the solid.
 
     Returns:
-        [-] bound relative to the volume of the part; zero if the surface is unknown.
+        [-] bound, or zero if the surface is unknown.
     """
     if solid.surface is None:
         return 0.0
@@ -66,22 +65,20 @@ def volume_error(solid: Solid, mesh: Elements) -> float:
 
 
 def dihedral_angles(solid: Solid) -> NDArray:
-    """Compute the angles between the faces of tetrahedra.
+    """Compute the angles between faces of tetrahedra.
 
     Args:
         solid: straight tetrahedra.
 
     Returns:
-        (t, 6) [rad] angles at the edges 01 02 03 12 13 23; arccos(1/3) in a regular
-        tetrahedron.
+        (t, 6) [rad] angles at the edges 01 02 03 12 13 23.
     """
     corners = solid.points[solid.cells]
     angles = []
     for i, j in EDGES:
         k, l = (v for v in range(4) if v not in (i, j))
         along = corners[:, j] - corners[:, i]
-        # positions of the two opposite corners, projected onto the plane normal to the
-        # edge
+        # the two opposite corners, projected onto a plane normal to the edge
         one, other = (np.cross(along, corners[:, v] - corners[:, i]) for v in (k, l))
         across = np.linalg.norm(np.cross(one, other), axis=1)
         angles.append(np.arctan2(across, np.einsum("ij,ij->i", one, other)))

@@ -1,7 +1,7 @@
-"""Sparse solver for symmetric positive definite systems with many right-hand sides.
+"""Solver for sparse symmetric positive definite systems.
 
 If the MKL package is installed, its PARDISO solver is used. Otherwise SciPy's SuperLU
-is used, which takes about ten times as long and twice the memory.
+is used, which needs about ten times the time and twice the memory.
 """
 
 import os
@@ -16,24 +16,23 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_array, csr_array, csr_matrix, triu
 from scipy.sparse.linalg import splu
 
-# Parameters iparm of PARDISO: the defaults for symmetric matrices, except for 8: no
-# iterative refinement, because the error of the solution enters the energy squared; 24:
-# two-level factorisation, which saves an eighth of the time; 37: rows whose patterns
-# agree to 90 %, such as the three rows of a node, form a block, which halves the time
-# of the analysis
+# Parameters iparm of PARDISO. Three of them differ from the defaults: 8, no iterative
+# refinement; 24, two-level factorisation, which saves an eighth of the time; and 37,
+# rows with nearly the same nonzero columns form a block, which halves the time of the
+# analysis.
 _SETTINGS = {1: 1, 2: 2, 8: 0, 10: 8, 18: -1, 24: 1, 37: -90}
 
 
 class FactorisationFailed(RuntimeError):
-    """A sparse factorisation failed."""
+    """Error of a sparse matrix factorisation."""
 
 
 @cache
 def solver_name() -> str:
-    """Return the name of the solver on this machine, ``"PARDISO"`` or ``"SuperLU"``."""
+    """Return the name of the fastest installed solver."""
     if find_spec("pypardiso") is None:
         return "SuperLU"
-    # pypardiso would search for MKL in every folder of Python, which takes seconds
+    # pypardiso would search all folders of the Python installation, which takes seconds
     if library := _mkl():
         os.environ.setdefault("PYPARDISO_MKL_RT", library)
     try:
@@ -44,7 +43,7 @@ def solver_name() -> str:
 
 
 def _mkl() -> str | None:
-    """Locate the MKL library in the file list of its package."""
+    """Find the MKL library in the list of files of its package."""
     try:
         listed = files("mkl") or []
     except PackageNotFoundError:
@@ -58,18 +57,19 @@ def _mkl() -> str | None:
 
 
 def solve(upper: csr_array, loads: NDArray, solver: str | None = None) -> NDArray:
-    """Solve K x = loads for symmetric positive definite K.
+    """Solve K x = loads for a symmetric positive definite matrix K.
 
     Args:
-        upper: (n, n) upper triangle of a symmetric positive definite matrix K.
+        upper: (n, n) upper triangle of K.
         loads: (n, k) right-hand sides.
-        solver: ``"PARDISO"`` or ``"SuperLU"``; by default the fastest one installed.
+        solver: ``"PARDISO"`` or ``"SuperLU"``. The default is the fastest installed
+            solver.
 
     Returns:
         (n, k) solutions.
 
     Raises:
-        FactorisationFailed: the matrix is singular, or the memory is insufficient.
+        FactorisationFailed: the matrix is singular, or there is not enough memory.
     """
     if (solver or solver_name()) == "PARDISO":
         return _solve_with_pardiso(upper, loads)
@@ -87,13 +87,13 @@ def solve(upper: csr_array, loads: NDArray, solver: str | None = None) -> NDArra
 
 
 def _solve_with_pardiso(upper: csr_array, loads: NDArray) -> NDArray:
-    """Solve with PARDISO, as symmetric positive definite matrix."""
+    """Solve with PARDISO."""
     import pypardiso
 
     solver = pypardiso.PyPardisoSolver(mtype=2)
     for number, value in _SETTINGS.items():
         solver.set_iparm(number, value)
-    # pypardiso requires csr_matrix instead of csr_array, with sorted 32-bit indices
+    # pypardiso requires a csr_matrix with sorted 32-bit indices
     matrix = csr_matrix(upper)
     matrix.sort_indices()
     try:
@@ -108,13 +108,13 @@ def _solve_with_pardiso(upper: csr_array, loads: NDArray) -> NDArray:
 
 
 def expected_cost(unknowns: int) -> tuple[float, float]:
-    """Estimate the solution cost from measurements with 40 k to 850 k unknowns.
+    """Estimate the memory and the time of a solution.
 
     Args:
         unknowns: number of rows of the matrix.
 
     Returns:
-        Memory [byte], and time [s] on two cores of a common computer.
+        Memory [byte], and time on two processor cores [s].
     """
     share = unknowns / 400e3
     memory, seconds = 3.8e9 * share**1.1, 20.0 * share**1.4

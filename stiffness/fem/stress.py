@@ -1,11 +1,9 @@
-"""Stress in a link under a tip wrench.
+"""Stresses in a meshed link under a tip wrench.
 
-Stresses superpose linearly, so six displacement fields suffice, one for each component
-of the wrench. At the edge of a rigid interface, the elastic solution is singular: the
-largest stress grows without bound as the mesh is refined and has no physical meaning.
-Stresses are therefore reported only beyond a certain distance from the interfaces, by
-default the interface radius, which the report states. Stresses within this distance and
-the effect of a real joint are not covered.
+The stresses are linear combinations of those due to six unit wrenches. At the edge of a
+rigid interface, the elastic stress is infinite, so the largest stress on a mesh has no
+physical meaning. Stresses are therefore evaluated only beyond a certain distance from
+the interfaces. The default distance is the radius of the interface.
 """
 
 from collections.abc import Mapping
@@ -34,21 +32,21 @@ from forcefit.stiffness.fem.stress_error import (
 )
 from forcefit.stiffness.link import inverted
 
-_CHUNK = 4096  # number of elements in a batch: 4096 x 20 x 36 numbers are 24 MB
+_CHUNK = 4096  # number of elements in a batch, whose stresses occupy 24 MB
 
 
 @dataclass(frozen=True, eq=False)
 class StressSource:
-    """Solved mesh from which a stress field was computed.
+    """Solved mesh from which stresses were computed.
 
     Attributes:
-        level: the solved mesh with n nodes, numbered by
+        level: solved mesh. Its nodes are numbered by
             :func:`forcefit.stiffness.fem.stress_error.nodes_by_material`.
-        far: (n,) bool, True for nodes beyond the excluded distance from interfaces.
+        far: (n,) bool, True for nodes beyond the excluded distance from the interfaces.
         singular: (n,) bool, True for nodes on re-entrant edges without a fillet.
         faceted: (n,) bool, True for nodes on surfaces whose shape was not recognised.
-        left_out: (n,) bool, True for nodes where the mesh deviates from the surface,
-            whose stresses are not reported.
+        left_out: (n,) bool, True for nodes that are excluded because the mesh deviates
+            from the surface there.
     """
 
     level: Level
@@ -60,19 +58,18 @@ class StressSource:
 
 @dataclass(frozen=True, eq=False)
 class StressInfluence:
-    """Nodal stresses due to unit tip wrenches, away from interfaces.
+    """Nodal stresses due to unit tip wrenches, at a distance from the interfaces.
 
     Attributes:
         places: (p, 3) [m] positions of the nodes, in the link's axes.
-        influence: (p, 6, 6) [Pa/(N m), Pa/N] stress xx yy zz yz xz xy for each
-            component of the wrench at the tip.  If the link's own weight is included
-            (:func:`forcefit.stiffness.fem.own_weight.with_own_weight`), the shape is
-            (p, 9, 6), where the last three rows [Pa per m/s^2] are for gravity. A
-            wrench then has nine components, with gravity last.
-        away: [m] smallest distance of these nodes from an interface.
-        reentrant_edges: whether some nodes lie on re-entrant edges without a fillet,
-            where the elastic stress is singular too.
-        source: mesh from which the stresses were computed; None if errors are unknown.
+        influence: (p, 6, 6) [Pa/(N m), Pa/N] stresses xx yy zz yz xz xy due to unit
+            wrenches at the tip. With own weight, the shape is (p, 9, 6), and the last
+            three rows are the stresses due to unit gravity along x, y and z [Pa per
+            m/s^2].
+        away: [m] smallest distance of the nodes from an interface.
+        reentrant_edges: True if some nodes are on re-entrant edges without a fillet,
+            where the elastic stress is infinite.
+        source: solved mesh, from which errors are estimated; None if it is unknown.
     """
 
     places: NDArray
@@ -85,7 +82,7 @@ class StressInfluence:
 
     @property
     def region(self) -> str:
-        """Description of the evaluated nodes."""
+        """Description of the region of the nodes."""
         words = (
             f"{len(self.places)} nodes at least {self.away:.4g} m away from both "
             "interfaces, whose clamped edges are singular"
@@ -107,34 +104,34 @@ class StressInfluence:
         """Compute the stresses due to a tip wrench.
 
         Args:
-            wrench: (6,) [N m, N] at the tip, in the link's axes.
+            wrench: (6,) [N m, N] wrench at the tip, in the axes of the link.
 
         Returns:
-            (p, 6) [Pa] stresses xx yy zz yz xz xy.
+            (p, 6) [Pa] stresses xx yy zz yz xz xy at the nodes.
         """
         return np.einsum("pws,w->ps", self.influence, np.asarray(wrench, dtype=float))
 
     def peak(self, wrench: ArrayLike) -> tuple[float, NDArray]:
-        """Find the largest von Mises stress due to a tip wrench, and its position.
+        """Find the largest von Mises stress due to a tip wrench and its position.
 
         Args:
-            wrench: (6,) [N m, N] at the tip, in the link's axes.
+            wrench: (6,) [N m, N] wrench at the tip, in the axes of the link.
 
         Returns:
-            Largest stress [Pa], and its position (3,) [m].
+            Largest stress [Pa], and its position, (3,) [m].
         """
         values = von_mises(self.stresses(wrench))
         worst = int(np.argmax(values))
         return float(values[worst]), self.places[worst]
 
     def peak_error(self, wrench: ArrayLike) -> float:
-        """Estimate the mesh error of the peak stress due to a tip wrench.
+        """Estimate the error of the peak stress due to a tip wrench.
 
         Args:
-            wrench: (6,) [N m, N] at the tip, in the link's axes.
+            wrench: (6,) [N m, N] wrench at the tip, in the axes of the link.
 
         Returns:
-            [Pa] error; infinite where the stress is singular, and NaN if the mesh is
+            [Pa] error, which is infinite at a singularity, and NaN if the mesh is
             unknown.
         """
         if self.source is None:
@@ -151,27 +148,26 @@ class StressInfluence:
         return estimated_error(level, motion, node, zone, self.source.left_out)
 
     def relative_error(self) -> float:
-        """Return the largest relative error of the peaks for six unit wrenches."""
+        """Return the largest relative error of the peaks under unit wrenches."""
         unit = np.eye(6, self.influence.shape[1])
         return max(self.peak_error(w) / self.peak(w)[0] for w in unit)
 
 
 @dataclass(frozen=True, eq=False)
 class PeakStress:
-    """Peak von Mises stress in a meshed link under one tip wrench.
+    """Peak von Mises stress in a meshed link under a tip wrench.
 
     Attributes:
-        wrench: (6,) [N m, N] at the tip, in the link's axes.
+        wrench: (6,) [N m, N] wrench at the tip, in the axes of the link.
         von_mises: [Pa] peak stress.
-        error: [Pa] estimated mesh error; infinite where the stress is singular.
+        error: [Pa] estimated error of the peak stress; infinite at a singularity.
         place: (3,) [m] position of the peak.
-        region: description of the evaluated points.
-        away: [m] smallest distance of these points from an interface.
-        beam: [Pa] peak stress and (3,) [m] its position by the beam formula, over the
-            part of the beam at least ``away`` from base and tip; None without a
+        region: description of the region in which the stress was evaluated.
+        away: [m] distance of this region from the interfaces.
+        beam: peak stress [Pa] and its position, (3,) [m], by beam theory in the same
+            region; None without a section.
+        beam_whole: [Pa] peak stress by beam theory in the whole beam; NaN without a
             section.
-        beam_whole: [Pa] peak stress by the beam formula over the whole length; NaN
-            without a section.
     """
 
     wrench: NDArray
@@ -193,23 +189,25 @@ def peak_stress(
     away: float | None = None,
     gravity: ArrayLike | None = None,
 ) -> PeakStress:
-    """Compute the peak stress due to a tip wrench by elements and by beam theory.
+    """Compute the peak stress by finite elements and by beam theory.
 
     Args:
         solved: result of :func:`forcefit.stiffness.fem.fea.solve_link`.
-        wrench: (6,) [N m, N] at the tip, in the link's axes.
-        section: section of a straight beam from base to tip, in the form of
+        wrench: (6,) [N m, N] wrench at the tip, in the axes of the link.
+        section: section of a straight beam from base to tip, see
             :func:`forcefit.stiffness.beam.beam_stress.peak_beam_stress`.
-        up: (3,) vector along the section's z axis, in the link's axes.
-        away: [m] excluded distance from interfaces; by default the interface radius.
-        gravity: (3,) [m/s^2] in the link's axes, for the link's own weight.
+        up: (3,) vector in the direction of the section's z axis.
+        away: [m] excluded distance from the interfaces. The default is the radius of
+            the interface.
+        gravity: (3,) [m/s^2] gravity, in the axes of the link, to include its own
+            weight.
 
     Returns:
-        The peak stress with its position and region.
+        The peak stress.
 
     Raises:
-        BadInput: all nodes are within this distance, the beam formula does not cover
-            the section, or gravity acts on a link without a density.
+        BadInput: all nodes are within the excluded distance, the section is invalid, or
+            gravity is given for a link without a density.
     """
     w = np.asarray(wrench, dtype=float)
     if section is not None:
@@ -235,7 +233,7 @@ def peak_stress(
     whole, _ = peak_beam_stress(section, length, in_beam, weight)
     near_tip = in_beam.copy()
     near_tip[:3] += np.cross([field.away, 0, 0], in_beam[3:])
-    # weight of the end piece, where stress is not evaluated
+    # weight of the beam within the excluded distance from the tip
     beyond = weight * field.away / length
     near_tip[:3] += np.cross([field.away / 2, 0, 0], beyond)
     near_tip[3:] += beyond
@@ -256,18 +254,18 @@ def peak_stress(
 
 
 def stress_influence(solved: MeshedLink, away: float | None = None) -> StressInfluence:
-    """Compute the stresses in a solved link due to six unit tip wrenches.
+    """Compute the nodal stresses due to unit tip wrenches.
 
     Args:
-        solved: result of :func:`forcefit.stiffness.fem.fea.solve_link`; a node between
-            two materials counts once per material.
-        away: [m] excluded distance from interfaces; by default the interface radius.
+        solved: result of :func:`forcefit.stiffness.fem.fea.solve_link`.
+        away: [m] excluded distance from the interfaces. The default is the radius of
+            the interface.
 
     Returns:
-        The stresses of unit wrenches.
+        The stresses. A node between two materials has a stress in each material.
 
     Raises:
-        BadInput: all nodes are within this distance.
+        BadInput: all nodes are within the excluded distance.
     """
     from scipy.spatial import cKDTree
 
@@ -277,7 +275,7 @@ def stress_influence(solved: MeshedLink, away: float | None = None) -> StressInf
     distance = max(radii) if away is None else away
     clamped = np.unique(mesh.faces[mesh.patch <= 1])
     gap = cKDTree(mesh.nodes[clamped]).query(mesh.nodes[node])[0]
-    far = gap >= distance * (1 - 1e-9)  # include a node at exactly this distance
+    far = gap >= distance * (1 - 1e-9)  # a node at exactly this distance is included
     if not far.any():
         raise BadInput(
             f"stress: found no node {distance:.4g} m away from the interfaces; "
@@ -306,15 +304,15 @@ def _peaks_on_facets(field: StressInfluence, wrench: NDArray) -> bool:
 
 
 def _motions(level: Level) -> NDArray:
-    """Return (k, k) tip motions due to unit wrenches and, if solved, unit gravity."""
-    # uses the stiffness of these fields, so that they balance the wrench exactly
+    """Return the factors of the displacement fields for each unit load, (k, k)."""
+    # the stiffness on this mesh is used, so that the stresses balance the wrench
     motions = np.eye(level.solution.fields.shape[2])
     motions[:6, :6] = inverted(level.solution.stiffness)
     return motions
 
 
 def _interface_radius(mesh: Elements, patch: int) -> float:
-    """Return the largest distance [m] of an interface's nodes from their centroid."""
+    """Return the largest distance of interface nodes from their centroid [m]."""
     faces = mesh.faces[mesh.patch == patch]
     N, area = triangle_areas(mesh, faces)
     first = np.einsum("tq,qa,tax->x", area, N, mesh.nodes[faces])
@@ -323,7 +321,7 @@ def _interface_radius(mesh: Elements, patch: int) -> float:
 
 
 def _nodal_stresses(level: Level) -> NDArray:
-    """Average the nodal stresses (n, k, 6) for each unit screw."""
+    """Average the stresses in elements at each node, (n, k, 6)."""
     cells, nodes = nodes_by_material(level)
     screws = np.eye(level.solution.fields.shape[2])
     total = np.zeros((len(nodes), len(screws), 6))

@@ -1,17 +1,15 @@
-r"""Error estimate for a peak stress, from differences between neighbouring elements.
+r"""Estimated error of the peak stress in a meshed link.
 
-At a common node, the stresses in neighbouring elements differ by about the mesh error.
-Their mean is the nodal stress. The estimated error is the root mean square of the
-largest deviations from this mean, times a factor. The root mean square is taken over
-the nodes of the elements at the peak and over all nodes with nearly as large a stress;
-the factor accounts for the fact that the peak is the largest of many values with
-errors. Nodes where the mesh deviates from the surface of the part are excluded, but if
-their stresses are larger, the difference is added to the error. At a singularity,
-neither the stress nor the error is defined.
+The stress at a node is the mean of the stresses in the adjacent elements. The estimated
+error is the root mean square of the largest deviations from this mean, times a safety
+factor. It is computed at the nodes of the elements around the peak and at all nodes
+with nearly the same stress. Nodes where the mesh deviates from the surface of the part
+are excluded. If the stress at an excluded node is larger than the peak, the difference
+is added to the error. At a singularity, the error is infinite.
 
 Sources:
-    Zienkiewicz & Zhu (1987), A simple error estimator, for the use of recovered
-    stresses as the more accurate ones.
+    Zienkiewicz & Zhu (1987), A simple error estimator, for the comparison of element
+    stresses with averaged stresses.
 """
 
 from typing import TYPE_CHECKING
@@ -28,25 +26,25 @@ from forcefit.stiffness.surface.facets import Facets
 if TYPE_CHECKING:
     from forcefit.stiffness.fem.adaptive_step import Level
 
-# ratio of peak error to the differences around the peak: at most 1.6, median 0.3, for 9
-# shouldered bars in tension, torsion and bending on their first meshes
+# largest ratio of the error of a peak stress to the deviations around the peak, for
+# nine shouldered bars in tension, torsion and bending; the median is 0.3
 SAFETY_FACTOR = 1.6
-# cosine of the largest angle between two patches of a smooth surface
+# cosine of the largest angle between the normals at a smooth edge
 _SMOOTH = np.cos(np.radians(5.0))
-# distance from the exact shape, relative to the face size, above which a face counts as
-# deviating; cubic faces follow a fillet to 1e-4
+# largest accepted distance of a node from the exact shape, relative to the face size;
+# for cubic faces on a fillet, the ratio is 1e-4
 _OFF = 5e-3
-ZONE = 0.9  # fraction of the peak above which a stress counts as nearly as large
+ZONE = 0.9  # fraction of the peak above which a stress is nearly the same
 
 
 def von_mises(stress: ArrayLike) -> NDArray:
-    """Compute the von Mises equivalent stress.
+    """Compute the von Mises stress.
 
     Args:
         stress: (..., 6) [Pa] components xx yy zz yz xz xy.
 
     Returns:
-        (...) [Pa] equivalent stress.
+        (...) [Pa] von Mises stress.
     """
     s = np.asarray(stress, dtype=float)
     x, y, z, yz, xz, xy = np.moveaxis(s, -1, 0)
@@ -55,16 +53,16 @@ def von_mises(stress: ArrayLike) -> NDArray:
 
 
 def element_stresses(level: "Level", members: NDArray, motion: NDArray) -> NDArray:
-    """Compute the stresses of elements at their nodes.
+    """Compute the stresses in elements at their nodes.
 
     Args:
         level: a solved mesh.
-        members: (c,) indices of elements.
-        motion: (6,) or (6, k) [rad, m] screws of the tip; (9, ...) with gravity [m/s^2]
-            if the solution has the fields of the link's own weight.
+        members: (c,) indices of the elements.
+        motion: (6,) or (6, k) [rad, m] screws of the tip. With own weight, the shape is
+            (9,) or (9, k), and the last three components are gravity [m/s^2].
 
     Returns:
-        (c, nodes, k, 6) [Pa] stresses xx yy zz yz xz xy; k = 1 for one screw.
+        (c, m, k, 6) [Pa] stresses xx yy zz yz xz xy at the m nodes of each element.
     """
     mesh = level.mesh
     fields = level.solution.fields @ np.reshape(motion, (len(motion), -1))
@@ -86,14 +84,15 @@ def element_stresses(level: "Level", members: NDArray, motion: NDArray) -> NDArr
 
 
 def nodes_by_material(level: "Level") -> tuple[NDArray, NDArray]:
-    """Number nodes separately for each material, because stresses jump at interfaces.
+    """Number nodes separately for each material.
 
     Args:
         level: a solved mesh of n nodes.
 
     Returns:
-        (t, k) new numbers of each element's nodes, and (m,) node of each new number.
-        With a single material, m equals n.
+        New node numbers of each element, (t, k), and the original number of each new
+        node, (m,). A node between two materials has two new numbers, because stresses
+        are discontinuous there.
     """
     cells, constants = level.mesh.cells, level.material[:, :2]
     kind = np.unique(constants, axis=0, return_inverse=True)[1].reshape(-1)
@@ -110,12 +109,11 @@ def estimated_error(
     """Estimate the error of a peak stress.
 
     Args:
-        level: a solved mesh of n nodes, numbered by :func:`nodes_by_material`.
+        level: a solved mesh. Its nodes are numbered by :func:`nodes_by_material`.
         motion: (6,) [rad, m] screw of the tip.
         node: number of the node with the peak.
-        zone: (n,) bool, True for nodes with nearly as large a stress.
-        left_out: (n,) bool, True for nodes where the mesh deviates from the surface,
-            and where the stress may be larger.
+        zone: (n,) bool, True for nodes with nearly the same stress.
+        left_out: (n,) bool, True for nodes where the mesh deviates from the surface.
 
     Returns:
         [Pa] estimated error.
@@ -129,7 +127,7 @@ def estimated_error(
 
 
 def _means_and_deviations(level: "Level", motion: NDArray) -> tuple[NDArray, NDArray]:
-    """Compute (n, 6) [Pa] nodal stresses, and (n,) the largest deviations from them."""
+    """Compute nodal stresses, (n, 6) [Pa], and the largest deviations, (n,) [Pa]."""
     cells, nodes = nodes_by_material(level)
     count = len(nodes)
     total, largest = np.zeros((count, 6)), np.zeros(count)
@@ -148,14 +146,14 @@ def on_inner_edges(level: "Level") -> NDArray:
         level: a solved mesh of n nodes.
 
     Returns:
-        (n,) bool, True if an element of the node touches an edge at which the shapes
-        meet at an angle without a fillet, or at which two materials meet at the
-        surface.
+        (n,) bool, True if an adjacent element touches a re-entrant edge without a
+        fillet or a boundary edge between two materials.
     """
     edges, cells = singular_edges(level.solid, ()), level.mesh.cells
     on = np.zeros(len(level.mesh.nodes), dtype=bool)
     if len(edges):
-        # coarse faces on a fillet meet at an angle, although their exact shapes do not
+        # the exact shapes are compared, because coarse faces on a fillet form sharp
+        # edges
         on[edges[_meet_at_an_angle(level, edges)]] = True
     if level.solid.region is not None:
         on[edges_between(level.solid, level.solid.region)] = True
@@ -164,7 +162,7 @@ def on_inner_edges(level: "Level") -> NDArray:
 
 
 def _meet_at_an_angle(level: "Level", edges: NDArray) -> NDArray:
-    """Return (e,) bool, True for edges where the adjacent shapes meet at an angle."""
+    """Return whether the adjacent shapes form a sharp edge, (e,)."""
     solid = level.solid
     count = np.int64(len(solid.points))
     pairs = np.sort(solid.faces[:, [[0, 1], [1, 2], [0, 2]]], axis=2)
@@ -190,9 +188,8 @@ def off_shapes(level: "Level") -> NDArray:
         level: a solved mesh of n nodes.
 
     Returns:
-        (n,) bool, True for nodes of elements with a node that is farther from the
-        shape of its patch than 0.5 % of the face size (elements that would be inverted
-        were straightened), and for nodes of neighbouring elements.
+        (n,) bool, True for nodes of elements, and of their neighbours, with a node
+        whose distance from the exact shape exceeds 0.5 % of the face size.
     """
     mesh = level.mesh
     off = np.zeros(len(mesh.nodes), dtype=bool)
@@ -216,7 +213,7 @@ def on_facets(level: "Level") -> NDArray:
         level: a solved mesh of n nodes.
 
     Returns:
-        (n,) bool, True where facets were treated as a smooth surface.
+        (n,) bool, True for nodes on these surfaces.
     """
     mesh, shapes = level.mesh, level.solid.shapes
     lifted = np.array([isinstance(shape, Facets) for shape in shapes], dtype=bool)

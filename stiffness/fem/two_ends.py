@@ -1,10 +1,9 @@
-"""Stiffness and consistent mass of a meshed link with two moving ends.
+"""Stiffness and mass matrix of a meshed link with two moving ends.
 
-Both ends are rigid and free to move, and the solid between them deforms statically
-(Guyan reduction). The mass matrix is therefore exact for rigid motions, and as accurate
-as that of a cubic beam element in bending. A motion of the base equals a rigid motion
-of the link minus the resulting motion of the tip, so the fields with a held base
-suffice.
+Both ends are rigid, and the solid between them deforms statically (Guyan reduction).
+The mass matrix is exact for rigid motions, and in bending as accurate as that of a
+cubic beam element. Because a rigid motion causes no deformation, the displacements due
+to a motion of the base follow from those due to a motion of the tip.
 """
 
 from dataclasses import dataclass
@@ -20,12 +19,11 @@ from forcefit.stiffness.screws import screw_map
 
 @dataclass(frozen=True, eq=False)
 class TwoEnds:
-    """Matrices of a link with two rigid ends, with rows for the base, then the tip.
+    """Stiffness and mass matrix of a link with two rigid ends, base before tip.
 
     Attributes:
-        stiffness: (12, 12) [N m/rad .. N/m] stiffness, for which rigid motions cause no
-            force.
-        mass: (12, 12) [kg m^2 .. kg] mass matrix, which is zero if the density is zero.
+        stiffness: (12, 12) [N m/rad .. N/m] stiffness matrix.
+        mass: (12, 12) [kg m^2 .. kg] mass matrix; zero if the density is zero.
     """
 
     stiffness: NDArray
@@ -33,13 +31,13 @@ class TwoEnds:
 
 
 def two_ends(solved: MeshedLink) -> TwoEnds:
-    """Condense a meshed link onto both ends.
+    """Condense a meshed link onto its two ends.
 
     Args:
         solved: link solved on its finest mesh.
 
     Returns:
-        Stiffness and mass of the link, in the mesh's axes.
+        Stiffness and mass matrix, in the axes of the mesh.
 
     Sources:
         Guyan (1965), Reduction of stiffness and mass matrices.
@@ -49,7 +47,7 @@ def two_ends(solved: MeshedLink) -> TwoEnds:
     if held.kind != "rigid":
         held = condense(mesh, constants[:, 0], constants[:, 1], solved.centers)
     base, tip = solved.centers
-    # motion of the tip relative to the rigid motion caused by the base
+    # motion of the tip relative to the rigid motion of the link with the base
     against = np.hstack([-screw_map(base - tip), np.eye(6)])
     K = against.T @ held.stiffness @ against
     fields = np.einsum("nik,kj->nij", held.fields, against)

@@ -1,4 +1,4 @@
-"""Tetrahedral meshes from a surface, refined where the solution is singular.
+"""Tetrahedral meshes of links.
 
-Start with ``mesh.py``.  ``lagrange.py`` numbers the nodes of curved elements.
+Start with ``mesh.py``, which meshes the surface of a link.
 """

@@ -1,11 +1,10 @@
-"""Nodes of curved elements, placed on the exact boundary shapes of a solid.
+"""Curved elements with boundary nodes on the exact shapes of a solid.
 
-The nodes of straight elements form a lattice.  Nodes on boundary edges are moved onto
-the shapes of their patches, inner faces follow their edges, and nodes on boundary faces
-are then moved onto their shapes. The mesh is conforming, and its geometric error is the
-interpolation error of the shapes. Cubic edges and faces interpolate the shapes at
-points where this error has zero mean, so the volume error decreases with the sixth
-power of the element size h.
+The nodes of a straight element form a regular lattice. First, the nodes on boundary
+edges are moved onto the shapes of their patches. The nodes on the adjacent faces are
+moved with them. The nodes on boundary faces are then moved onto the shapes. Cubic edges
+and faces interpolate the shapes at points where the mean of the interpolation error is
+zero, so the volume error decreases with the sixth power of the element size.
 """
 
 from collections.abc import Callable
@@ -28,12 +27,13 @@ from forcefit.stiffness.mesh.refine import refine
 from forcefit.stiffness.mesh.solid import Solid, node_patches, on_shapes
 from forcefit.stiffness.surface.primitives import Shape
 
-_LARGEST_MOVE = 0.05  # largest displacement of a node, relative to the part's size
-# ratio of the smallest to the largest Jacobian determinant in an element, below which
-# the element counts as inverted
+_LARGEST_MOVE = 0.05  # largest displacement of a node, relative to the size of the part
+# ratio of the smallest to the largest Jacobian determinant in an element below which
+# the element is treated as inverted
 _INVERTED = 0.05
-_PASSES = 3  # largest number of passes to bisect inverted elements
-# solution of 9 t^3 - 10 t^2 + 3.6 t = 0.4: value of two of three coordinates L
+_PASSES = 3  # maximum number of passes to bisect inverted elements
+# value of two barycentric coordinates of an interpolation point on a face, which is a
+# root of 9 t^3 - 10 t^2 + 3.6 t = 0.4
 _SAMPLE = 0.2128543571118083
 
 
@@ -42,12 +42,14 @@ class CurvedElements:
     """Elements of a solid with curved geometry.
 
     Attributes:
-        cells: (t, m) nodes of each tetrahedron, with its corners in increasing order.
+        cells: (t, m) indices of the nodes of each element, with its corners in
+            increasing order.
         nodes: (n, 3) [m] positions of the nodes.
-        patch: (t, 4) patch of each face, in the order of ``FACES``; -1 inside.
+        patch: (t, 4) patch of each face, in the order of ``FACES``; -1 for an inner
+            face.
         curved: (t,) bool, True for an element that is not straight.
-        inverted: (t,) bool, True for an element that was straightened because its
-            Jacobian changed sign.
+        inverted: (t,) bool, True for an element that was straightened because it would
+            be inverted.
     """
 
     cells: NDArray
@@ -65,7 +67,7 @@ def curved_elements(solid: Solid, order: int) -> CurvedElements:
         order: order of the elements, 2 or 3.
 
     Returns:
-        The elements, of which inverted ones are straightened stepwise until valid.
+        The elements. Elements that would be inverted are straightened.
     """
     corners = np.sort(solid.cells, axis=1)
     cells, count = numbered(corners, order)
@@ -108,15 +110,15 @@ def curved_elements(solid: Solid, order: int) -> CurvedElements:
 
 
 def patches_of_cells(faces: NDArray, patch: NDArray, corners: NDArray) -> NDArray:
-    """Find the patch of each face of the tetrahedra.
+    """Find the patch of each face of tetrahedra.
 
     Args:
-        faces: (f, 3) corners of the triangles on patches.
-        patch: (f,) patch numbers of these triangles.
-        corners: (t, 4) corners of the tetrahedra in increasing order.
+        faces: (f, 3) corners of the boundary triangles.
+        patch: (f,) patch number of each boundary triangle.
+        corners: (t, 4) corners of each tetrahedron in increasing order.
 
     Returns:
-        (t, 4) patches in the order of ``FACES``; -1 for a face on no patch.
+        (t, 4) patch of each face, in the order of ``FACES``; -1 for an inner face.
     """
     if not len(faces):
         return np.full((len(corners), 4), -1)
@@ -135,14 +137,14 @@ def patches_of_cells(faces: NDArray, patch: NDArray, corners: NDArray) -> NDArra
 
 
 def refine_inverted(solid: Solid, order: int) -> Solid:
-    """Bisect elements that would be inverted when their faces are curved.
+    """Bisect tetrahedra that would be inverted when they are curved.
 
     Args:
         solid: straight tetrahedra.
-        order: order of the elements to be created.
+        order: order of the curved elements, 2 or 3.
 
     Returns:
-        The solid, refined where a wall is thin relative to its radius of curvature.
+        The refined solid.
     """
     for _ in range(_PASSES):
         inverted = curved_elements(solid, order).inverted
@@ -155,26 +157,27 @@ def refine_inverted(solid: Solid, order: int) -> Solid:
 def _cubic_edges(
     ends: NDArray, pairs: NDArray, moved_nodes: Callable[[NDArray, NDArray], NDArray]
 ) -> NDArray:
-    """Return (t, 6, 2, 3) displacements of the two nodes at the thirds of each edge."""
-    # the shape is interpolated at the Lobatto points, where the error of a cubic
-    # against an arc has zero mean, and then evaluated at the thirds of the edge
+    """Return the displacements of the two nodes on each edge, (t, 6, 2, 3) [m]."""
+    # The shape is interpolated at the Lobatto points, so that the mean error of a cubic
+    # edge on an arc is zero. The interpolation is then evaluated at the nodes.
     s = (1 + np.array([-1, 1]) / np.sqrt(5)) / 2
     places = np.zeros((int(pairs.max()) + 1, 3))
     places[pairs] = ends[:, :, :1] + s[:, None] * (ends[:, :, 1:] - ends[:, :, :1])
     moved = (moved_nodes(places, pairs) - places)[pairs]
-    # the displacement is s (1 - s) (c_0 + c_1 (2 s - 1)); s (1 - s) is 1 / 5, then 2 /
-    # 9
+    # The displacement is s (1 - s) (c_0 + c_1 (2 s - 1)), where s (1 - s) is 1 / 5 at
+    # the Lobatto points and 2 / 9 at the nodes.
     c_0 = 5 / 2 * (moved[:, :, 1] + moved[:, :, 0])
     c_1 = 5 / 2 * np.sqrt(5) * (moved[:, :, 1] - moved[:, :, 0])
     return 2 / 9 * np.stack([c_0 - c_1 / 3, c_0 + c_1 / 3], axis=2)
 
 
 def _face_nodes_by_edges(moved: NDArray) -> NDArray:
-    """Compute (t, 4, 3) displacements of face nodes from those of edges (t, 20, 3)."""
-    # along an edge the displacement is L_a L_b (c_0 + c_1 (L_b - L_a)), extended over
-    # the faces; at the middle of a face each of its edges adds c_0 / 9
+    """Return displacements of face nodes due to those of edge nodes, (t, 4, 3) [m]."""
+    # The displacement due to an edge is L_a L_b (c_0 + c_1 (L_b - L_a)), which is c_0 /
+    # 9 in the middle of an adjacent face.
     carried = np.zeros((len(moved), 4, 3))
-    # at the thirds, L_a L_b is 2 / 9, so c_0 is the mean of the two nodes times 9 / 2
+    # L_a L_b is 2 / 9 at the nodes of an edge, so c_0 is their mean displacement times
+    # 9 / 2
     mean = moved[:, 4:16].reshape(-1, 6, 2, 3).mean(axis=2)
     for f, face in enumerate(FACES):
         around = [np.isin(edge, face).all() for edge in EDGES]
@@ -185,10 +188,10 @@ def _face_nodes_by_edges(moved: NDArray) -> NDArray:
 def _cubic_faces(
     corners: NDArray, patch: NDArray, shapes: tuple[Shape | None, ...], reach: float
 ) -> NDArray:
-    """Return (f, 3) displacements of face midpoints, given those of all other nodes."""
-    # interpolated at three points; there the cubic that equals the quartic x^2, with x
-    # = L_1 L_2 + L_2 L_3 + L_3 L_1, along the edges also has the integral of x^2, so
-    # that the error of a shape has zero mean
+    """Return the displacements of the nodes in the middle of faces, (f, 3) [m]."""
+    # The shape is interpolated at three points, so that the mean of the interpolation
+    # error is zero. At these points, with x = L_1 L_2 + L_2 L_3 + L_3 L_1, the cubic
+    # that interpolates x^2 and equals x^2 on the edges has the same integral as x^2.
     L = np.full((3, 3), _SAMPLE) + (1 - 3 * _SAMPLE) * np.eye(3)
     N, _ = shape_functions(3, L)
     places = N @ corners
@@ -203,7 +206,7 @@ def _cubic_faces(
 def _straightened(
     straight: NDArray, curved: NDArray, cells: NDArray, order: int
 ) -> tuple[NDArray, NDArray]:
-    """Straighten inverted elements; return the nodes and these elements."""
+    """Straighten inverted elements, and return which elements were straightened."""
     nodes = curved.copy()
     suspects = np.flatnonzero((curved != straight)[cells].any(axis=(1, 2)))
     places = np.concatenate([quadrature(6)[0], lattice(order) / order])
@@ -219,7 +222,7 @@ def _straightened(
             break
         inverted[bad] = True
         touched = np.unique(cells[bad])
-        # the loop terminates because straight elements are never inverted
+        # this loop ends because straight elements are not inverted
         kept = 0.5 if step < 4 else 0.0
         nodes[touched] += (1 - kept) * (straight - nodes)[touched]
     return nodes, inverted

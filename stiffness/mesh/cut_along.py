@@ -1,9 +1,9 @@
-"""Cutting of a mesh along the smooth outline of an interface.
+"""Splitting of a mesh along the smooth outline of an interface.
 
-The mesher reproduces only sharp edges. Where an interface continues into a fillet, mesh
-triangles cross the outline of the interface, and its area would be off by parts of
-these triangles. Corners near the outline are therefore moved onto it, and edges that
-still cross it are split.
+The mesher follows only the sharp edges of a surface. Where an interface continues into
+a fillet, mesh triangles cross the outline of the interface. To obtain the exact area of
+the interface, corners near the outline are moved onto the outline, and edges that still
+cross the outline are split.
 """
 
 from dataclasses import replace
@@ -16,21 +16,22 @@ from forcefit.stiffness.mesh.solid import Solid
 from forcefit.stiffness.mesh.split_crossing import split_crossing
 from forcefit.stiffness.surface.smooth_outline import SmoothOutline
 
-# distance within which a corner is moved onto the outline, relative to the shortest
-# edge at the corner
+# largest distance from the outline at which a corner is moved onto the outline,
+# relative to the shortest edge at the corner
 _NEAR = 0.3
-_REACH = 0.005  # largest displacement of a corner, relative to the part's size
+_REACH = 0.005  # largest displacement of a corner, relative to the size of the part
 
 
 def cut_along(solid: Solid, outline: SmoothOutline) -> Solid:
-    """Split a mesh so that no boundary triangle crosses an outline.
+    """Split a mesh so that no boundary triangle crosses the outline of an interface.
 
     Args:
-        solid: solid whose boundary corners are near the surface or on its shapes.
+        solid: straight tetrahedra.
         outline: outline of an interface.
 
     Returns:
-        The solid, with each triangle at the outline assigned to the patch on its side.
+        The split solid. Each triangle near the outline is assigned to the patch on its
+        side of the outline.
     """
 
     def crossing(finer: Solid, on: NDArray, ends: NDArray) -> tuple[NDArray, NDArray]:
@@ -41,19 +42,19 @@ def cut_along(solid: Solid, outline: SmoothOutline) -> Solid:
 
 
 def _members(solid: Solid, outline: SmoothOutline) -> NDArray:
-    """Return (f,) bool, True for boundary triangles of both patches at the outline."""
+    """Return whether each boundary triangle is on a patch at the outline, (f,)."""
     return np.isin(solid.patch, outline.patches)
 
 
 def _boundary_edges(solid: Solid, outline: SmoothOutline) -> NDArray:
-    """Return the (k, 2) edges of the triangles of both patches, corners ascending."""
+    """Return the edges of the triangles on both patches, (k, 2)."""
     faces = solid.faces[_members(solid, outline)]
     pairs = np.sort(faces[:, [[0, 1], [1, 2], [0, 2]]].reshape(-1, 2), axis=1)
     return np.unique(pairs, axis=0)
 
 
 def _corners_on(solid: Solid, outline: SmoothOutline) -> NDArray:
-    """Return (n,) bool, True for corners that count as on the outline."""
+    """Return whether each corner is on the outline, (n,)."""
     pairs = _boundary_edges(solid, outline)
     length = np.linalg.norm(
         solid.points[pairs[:, 0]] - solid.points[pairs[:, 1]], axis=1
@@ -75,11 +76,9 @@ def _corners_on(solid: Solid, outline: SmoothOutline) -> NDArray:
 def _crossing_edges(
     solid: Solid, outline: SmoothOutline, on: NDArray, ends: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Return (e,) bool, True for edges that cross the outline, and where they cross."""
+    """Return which edges cross the outline, (e,), and at which fraction."""
     pairs = _boundary_edges(solid, outline)
-    index = np.searchsorted(
-        edge_code(ends, len(on)), edge_code(pairs, len(on))
-    )  # both are sorted
+    index = np.searchsorted(edge_code(ends, len(on)), edge_code(pairs, len(on)))
     start, end = solid.points[pairs].swapaxes(0, 1)
     low, high = outline.outside(start), outline.outside(end)
     across = (low * high < 0) & ~on[pairs].any(axis=1)
@@ -95,12 +94,12 @@ def _crossing_edges(
 
 
 def _sides(solid: Solid, outline: SmoothOutline, on: NDArray) -> NDArray:
-    """Return (f,) patches, where triangles at the outline are assigned by side."""
+    """Assign the triangles near the outline to the patch on their side."""
     patch = solid.patch.copy()
     near = np.flatnonzero(_members(solid, outline) & on[solid.faces].any(axis=1))
     corners = solid.points[solid.faces[near]]
     away = outline.outside(corners.reshape(-1, 3)).reshape(-1, 3)
-    # a corner on the outline belongs to neither side
+    # corners on the outline are not on either side
     mean = np.where(on[solid.faces[near]], 0.0, away).sum(axis=1)
     mean = np.where(on[solid.faces[near]].all(axis=1), away.sum(axis=1), mean)
     patch[near] = np.where(mean > 0, outline.patches[1], outline.patches[0])

@@ -1,9 +1,8 @@
-"""Cutting of a mesh along a plane or a curved face inside a link.
+"""Splitting of a mesh along a plane or a curved face inside a link.
 
-Tetrahedra that are too large to follow a curved face are bisected first. Corners near
-the face are then moved onto it, and edges that still cross it are split. The cut
-extends slightly beyond the border of the face, so that it also divides the tetrahedra
-that contain this border.
+First, tetrahedra that are too large to follow a curved face are bisected. Corners near
+the face are then moved onto the face, and edges that still cross the face are split.
+Edges that pass the border of the face at a small distance are also split.
 """
 
 from dataclasses import dataclass, replace
@@ -23,41 +22,44 @@ from forcefit.stiffness.mesh.split_crossing import one_of_each, split_crossing
 from forcefit.stiffness.surface.facets import Facets
 from forcefit.stiffness.surface.primitives import Plane, Shape, project
 
-# distance within which a corner is moved onto the face, relative to its shortest edge
+# largest distance from the face at which a corner is moved onto the face, relative to
+# the shortest edge at the corner
 _NEAR = 0.3
-_REACH = 0.005  # largest displacement of a corner, relative to the part's size
-# smallest ratio of a tetrahedron's volume after and before its corners are moved
+_REACH = 0.005  # largest displacement of a corner, relative to the size of the part
+# smallest accepted ratio of the volumes of a tetrahedron after and before its corners
+# are moved
 _LEAST = 0.2
-# distance up to which a corner counts as on the face, relative to the part's size;
-# shapes are accurate to 2e-6
+# largest distance of a corner on the face from the face, relative to the size of the
+# part
 ON_FACE = 1e-6
-# cosine of the largest rotation of the normal of a curved face along an edge
+# cosine of the largest angle between the normals of a curved face at the ends of an
+# edge
 _TURN = np.cos(np.radians(35.0))
-_PASSES = 12  # largest number of passes to bisect oversized tetrahedra
+_PASSES = 12  # maximum number of passes to bisect large tetrahedra
 _HALVINGS = 12  # number of bisections to locate where an edge crosses a curved face
 
 
 @dataclass(frozen=True, eq=False)
 class CutFace:
-    """A face inside a link.
+    """A face inside a link, at which elements are split.
 
     Attributes:
         shape: shape of the face.
-        facets: facets of the face; None for the whole shape.
+        facets: facets that bound the face; None if the face is the whole shape.
     """
 
     shape: Shape
     facets: Facets | None = None
 
     def is_near(self, points: NDArray, reach: NDArray) -> NDArray:
-        """Return which points are near the face.
+        """Return whether each point is near the face.
 
         Args:
             points: (n, 3) [m] points.
-            reach: (n,) [m] distance that counts as near, for each point.
+            reach: (n,) [m] distance below which each point is near the face.
 
         Returns:
-            (n,) bool, True for a point closer than its ``reach``.
+            (n,) bool, True for a point near the face.
         """
         near = np.abs(self.shape.signed(points)[0]) <= reach
         if self.facets is not None and near.any():
@@ -66,13 +68,13 @@ class CutFace:
 
 
 def faces_inside(cells: NDArray) -> tuple[NDArray, NDArray]:
-    """Find the faces shared by two tetrahedra.
+    """Find the faces between two tetrahedra.
 
     Args:
         cells: (t, 4) corners of the tetrahedra.
 
     Returns:
-        (f, 3) corners of each face, and (f, 2) its two tetrahedra.
+        Corners of each face, (f, 3), and its two tetrahedra, (f, 2).
     """
     faces = np.sort(cells[:, FACES].reshape(-1, 3), axis=1)
     order = np.lexsort(faces.T)
@@ -82,11 +84,11 @@ def faces_inside(cells: NDArray) -> tuple[NDArray, NDArray]:
 
 
 def face_code(corners: NDArray, points: int) -> NDArray:
-    """Return a number that identifies the corners of each triangle in any order.
+    """Return a number that identifies each triangle, whatever the order of its corners.
 
     Args:
-        corners: (..., 3) corners in any order.
-        points: number of points of the mesh.
+        corners: (..., 3) corners of triangles.
+        points: number of points in the mesh.
 
     Returns:
         (...) numbers.
@@ -97,14 +99,14 @@ def face_code(corners: NDArray, points: int) -> NDArray:
 
 
 def cut(solid: Solid, face: CutFace) -> Solid:
-    """Cut a mesh along a face.
+    """Split a mesh along a face.
 
     Args:
-        solid: solid to be cut.
+        solid: straight tetrahedra.
         face: face inside the solid.
 
     Returns:
-        The solid, with the triangles on the face added to its ``inner`` triangles.
+        The split solid. Its ``inner`` triangles include those on the face.
     """
     if not isinstance(face.shape, Plane):
         solid = _resolved(solid, face)
@@ -117,14 +119,14 @@ def cut(solid: Solid, face: CutFace) -> Solid:
 
 
 def without_chords(solid: Solid) -> Solid:
-    """Split edges whose two ends are on a curved face but whose inside is not.
+    """Split edges that are chords of a curved face.
 
     Args:
-        solid: solid with ``inner`` triangles.
+        solid: straight tetrahedra.
 
     Returns:
-        The solid without such edges. Otherwise, a tetrahedron could have two sides on a
-        curved face and become flat when these sides are curved.
+        The solid without chords, of which both ends but no inner points are on the
+        face. A tetrahedron with two faces on a curved face would become flat.
     """
     for number in np.unique(solid.inner_patch):
         if isinstance(solid.shapes[number], Plane):
@@ -170,7 +172,7 @@ def _resolved(solid: Solid, face: CutFace) -> Solid:
 def _crossing(
     solid: Solid, face: CutFace, on: NDArray, ends: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Return (e,) bool, True for edges that cross the face, and where they cross."""
+    """Return which edges cross the face, (e,), and at which fraction."""
     value = np.where(on, 0.0, face.shape.signed(solid.points)[0])
     low, high = value[ends].T
     across = low * high < 0
@@ -181,7 +183,7 @@ def _crossing(
     found = _share_of_crossing(face.shape, start, end, low[across], high[across])
     share[across] = found
     if face.facets is not None:
-        # edges of tetrahedra that the face intersects are near the face
+        # only edges near the face are evaluated
         _, of_cell = edges_of(solid.cells, len(solid.points))
         length = np.linalg.norm(np.diff(solid.points[ends], axis=1)[:, 0], axis=1)
         reach = np.zeros(len(ends))
@@ -196,7 +198,7 @@ def _crossing(
 def _share_of_crossing(
     shape: Shape, start: NDArray, end: NDArray, low: NDArray, high: NDArray
 ) -> NDArray:
-    """Find numerically the fractions (e,) at which edges cross a shape."""
+    """Find the fraction of each edge at which the edge crosses a shape, (e,)."""
     left, right = np.zeros(len(low)), np.ones(len(low))
     for _ in range(0 if isinstance(shape, Plane) else _HALVINGS):
         middle = (left + right) / 2
@@ -209,13 +211,13 @@ def _share_of_crossing(
 
 
 def _with_cut(solid: Solid, on: NDArray, face: CutFace) -> Solid:
-    """Add the triangles on a face to the inner triangles of a solid."""
+    """Add the triangles on a face to the ``inner`` triangles of a solid."""
     number, count = len(solid.shapes), len(solid.points)
     solid = replace(solid, shapes=(*solid.shapes, face.shape))
     faces, owners = faces_inside(solid.cells)
     size = float(np.linalg.norm(np.ptp(solid.points, axis=0)))
     known = face_code(solid.inner, count)
-    for _ in range(2):  # moving corners may bring others onto the face
+    for _ in range(2):  # moved corners can be on the face
         value = face.shape.signed(solid.points)[0]
         on |= np.abs(value) < ON_FACE * size
         side = np.sign(np.where(on, 0.0, value)[solid.cells].sum(axis=1))
@@ -229,7 +231,7 @@ def _with_cut(solid: Solid, on: NDArray, face: CutFace) -> Solid:
 
 
 def _onto(solid: Solid, face: CutFace) -> tuple[Solid, NDArray]:
-    """Move the corners near a face onto it; also return which are on it."""
+    """Move corners near a face onto the face, and find the corners on it."""
     size = float(np.linalg.norm(np.ptp(solid.points, axis=0)))
     height = np.abs(face.shape.signed(solid.points)[0])
     ends, _ = edges_of(solid.cells, len(solid.points))
@@ -241,7 +243,7 @@ def _onto(solid: Solid, face: CutFace) -> tuple[Solid, NDArray]:
         np.maximum.at(longest, ends[:, k], length)
     near = height < reach
     near[near] = face.is_near(solid.points[near], longest[near])
-    # corners beyond the border are moved too, because the cut extends beyond it
+    # corners slightly beyond the border are moved too
     near |= height < ON_FACE * size
     target, on = _targets(solid, face.shape, near, reach, ON_FACE * size)
     already, before = on & (height < ON_FACE * size), solid.volumes()
@@ -256,8 +258,8 @@ def _onto(solid: Solid, face: CutFace) -> tuple[Solid, NDArray]:
 def _targets(
     solid: Solid, shape: Shape, near: NDArray, reach: NDArray, close: float
 ) -> tuple[NDArray, NDArray]:
-    """Return (n, 3) [m] target positions, and (n,) bool, True for movable corners."""
-    # corners on the boundary or on other inner faces must stay on their shapes
+    """Return target positions, (n, 3) [m], and which corners can be moved, (n,)."""
+    # corners on the boundary or on other inner faces stay on their shapes
     target, on = solid.points.copy(), np.zeros(len(near), dtype=bool)
     free = near.copy()
     groups = [(key, group[near[group]]) for key, group in corner_groups(solid)]

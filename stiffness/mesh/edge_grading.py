@@ -1,17 +1,15 @@
-r"""Layers of thin elements along edges at which the stress is singular.
+r"""Thin elements along edges at which the stress is singular.
 
-Strains increase as r^(a - 1) with a < 1 near two kinds of edges: re-entrant edges of
-the part, and edges that separate a clamped from a free face.  Elements of uniform size
-converge slowly there, regardless of their polynomial degree. A layer of elements that
-are thin across the edge, and as long along it as their neighbours, removes most of the
-error at little cost.
+At a distance r from a singular edge, strains are proportional to r^(a - 1) with a < 1.
+Singular edges are re-entrant edges of the part, and edges between a clamped and a free
+face. Elements of uniform size converge slowly at such edges. A layer of thin elements
+along the edge removes most of the error.
 
-A tetrahedron with an edge on a singular edge is cut into a wedge along this edge and a
-remaining part.  The cut divides its remaining edges in the same ratio, measured from
-the singular edge.  A tetrahedron with only a corner on a singular edge is cut into a
-small tetrahedron and a remaining part.  Neighbours cut their common face at the same
-points. Cuts are made in the coordinates of the curved element, so thin layers follow a
-round edge.
+A tetrahedron with one edge on a singular edge is divided into a wedge along this edge
+and a second part. A tetrahedron with one corner on a singular edge is divided into a
+small tetrahedron and a second part. The points of division are at the same fraction of
+each edge, so that neighbours are divided at the same points. They are defined in the
+coordinates of the curved element, so that the layer follows a curved edge.
 """
 
 from dataclasses import dataclass
@@ -29,21 +27,20 @@ from forcefit.stiffness.mesh.refine import (
 from forcefit.stiffness.mesh.regions import Region, material_edges
 from forcefit.stiffness.mesh.solid import Solid, moved_onto_shapes
 
-ENDS = (0, 1)  # patches of base and tip; distributed tractions end at their outlines
-# ratio of layer thickness to element size; values from 0.15 to 0.3 are equally accurate
+ENDS = (0, 1)  # patches of base and tip, at whose outlines the stress is singular
+# ratio of layer thickness to element size; results are similar from 0.15 to 0.3
 LAYER_SHARE = 0.25
-# largest number of passes to split edges between singular edges; 3 to 12 suffice for
-# the parts in meshes/
+# maximum number of passes to split edges; 3 to 12 suffice for the parts in meshes/
 _PASSES = 100
-# cosine of 35 degrees: the stress at a flatter re-entrant edge is hardly singular
+# cosine of the smallest angle by which a re-entrant edge exceeds 180 degrees
 _REENTRANT = np.cos(np.radians(35.0))
-# edges that are cut, for a singular corner or a singular edge; singular corners first
+# divided edges of a tetrahedron with one or two singular corners, which come first
 _CUT_EDGES = {1: [[0, 1], [0, 2], [0, 3]], 2: [[0, 2], [0, 3], [1, 2], [1, 3]]}
-# Pieces of a cut tetrahedron: a small tetrahedron and a prism, or two prisms.  Corners
-# are numbered 0 to 3, and cut points from 4 on, in the order above. Each prism is
-# divided into three tetrahedra. The diagonal of each side starts at the smallest
-# number, so that neighbours agree (Dompierre et al. 1999). Because corner numbers
-# increase and cut points come last, the diagonals are the same in all tetrahedra.
+# A divided tetrahedron consists of a small tetrahedron and a prism, or of two prisms.
+# Corners have the numbers 0 to 3, and the points on divided edges have the next
+# numbers. Each prism consists of three tetrahedra. The diagonal of each side starts at
+# the smallest number, so that neighbours have the same diagonal (Dompierre et al.
+# 1999).
 _PARTS = {
     1: np.array([[0, 4, 5, 6], [1, 3, 2, 6], [1, 6, 2, 5], [1, 6, 5, 4]]),
     2: np.array([
@@ -55,14 +52,14 @@ _PARTS = {
 
 @dataclass(frozen=True, eq=False)
 class Parts:
-    """Tetrahedra of a solid, cut into smaller tetrahedra (parts).
+    """Parts into which the tetrahedra of a solid are divided.
 
     Attributes:
-        corners: (t, 4) numbers of the parts' corners, increasing in each row; a number
-            below the number of the solid's points denotes a corner of the solid.
-        places: (t, 4, 4) barycentric coordinates of the corners in their parent
+        corners: (t, 4) corners of each part, in increasing order. The corners of the
+            solid have the lowest numbers.
+        places: (t, 4, 4) barycentric coordinates of the corners of each part in its
             tetrahedron, whose corners are in increasing order.
-        parent: (t,) tetrahedron of the solid that contains each part.
+        parent: (t,) index of the tetrahedron that contains each part.
     """
 
     corners: NDArray
@@ -71,29 +68,29 @@ class Parts:
 
 
 def whole_elements(solid: Solid) -> Parts:
-    """Return all tetrahedra uncut, each as a single part."""
+    """Return each tetrahedron of a solid as a single part."""
     count = len(solid.cells)
     places = np.broadcast_to(np.eye(4), (count, 4, 4))
     return Parts(np.sort(solid.cells, axis=1), places, np.arange(count))
 
 
 def singular_edges(solid: Solid, held: tuple[int, ...]) -> NDArray:
-    """Find the edges of a solid at which stresses are singular.
+    """Find the edges at which stresses are singular.
 
     Args:
-        solid: solid with patches.
-        held: patches that are clamped or loaded.
+        solid: straight tetrahedra.
+        held: numbers of the patches that are clamped or loaded.
 
     Returns:
-        (e, 2) corners of the edges: outlines of the clamped patches, and re-entrant
-        edges between patches that meet at more than 215 degrees.
+        (e, 2) corners of each edge. Singular edges are the outlines of these patches,
+        and edges with an inner angle above 215 degrees.
     """
     count = len(solid.points)
     pairs = np.sort(solid.faces[:, [[0, 1], [1, 2], [0, 2]]], axis=2)
     code = edge_code(pairs, count).ravel()
     order = np.argsort(code, kind="stable")
     code, owner = code[order], order // 3
-    # where two bodies touch, an edge has four faces, and any pairing of them is valid
+    # an edge at which two bodies touch has four faces, which can be paired in any order
     code, left, right = code[::2], owner[::2], owner[1::2]
     border = solid.patch[left] != solid.patch[right]
     clamped = np.isin(solid.patch[left], held) | np.isin(solid.patch[right], held)
@@ -110,15 +107,15 @@ def singular_edges(solid: Solid, held: tuple[int, ...]) -> NDArray:
 def graded_edges(
     solid: Solid, held: tuple[int, ...], regions: tuple[Region, ...]
 ) -> NDArray:
-    """Find the singular edges, including boundary edges between two materials.
+    """Find the singular edges, including those between two materials.
 
     Args:
-        solid: solid with patches.
-        held: patches that are clamped or loaded.
+        solid: straight tetrahedra.
+        held: numbers of the patches that are clamped or loaded.
         regions: regions of the link.
 
     Returns:
-        (e, 2) corners of the edges.
+        (e, 2) corners of each edge.
     """
     both = (singular_edges(solid, held), material_edges(solid, regions))
     return np.unique(np.concatenate(both), axis=0) if len(both[1]) else both[0]
@@ -127,16 +124,16 @@ def graded_edges(
 def split_joining_edges(
     solid: Solid, held: tuple[int, ...], regions: tuple[Region, ...] = ()
 ) -> Solid:
-    """Split the edges that connect two singular edges.
+    """Split edges that connect two singular edges.
 
     Args:
-        solid: solid with patches.
-        held: patches that are clamped or loaded.
+        solid: straight tetrahedra.
+        held: numbers of the patches that are clamped or loaded.
         regions: regions of the link.
 
     Returns:
-        A solid in which each tetrahedron has at most one corner or one edge on singular
-        edges, except for a few that may remain after a hundred passes.
+        The split solid. Nearly all of its tetrahedra have at most one corner or one
+        edge on singular edges.
     """
     settled = False
     for _ in range(_PASSES):
@@ -147,7 +144,7 @@ def split_joining_edges(
         ends, of_cell = edges_of(solid.cells, count)
         joining = touched[ends].all(axis=1)
         rank = length_ranks(solid.points, ends)
-        # if a triangle has three singular edges, its longest edge is split too
+        # of three singular edges that form a triangle, the longest edge is split too
         triangle = joining[of_cell].sum(axis=1) > 2
         longest = np.where(joining, rank, -1)[of_cell].argmax(axis=1)
         longest = of_cell[np.arange(len(of_cell)), longest]
@@ -159,7 +156,8 @@ def split_joining_edges(
                 return solid
             solid, settled = moved_onto_shapes(solid), True
             continue
-        # first split edges that are the longest such edge in all their tetrahedra
+        # an edge is split first if it is the longest such edge in all adjacent
+        # tetrahedra
         rank[~joining] = -1
         highest = rank[of_cell].max(axis=1)
         own = rank[of_cell] == np.maximum(highest, 0)[:, None]
@@ -175,26 +173,27 @@ def layered(
     share: float = LAYER_SHARE,
     regions: tuple[Region, ...] = (),
 ) -> Parts:
-    """Cut a layer of thin parts along the singular edges.
+    """Divide the tetrahedra along singular edges.
 
     Args:
         solid: result of :func:`split_joining_edges`.
-        held: patches that are clamped or loaded.
-        share: thickness of the layer, as a fraction of each edge from its singular end.
+        held: numbers of the patches that are clamped or loaded.
+        share: thickness of the layer of thin elements, as a fraction of each divided
+            edge.
         regions: regions of the link.
 
     Returns:
-        The parts. Tetrahedra without a singular corner or edge remain uncut.
+        The parts of all tetrahedra.
     """
     parts = whole_elements(solid)
     count = len(solid.points)
     touched = np.zeros(count, dtype=bool)
     touched[graded_edges(solid, held, regions)] = True
-    # tetrahedra that touch several singular edges are not cut
+    # tetrahedra that touch several singular edges are not divided
     while (several := touched[parts.corners].sum(axis=1) > 2).any():
         touched[parts.corners[several]] = False
     on = touched[parts.corners]
-    # singular corners come first; the orientation of the tetrahedron is irrelevant
+    # singular corners come first
     order = np.argsort(~on, axis=1, kind="stable")
     corners = np.take_along_axis(parts.corners, order, axis=1)
     places = np.take_along_axis(parts.places, order[:, :, None], axis=1)

@@ -1,4 +1,4 @@
-"""Assignment of a mesh boundary to the patches of a surface."""
+"""Assignment of the boundary of a mesh to the patches of a surface."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,26 +14,26 @@ from forcefit.stiffness.surface.true_surface import TrueSurface
 
 
 class MeshFailed(BadInput):
-    """The mesher produced no usable mesh of a valid surface."""
+    """Error of a mesh generation from a valid surface."""
 
 
 def fit_to_patches(
     points: NDArray, cells: NDArray, surface: Surface, patches: Patches
 ) -> Solid:
-    """Assign boundary triangles to patches, and project corners onto the exact shapes.
+    """Assign boundary triangles to patches, and move corners onto the exact shapes.
 
     Args:
-        points: (n, 3) [m] corners of the mesh.
-        cells: (t, 4) tetrahedra of either orientation.
-        surface: the surface that was meshed.
-        patches: patches of the surface, with their shapes.
+        points: (n, 3) [m] positions of the corners.
+        cells: (t, 4) corners of the tetrahedra, in either orientation.
+        surface: surface of the link.
+        patches: patches of the surface.
 
     Returns:
-        The solid. A corner is moved less if it would otherwise invert a tetrahedron.
+        The solid. A corner is moved only as far as no tetrahedron becomes inverted.
 
     Raises:
-        MeshFailed: the volumes of mesh and part differ by more than 2 %, the number of
-            holes differs, or an interface has no face.
+        MeshFailed: the volumes of mesh and part differ by more than 2 %, the numbers of
+            holes differ, or no face is on an interface.
     """
     points, cells = _positive_cells(points, cells)
     faces = boundary_faces(cells)
@@ -52,7 +52,7 @@ def fit_to_patches(
         )
     if (least := float(element_quality(solid).min())) <= 0:
         raise MeshFailed(f"{surface.name}: an element is inverted, quality {least:.2g}")
-    # losing a hole in a thin wall hardly changes the volume, but changes the stiffness
+    # a missing hole in a thin wall changes the stiffness but hardly the volume
     holes, expected = (euler_characteristic(f) for f in (faces, surface.triangles))
     if holes != expected:
         raise MeshFailed(
@@ -68,7 +68,7 @@ def fit_to_patches(
 
 
 def _positive_cells(points: NDArray, cells: NDArray) -> tuple[NDArray, NDArray]:
-    """Return the used points, and the cells reoriented to positive volume."""
+    """Remove unused points, and orient all tetrahedra to positive volume."""
     used, cells = np.unique(cells, return_inverse=True)
     points, cells = points[used], cells.reshape(-1, 4)
     a, b, c, d = np.moveaxis(points[cells], 1, 0)
@@ -80,7 +80,7 @@ def _positive_cells(points: NDArray, cells: NDArray) -> tuple[NDArray, NDArray]:
 def _nearest_patch(
     points: NDArray, faces: NDArray, surface: Surface, patches: Patches
 ) -> NDArray:
-    """Find the nearest patch with a similar normal for each boundary face."""
+    """Find the nearest patch with a similar normal to each boundary face."""
     import pyvista
 
     mesh = pyvista.PolyData.from_regular_faces(surface.points, surface.triangles)

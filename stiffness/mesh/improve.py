@@ -1,12 +1,11 @@
-"""Improvement of poorly shaped tetrahedra by moving corners and splitting inner edges.
+"""Improvement of flat tetrahedra.
 
-When corners are moved onto the shapes of the part, tetrahedra may become flat, in
-particular where two shapes meet tangentially and all corners of a tetrahedron are on
-the boundary. An inner edge of such a tetrahedron is split. Corners are then moved, on
-their shapes or inside the part, to the position that maximises the quality of the worst
-adjacent tetrahedron.
+When corners are moved onto the shapes of a part, tetrahedra may become flat. If all
+corners of a flat tetrahedron are on the boundary, one of its inner edges is split. Each
+corner is then moved to the position that maximises the quality of the worst adjacent
+tetrahedron. Corners on the boundary stay on their shapes.
 
-Source: Freitag & Ollivier-Gooch (1997), local optimisation of the worst element.
+Source: Freitag & Ollivier-Gooch (1997) for the optimisation of the worst element.
 """
 
 from dataclasses import replace
@@ -29,30 +28,28 @@ from forcefit.stiffness.mesh.solid import (
 from forcefit.stiffness.mesh.split_crossing import one_of_each
 from forcefit.stiffness.surface.primitives import project
 
-# quality below which a tetrahedron is improved; those from pytetwild are better
+# quality below which a tetrahedron is improved
 POOR = 0.08
 _ROUNDS = 4
-# number of steps in the search for a corner position; a step without improvement is
-# halved
+# number of steps in the search for the position of a corner
 _STEPS = 10
 _DIRECTIONS = np.array([d for d in product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
 
 
 def fitted(solid: Solid, limit: float | None = None) -> Solid:
-    """Move corners onto their shapes, and improve tetrahedra that become flat.
+    """Move corners onto their shapes, and improve flat tetrahedra.
 
     Args:
-        solid: solid whose corners may be off the shapes of their patches.
-        limit: [-] quality below which tetrahedra are improved; by default :data:`POOR`,
-            or a lower value if the tetrahedra of the solid are worse.
+        solid: straight tetrahedra.
+        limit: [-] quality below which tetrahedra are improved. The default is
+            :data:`POOR`, or less if the solid has worse tetrahedra.
 
     Returns:
-        The solid, with additional tetrahedra if some had to be split. If the
-        improvement fails, some corners remain off their shapes, as in
-        :func:`moved_onto_shapes`.
+        The improved solid. If the improvement fails, it is the result of
+        :func:`moved_onto_shapes`, where some corners are not on their shapes.
     """
     least = float(element_quality(solid).min())
-    # elements of an extruded bar are long by design
+    # elements of an extruded bar are long, and their quality is low
     good = solid.surface is None or least > POOR / 4
     poor = limit or (min(POOR, least / 2) if good else POOR)
     target = corners_on_shapes(solid)
@@ -72,7 +69,7 @@ def fitted(solid: Solid, limit: float | None = None) -> Solid:
 
 
 def _split_inside(solid: Solid, limit: float) -> Solid:
-    """Split an inner edge of poor tetrahedra with all corners on the boundary."""
+    """Split an inner edge of each flat tetrahedron with all corners on the boundary."""
     boundary = np.zeros(len(solid.points), dtype=bool)
     boundary[solid.faces] = True
     ends, of_cell = edges_of(solid.cells, len(solid.points))
@@ -92,7 +89,7 @@ def _split_inside(solid: Solid, limit: float) -> Solid:
 
 
 def _relaxed(solid: Solid, limit: float) -> Solid:
-    """Move the corners of poor tetrahedra, inner corners first."""
+    """Move the corners of flat tetrahedra."""
     points = solid.points.copy()
     shapes_of: dict[int, tuple[int, ...]] = {}
     for key, group in corner_groups(solid):
@@ -108,7 +105,7 @@ def _relaxed(solid: Solid, limit: float) -> Solid:
 def _best_place(
     solid: Solid, points: NDArray, star: NDArray, corner: int, key: tuple[int, ...]
 ) -> NDArray:
-    """Return the position (3,) [m] of a corner that maximises the worst quality."""
+    """Return the position of a corner that maximises the worst quality, (3,) [m]."""
     place = points[corner]
     around = points[star]
     mine = star == corner

@@ -1,4 +1,4 @@
-r"""Lagrange polynomials on tetrahedra and triangles, by values at lattice points.
+r"""Lagrange polynomials on tetrahedra and triangles.
 
 ====== ========================================================== ==========
 symbol meaning                                                    shape
@@ -8,11 +8,11 @@ N      shape functions at the points                              (q, m)
 dN     derivatives of N, with L_1 .. L_(c-1) as variables          (q, m, c-1)
 ====== ========================================================== ==========
 
-c is 4 for a tetrahedron and 3 for a triangle.  The lattice of degree p consists of all
-points whose barycentric coordinates are multiples of 1 / p.  They are ordered as
-corners, points on edges, points on faces and inner points. The corners of each element
-are numbered in increasing order, so that two elements list the nodes of a common edge
-or face in the same order; half of the elements are then left-handed.
+The number of coordinates c is 4 for a tetrahedron and 3 for a triangle. The lattice of
+degree p consists of all points whose barycentric coordinates are multiples of 1 / p.
+Corners come first, then points on edges, points on faces and inner points. The corners
+of each element are in increasing order, so that two elements have the nodes of a common
+face in the same order.
 """
 
 from functools import lru_cache
@@ -27,14 +27,14 @@ FACES = np.array(list(combinations(range(4), 3)))  # face k is opposite to corne
 
 @lru_cache(maxsize=16)
 def lattice(degree: int, corners: int = 4) -> NDArray:
-    """Return the lattice points in barycentric coordinates, as multiples of 1 / degree.
+    """Return the barycentric coordinates of the lattice points.
 
     Args:
         degree: degree of the polynomials, >= 1.
         corners: 4 for a tetrahedron, 3 for a triangle.
 
     Returns:
-        (m, corners) integers: the corners, then edge by edge, face by face, inside.
+        (m, corners) integers, which are the coordinates times ``degree``.
     """
     points = []
     for size in range(1, corners + 1):
@@ -47,7 +47,7 @@ def lattice(degree: int, corners: int = 4) -> NDArray:
 
 
 def _partitions(total: int, parts: int) -> list[tuple[int, ...]]:
-    """List all ways to split a total into positive parts, in ascending order."""
+    """List all tuples of positive integers with a given sum."""
     if parts == 1:
         return [(total,)]
     return [
@@ -58,17 +58,18 @@ def _partitions(total: int, parts: int) -> list[tuple[int, ...]]:
 
 
 def shape_functions(degree: int, L: NDArray) -> tuple[NDArray, NDArray]:
-    """Evaluate the polynomials that equal 1 at one lattice point and 0 at all others.
+    """Evaluate the Lagrange polynomials at given points.
 
     Args:
         degree: degree of the polynomials.
         L: (q, c) barycentric coordinates.
 
     Returns:
-        N (q, m) and dN (q, m, c - 1).
+        Shape functions N, (q, m), and their derivatives dN, (q, m, c - 1).
 
     Sources:
-        Silvester (1969): products of one polynomial per coordinate.
+        Silvester (1969) for polynomials that are products of functions of one
+        coordinate.
     """
     count, corners = L.shape
     P = np.ones((degree + 1, count, corners))
@@ -88,14 +89,14 @@ def shape_functions(degree: int, L: NDArray) -> tuple[NDArray, NDArray]:
 
 
 def numbered(corners: NDArray, degree: int) -> tuple[NDArray, int]:
-    """Number the lattice points of elements, with equal numbers for shared points.
+    """Number the nodes of elements. Shared nodes have the same number.
 
     Args:
-        corners: (t, 4) numbers of the corners, increasing in each row.
+        corners: (t, 4) corners of each element, in increasing order.
         degree: degree of the polynomials.
 
     Returns:
-        (t, m) numbers, corners first, and the total number of points.
+        Node numbers of each element, (t, m), and the total number of nodes.
     """
     total = int(corners.max()) + 1
     parts = [corners]
@@ -120,14 +121,13 @@ def numbered(corners: NDArray, degree: int) -> tuple[NDArray, int]:
 
 @lru_cache(maxsize=8)
 def face_nodes(degree: int) -> NDArray:
-    """Return the indices of the lattice points on each face of a tetrahedron.
+    """Return the indices of the nodes on each face of a tetrahedron.
 
     Args:
         degree: degree of the polynomials.
 
     Returns:
-        (4, k) indices, one row for each of ``FACES``, in the lattice order of a
-        triangle.
+        (4, k) indices of the nodes on each of ``FACES``, in the order of a triangle.
     """
     whole = [tuple(point) for point in lattice(degree)]
     rows = []

@@ -1,11 +1,11 @@
-"""Tetrahedral meshes of surfaces, with exact interfaces and curved faces.
+"""Tetrahedral meshes of links.
 
-Pytetwild creates the tetrahedra in a separate process with a time limit, from a surface
-with fewer triangles (:mod:`forcefit.stiffness.surface.decimate`).  The mesh boundary
-follows this surface only within a tolerance, the envelope, so every boundary triangle
-is assigned to a patch of the surface and its nodes are projected onto the exact shape
-of the patch. Because pytetwild is slow and not reproducible, meshes are cached under a
-hash of their input.
+The mesher pytetwild runs in a separate process with a time limit. It meshes a
+simplified surface (:mod:`forcefit.stiffness.surface.decimate`). The boundary of the
+mesh deviates from this surface by at most a tolerance, the envelope. Every boundary
+triangle is then assigned to a patch of the surface, and its corners are moved onto the
+exact shape of the patch. Because pytetwild is slow and not reproducible, meshes are
+stored in a cache.
 """
 
 import hashlib
@@ -34,9 +34,9 @@ from forcefit.stiffness.surface.surface import Surface, read_surface
 __all__ = ["Interface", "Solid", "mesh_solid", "parse_interface", "read_surface"]
 
 _WORKER = Path(__file__).with_name("mesh_worker.py")
-# library that makes meshes reproducible, usable only with the GNU C++ library
+# library that makes meshes reproducible; it requires the GNU C++ library
 _SAME_NUMBERS = Path(__file__).with_name("same_random_numbers.so")
-# format version of stored meshes, to be increased if their content changes
+# version of the format of stored meshes
 _FORMAT = 4
 
 
@@ -51,20 +51,20 @@ def mesh_solid(
     cache: Path | str | None = None,
     patches: Patches | None = None,
 ) -> Solid:
-    """Mesh a surface with tetrahedra, or read a mesh stored earlier.
+    """Mesh a surface with tetrahedra, or read the mesh from the cache.
 
     Args:
         surface: surface of the link.
-        base: the held interface.
-        tip: the loaded interface.
-        edge: [m] requested edge length; by default a twentieth of the diagonal.
-        envelope: [-] largest deviation of the mesh, relative to the diagonal, from the
-            coarser surface that the mesher reads, which itself may deviate from the
-            given surface by the same amount.
+        base: clamped interface.
+        tip: loaded interface.
+        edge: [m] requested edge length. The default is a twentieth of the diagonal.
+        envelope: [-] largest deviation of the mesh from the simplified surface, divided
+            by the diagonal. The simplified surface may deviate from the given surface
+            by the same amount.
         time_limit: [s] time limit of the mesher.
-        cache: folder of meshes; by default
-            :func:`forcefit.inputs.cache_folder.cache_folder`.
-        patches: patches of the surface for these interfaces; computed if None.
+        cache: folder in which meshes are stored. The default is the user's cache
+            folder.
+        patches: patches of the surface. They are computed if None.
 
     Returns:
         The solid.
@@ -88,7 +88,7 @@ def mesh_solid(
 
 
 def _from_cache(path: Path) -> tuple[NDArray, NDArray] | None:
-    """Read points and cells of a stored mesh; None for a missing or damaged file."""
+    """Read a stored mesh, or return None if the file is missing or damaged."""
     try:
         with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as stored:
             points, cells = stored["points"], stored["cells"]
@@ -99,7 +99,7 @@ def _from_cache(path: Path) -> tuple[NDArray, NDArray] | None:
 
 
 def _to_cache(path: Path, points: NDArray, cells: NDArray) -> None:
-    """Store a mesh completely or not at all; ignore a full or read-only disk."""
+    """Store a mesh, unless the disk is full or read-only."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with whole_file(path) as part, part.open("wb") as file:
@@ -117,12 +117,12 @@ def _tetrahedralize(
         given, made = Path(folder, "surface.npz"), Path(folder, "mesh.npz")
         points, triangles = coarser_surface(surface, envelope * surface.diagonal)
         np.savez(given, points=points, triangles=triangles, settings=[edge, envelope])
-        # -P prevents modules in the current folder from shadowing installed modules
+        # with -P, modules are not imported from the current folder
         command = [sys.executable, "-P", str(_WORKER), str(given), str(made)]
         if _SAME_NUMBERS.exists():
             command.append(str(_SAME_NUMBERS))
         try:
-            # the mesher writes a file to its current folder
+            # the mesher writes a file to the current folder
             run = subprocess.run(
                 command,
                 timeout=time_limit,

@@ -1,4 +1,4 @@
-"""Program that meshes a stored surface with pytetwild, in a separate process.
+"""Program that meshes a surface with pytetwild.
 
 ``python stiffness/mesh/mesh_worker.py SURFACE.npz MESH.npz [LIBRARY]``
 
@@ -12,25 +12,25 @@ from types import ModuleType
 
 import numpy as np
 
-# largest number of optimisation passes of the mesher; simple parts need fewer, and for
-# parts with walls at acute angles, twelve passes are as good as eighty
+# maximum number of optimisation passes of the mesher; more passes do not improve the
+# meshes of the tested parts
 _PASSES = 12
 
 
 def main(given: Path, made: Path, library: str | None = None) -> None:
-    """Read a surface and mesher settings, and write the points and cells of a mesh.
+    """Read a surface from a file, and write its mesh to a file.
 
     Args:
-        given: file with ``points`` (n, 3) [m], ``triangles`` (m, 3) and ``settings``:
-            edge length [m], and envelope relative to the diagonal.
-        made: output file with ``points`` (n, 3) [m] and ``cells`` (t, 4).
-        library: library that makes the mesher reproducible, or None.
+        given: input file with ``points``, (n, 3) [m], ``triangles``, (m, 3), and
+            ``settings``: edge length [m] and relative envelope.
+        made: output file with ``points``, (n, 3) [m], and ``cells``, (t, 4).
+        library: compiled library that makes the mesher reproducible, or None.
     """
-    # loaded before the mesher, because the first loaded definition of a function wins
+    # loaded before the mesher, because the first loaded definition of a function is
+    # used
     if library is not None:
         ctypes.CDLL(library, mode=ctypes.RTLD_GLOBAL)
-    # pytetwild imports pyvista only to add a method to its classes, which takes half a
-    # second; an empty module replaces pyvista here
+    # pytetwild imports pyvista, which is slow and not needed here
     sys.modules["pyvista"] = ModuleType("pyvista")
     import pytetwild
 

@@ -1,9 +1,8 @@
 """Quadrature rules on the reference triangle and tetrahedron.
 
-Each quadrature point is written as a word with one letter per barycentric coordinate:
-``aab`` is the point (a, a, b).  Points whose words consist of the same letters have the
-same weight.  All weights are positive, because negative weights would amplify round-off
-errors and could make an energy of stresses negative.
+A quadrature point is written as one letter for each barycentric coordinate, such as
+``aab`` for the point (a, a, b). Points with the same letters have the same weight. All
+weights are positive, so that the integral of a positive energy density is positive.
 
 Sources: Hammer and Stroud (1956) for degree 2; Radon (1948) for 5 and Dunavant (1985)
 for 4 and 6 in the triangle; Keast (1986) for 4, 5 and 6 in the tetrahedron.
@@ -17,13 +16,13 @@ from numpy.typing import NDArray
 
 
 class _Rule(NamedTuple):
-    """A quadrature rule that is exact up to a given degree.
+    """A quadrature rule that is exact for polynomials up to a given degree.
 
     Attributes:
-        degree: degree up to which polynomials are integrated exactly.
-        points: words of the points, in the order of summation.
-        coordinates: values of the letters a, b, c and so on.
-        weights: weight of each group of points whose words have the same letters.
+        degree: largest degree of polynomials that are integrated exactly.
+        points: letters of each point.
+        coordinates: values of the letters a, b, c, in this order.
+        weights: weight of each group of points with the same letters.
     """
 
     degree: int
@@ -105,15 +104,15 @@ _TETRAHEDRON = (
 
 @lru_cache(maxsize=16)
 def quadrature(degree: int, corners: int = 4) -> tuple[NDArray, NDArray]:
-    """Return a rule on the reference element that is exact to at least a given degree.
+    """Return a quadrature rule that is exact for polynomials up to a given degree.
 
     Args:
         degree: degree of the polynomials, at most 6.
         corners: 4 for a tetrahedron, 3 for a triangle.
 
     Returns:
-        L (q, corners), and positive weights (q,) whose sum is the size (area or volume)
-        of the reference element.
+        Barycentric coordinates, (q, corners), and weights, (q,), whose sum is the area
+        or volume of the reference element.
 
     Raises:
         ValueError: no rule of this degree is available.
@@ -125,5 +124,5 @@ def quadrature(degree: int, corners: int = 4) -> tuple[NDArray, NDArray]:
     words = rule.points.split()
     letters = np.array([[ord(c) - ord("a") for c in word] for word in words])
     L = np.array(rule.coordinates)[letters]
-    L[:, 0] = 1 - L[:, 1:].sum(axis=1)  # removes round-off of tabulated values
+    L[:, 0] = 1 - L[:, 1:].sum(axis=1)  # corrects round-off of the tabulated values
     return L, np.array([rule.weights["".join(sorted(word))] for word in words])

@@ -1,9 +1,8 @@
 """Local refinement of tetrahedra by longest-edge bisection (Rivara).
 
-An edge is split only if it is the longest edge of all tetrahedra around it; otherwise
-neighbouring tetrahedra are split first. The mesh is therefore conforming after every
-step. Boundary triangles are split together with their tetrahedra and remain in their
-patch, and new corners are moved onto the shape of the patch.
+An edge is split only if it is the longest edge of all adjacent tetrahedra. Otherwise,
+the adjacent tetrahedra are split first, so that the mesh is always conforming. New
+corners on the boundary are moved onto the shape of their patch.
 """
 
 from dataclasses import dataclass, replace
@@ -23,7 +22,8 @@ class Refined:
 
     Attributes:
         solid: the finer solid.
-        parent: (t,) index of the coarser tetrahedron that contains each tetrahedron.
+        parent: (t,) index of the tetrahedron before refinement that contains each
+            tetrahedron.
     """
 
     solid: Solid
@@ -31,14 +31,14 @@ class Refined:
 
 
 def refine(solid: Solid, halvings: NDArray) -> Refined:
-    """Bisect tetrahedra as requested, and neighbours as required for a conforming mesh.
+    """Bisect tetrahedra, and their neighbours as required for a conforming mesh.
 
     Args:
-        solid: solid to refine.
-        halvings: (t,) number of times to halve the volume of each tetrahedron.
+        solid: straight tetrahedra.
+        halvings: (t,) number of successive bisections of each tetrahedron.
 
     Returns:
-        The finer solid.
+        The refined solid.
     """
     parent, need = np.arange(len(solid.cells)), np.array(halvings, dtype=int)
     while (need > 0).any():
@@ -57,19 +57,19 @@ def split_edges(
     split: NDArray,
     places: NDArray | None = None,
 ) -> tuple[Solid, NDArray]:
-    """Split edges and their tetrahedra, with at most one edge in each tetrahedron.
+    """Split edges, of which each tetrahedron has at most one.
 
     Args:
-        solid: solid to refine. New corners are not moved onto its shapes here.
+        solid: straight tetrahedra. New corners are not moved onto the shapes.
         ends: (e, 2) corners of all edges, from :func:`edges_of`.
         of_cell: (t, 6) edges of each tetrahedron, from :func:`edges_of`.
         split: (e,) bool, True for edges to split.
-        places: (k, 3) [m] positions of the new corners; by default the midpoints of the
-            edges.
+        places: (k, 3) [m] positions of the new corners. By default, they are the
+            midpoints of the edges.
 
     Returns:
-        The solid, and the indices (r,) of the bisected tetrahedra. The first half of
-        each keeps its index, and the second halves are appended in this order.
+        The solid, and the indices of the bisected tetrahedra, (r,). The first half of
+        each has the same index as before. The second halves are appended in this order.
     """
     count = len(solid.points)
     middle = np.full(len(ends), -1)
@@ -110,8 +110,7 @@ def edges_of(cells: NDArray, points: int) -> tuple[NDArray, NDArray]:
         points: total number of corners.
 
     Returns:
-        (e, 2) corners of the edges, in increasing order, and (t, 6) edges of each
-        tetrahedron.
+        Corners of each edge, (e, 2), and edges of each tetrahedron, (t, 6).
     """
     ends = np.sort(cells[:, EDGES].reshape(-1, 2), axis=1)
     code, index = np.unique(edge_code(ends, points), return_inverse=True)
@@ -120,28 +119,28 @@ def edges_of(cells: NDArray, points: int) -> tuple[NDArray, NDArray]:
 
 
 def edge_code(ends: NDArray, points: int) -> NDArray:
-    """Return a number that identifies each ordered pair of corners.
+    """Return a number that identifies each edge.
 
     Args:
-        ends: (..., 2) corners.
+        ends: (..., 2) corners of each edge.
         points: total number of corners.
 
     Returns:
-        (...) numbers, which increase with the order of the pairs.
+        (...) numbers, which are in the lexicographic order of the corners.
     """
     return np.asarray(ends[..., 0] * np.int64(points) + ends[..., 1])
 
 
 def length_ranks(points: NDArray, ends: NDArray) -> NDArray:
-    """Return the ranks of edges by length.
+    """Return the rank of each edge by length.
 
     Args:
-        points: (n, 3) [m].
-        ends: (e, 2) corners.
+        points: (n, 3) [m] positions of the corners.
+        ends: (e, 2) corners of each edge.
 
     Returns:
-        (e,) rank of each edge, 0 for the shortest. Of two equally long edges, the first
-        has the lower rank.
+        (e,) ranks; 0 for the shortest edge. Of two equally long edges, the first has
+        the lower rank.
     """
     length = np.linalg.norm(points[ends[:, 0]] - points[ends[:, 1]], axis=1)
     rank = np.empty(len(ends), dtype=int)
@@ -150,15 +149,15 @@ def length_ranks(points: NDArray, ends: NDArray) -> NDArray:
 
 
 def chosen_by_all(of_cell: NDArray, chosen: NDArray, edges: int) -> NDArray:
-    """Find the edges chosen by all tetrahedra around them.
+    """Find the edges that are selected in all adjacent tetrahedra.
 
     Args:
         of_cell: (t, 6) edges of each tetrahedron, from :func:`edges_of`.
-        chosen: edge chosen by each tetrahedron, if it chooses one.
+        chosen: selected edge of each tetrahedron with a selection.
         edges: number of edges.
 
     Returns:
-        (e,) bool, True for such edges.
+        (e,) bool, True for these edges.
     """
     around = np.bincount(of_cell.ravel(), minlength=edges)
     return np.asarray(around == np.bincount(chosen, minlength=edges))
@@ -167,7 +166,7 @@ def chosen_by_all(of_cell: NDArray, chosen: NDArray, edges: int) -> NDArray:
 def _terminal_edges(
     points: NDArray, ends: NDArray, of_cell: NDArray, wanted: NDArray
 ) -> NDArray:
-    """Return (e,) bool, longest edges of all their cells to split for wanted cells."""
+    """Return which edges must be split first to bisect the wanted tetrahedra."""
     rank = length_ranks(points, ends)
     longest = np.take_along_axis(
         of_cell, rank[of_cell].argmax(axis=1)[:, None], axis=1
@@ -183,7 +182,7 @@ def _terminal_edges(
 
 
 def _halved(cells: NDArray, middle: NDArray, pairs: NDArray) -> tuple[NDArray, NDArray]:
-    """Bisect cells, with second halves appended; return them and their indices."""
+    """Bisect tetrahedra, and append the second halves."""
     row, which = np.nonzero(middle >= 0)
     new = middle[row, which]
     first, second = cells[row].copy(), cells[row].copy()

@@ -1,8 +1,7 @@
-"""Regions of different materials, and mesh cutting along the faces between them.
+"""Regions of different materials, and the faces between them.
 
-Known faces between regions, such as the planes of a box or the faces between two
-solids, become faces of tetrahedra, whose corners stay on the shapes of these faces from
-then on.
+Tetrahedra are split along known faces of regions, such as the planes of a box or the
+faces between two solids.
 """
 
 from collections.abc import Callable
@@ -24,8 +23,9 @@ from forcefit.stiffness.mesh.lagrange import FACES
 from forcefit.stiffness.mesh.refine import edge_code
 from forcefit.stiffness.mesh.solid import Solid
 
-_POOR = 0.2  # quality at which a tetrahedron can still follow a curved face
-# fraction of a piece's volume in a region above which the whole piece belongs to it
+_POOR = 0.2  # smallest quality of a tetrahedron that can follow a curved face
+# fraction of the volume of a connected part in a region above which the whole part is
+# assigned to the region
 _AGREED = 0.9
 
 
@@ -34,9 +34,10 @@ class Region:
     """Region of a link made of one material.
 
     Attributes:
-        where: function that returns which points (n, 3) [m] are in the region.
-        faces: faces along which the mesh is cut. Without faces, whole elements are
-            assigned to the region.
+        where: function of points, (n, 3) [m], that returns True for points in the
+            region.
+        faces: faces of the region, at which elements are split. Without faces, whole
+            elements are assigned to the region.
     """
 
     where: Callable[[NDArray], NDArray]
@@ -48,10 +49,10 @@ def region_of_cells(solid: Solid, regions: tuple[Region, ...]) -> NDArray:
 
     Args:
         solid: straight tetrahedra.
-        regions: regions; later ones have precedence.
+        regions: regions. In an overlap, the last region is used.
 
     Returns:
-        (t,) region number, starting from 1; 0 outside all regions.
+        (t,) number of the region, starting from 1; 0 outside all regions.
     """
     centers = solid.points[solid.cells].mean(axis=1)
     return region_of_places(centers, regions, solid.region)
@@ -60,16 +61,16 @@ def region_of_cells(solid: Solid, regions: tuple[Region, ...]) -> NDArray:
 def region_of_places(
     places: NDArray, regions: tuple[Region, ...], cut_region: NDArray | None
 ) -> NDArray:
-    """Find the region of points inside tetrahedra.
+    """Find the region of each point.
 
     Args:
         places: (n, 3) [m] points.
-        regions: regions; later ones have precedence.
-        cut_region: (n,) region of the tetrahedron that contains each point, counting
-            only regions along whose faces the mesh was cut; None if it was not cut.
+        regions: regions. In an overlap, the last region is used.
+        cut_region: (n,) number of the region of the tetrahedron around each point, for
+            regions at whose faces elements were split; None if no elements were split.
 
     Returns:
-        (n,) region number, starting from 1; 0 outside all regions.
+        (n,) number of the region, starting from 1; 0 outside all regions.
     """
     label = np.zeros(len(places), dtype=int) if cut_region is None else cut_region
     for number, region in enumerate(regions, 1):
@@ -80,15 +81,14 @@ def region_of_places(
 
 
 def cut_by_regions(solid: Solid, regions: tuple[Region, ...]) -> Solid:
-    """Cut a mesh so that faces between regions are faces of tetrahedra.
+    """Split the tetrahedra of a mesh along the faces of regions.
 
     Args:
         solid: straight tetrahedra.
         regions: regions of the link.
 
     Returns:
-        The solid, with the region of each tetrahedron and the triangles between
-        regions.
+        The split solid, with the region of each tetrahedron.
     """
     if not any(region.faces for region in regions):
         return solid
@@ -110,14 +110,14 @@ def cut_by_regions(solid: Solid, regions: tuple[Region, ...]) -> Solid:
 
 
 def is_jagged(solid: Solid, regions: tuple[Region, ...]) -> bool:
-    """Check whether a face between two regions passes through tetrahedra.
+    """Return whether the border of a region passes through tetrahedra.
 
     Args:
         solid: straight tetrahedra.
         regions: regions of the link.
 
     Returns:
-        True if a region has no faces, or if cutting along the faces failed.
+        True if a region has no faces, or if tetrahedra could not be split.
     """
     if not regions:
         return False
@@ -129,14 +129,14 @@ def is_jagged(solid: Solid, regions: tuple[Region, ...]) -> bool:
 
 
 def material_edges(solid: Solid, regions: tuple[Region, ...]) -> NDArray:
-    """Find the boundary edges between two regions, where stresses are singular.
+    """Find the boundary edges between two regions.
 
     Args:
         solid: straight tetrahedra.
         regions: regions of the link.
 
     Returns:
-        (e, 2) corners of the edges.
+        (e, 2) corners of each edge.
     """
     if not regions:
         return np.zeros((0, 2), dtype=int)
@@ -144,14 +144,14 @@ def material_edges(solid: Solid, regions: tuple[Region, ...]) -> NDArray:
 
 
 def edges_between(solid: Solid, region: NDArray) -> NDArray:
-    """Find the boundary edges at which two regions meet.
+    """Find the boundary edges between given regions of tetrahedra.
 
     Args:
         solid: straight tetrahedra.
-        region: (t,) region of each tetrahedron.
+        region: (t,) number of the region of each tetrahedron.
 
     Returns:
-        (e, 2) corners of the edges.
+        (e, 2) corners of each edge.
     """
     count = len(solid.points)
     label = region[_owners(solid)]
@@ -164,7 +164,7 @@ def edges_between(solid: Solid, region: NDArray) -> NDArray:
 
 
 def _owners(solid: Solid) -> NDArray:
-    """Return the tetrahedron (f,) behind each boundary triangle."""
+    """Return the tetrahedron of each boundary triangle, (f,)."""
     known = face_code(solid.cells[:, FACES], len(solid.points)).ravel()
     order = np.argsort(known)
     wanted = face_code(solid.faces, len(solid.points))
@@ -173,7 +173,7 @@ def _owners(solid: Solid) -> NDArray:
 
 
 def _places_inside(solid: Solid) -> NDArray:
-    """Return a point (t, 3) [m] inside each tetrahedron, away from cut faces."""
+    """Return a point inside each tetrahedron, (t, 3) [m]."""
     on = np.zeros(len(solid.points), dtype=bool)
     on[solid.inner] = True
     off = ~on[solid.cells]
@@ -183,7 +183,7 @@ def _places_inside(solid: Solid) -> NDArray:
 
 
 def _pieces(solid: Solid) -> NDArray:
-    """Return the piece (t,) between cuts that contains each element."""
+    """Return the number of the connected part that contains each tetrahedron, (t,)."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -197,7 +197,7 @@ def _pieces(solid: Solid) -> NDArray:
 
 
 def _between_regions(solid: Solid) -> Solid:
-    """Remove the cuts that do not separate two regions."""
+    """Remove ``inner`` triangles that are not between two regions."""
     assert solid.region is not None
     faces, owners = faces_inside(solid.cells)
     one, other = solid.region[owners].T
@@ -206,7 +206,7 @@ def _between_regions(solid: Solid) -> Solid:
     kept = np.isin(known, between)
     inner, patch = [solid.inner[kept]], [solid.inner_patch[kept]]
     lacking = faces[~np.isin(between, known)]
-    # a corner moved onto the boundary may be on the face too
+    # a corner that was moved onto the boundary may also be on the face
     close = ON_FACE * float(np.linalg.norm(np.ptp(solid.points, axis=0)))
     for number in np.unique(solid.inner_patch):
         shape = solid.shapes[number]

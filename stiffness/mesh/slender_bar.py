@@ -1,9 +1,8 @@
-"""Meshes of slender or thin-walled straight bars, recognised from their surfaces.
+"""Meshes of slender or thin-walled straight bars.
 
-The mesher creates elements of similar length in all directions. For a rod a thousand
-times longer than thick, or a tube whose wall is a hundredth of its radius, it takes
-minutes or does not terminate, whereas extruding the section of such a bar requires only
-a few thousand elements.
+The mesher creates elements of similar length in all directions. For a very slender rod
+or a thin tube, it therefore takes minutes or does not end. Extrusion of the section
+results in a mesh of only a few thousand elements.
 """
 
 import math
@@ -20,18 +19,19 @@ from forcefit.stiffness.surface.primitives import Cone, Plane, Shape
 from forcefit.stiffness.surface.surface import Surface
 from forcefit.stiffness.surface.true_surface import TrueSurface
 
-# ratio of length to width of the section at which a bar counts as slender
+# ratio of the length to the width of the section above which a bar is slender
 _SLENDER = 50.0
-# ratio of wall to width (for a tube, to diameter) below which a section is thin-walled
+# ratio of wall thickness to width or diameter below which a section is thin-walled
 _THIN = 0.04
-_LAYERS = 60.0  # number of layers along a bar, not counting the thin layers at its ends
-# length of a layer relative to the width of the section, for a bar that is not slender
+_LAYERS = 60.0  # number of layers along a bar, without the thin layers at its ends
+# thickness of a layer, relative to the width of the section, in a bar that is not
+# slender
 _LONGEST = 2.0
-_PARALLEL = 1e-6  # [rad] largest angle between directions that count as parallel
+_PARALLEL = 1e-6  # [rad] largest angle between parallel directions
 _SAME = 1e-6  # largest difference between equal positions, relative to the length
 _SAME_VOLUME = 1e-3
-# largest sine of the angle between a triangle of a straight side and the axis, and one
-# minus the smallest sine of the angle between a triangle of an end and the axis
+# tolerance of the sine of the angle between a triangle and the axis, which is 0 for a
+# side and 1 for an end
 _NEARLY = 0.1
 
 
@@ -40,13 +40,13 @@ def slender_bar(surface: Surface, base: Interface, tip: Interface) -> Solid | No
 
     Args:
         surface: surface of the link.
-        base: the held interface.
-        tip: the loaded interface.
+        base: clamped interface.
+        tip: loaded interface.
 
     Returns:
-        A starting mesh in the axes of the surface. None if the link is not a round bar,
-        tube, rectangle or box between base and tip, or if it is neither slender nor
-        thin-walled.
+        First mesh in the axes of the surface. None if the link is not a round bar, a
+        tube, a rectangular bar or a rectangular tube from base to tip, or if it is
+        neither slender nor thin-walled.
 
     Raises:
         BadInput: no part of the surface is on an interface.
@@ -60,7 +60,7 @@ def slender_bar(surface: Surface, base: Interface, tip: Interface) -> Solid | No
         return None
     along = (surface.points - base.point) @ axis
     reach = np.abs([along.min(), along.max() - length]).max()
-    # this check is faster than recognising shapes
+    # this check is fast and rejects most parts
     if reach > 10 * _SAME * length or not _prismatic(surface, axis):
         return None
     patches = find_patches(surface, base, tip)
@@ -83,8 +83,8 @@ def slender_bar(surface: Surface, base: Interface, tip: Interface) -> Solid | No
 def _prismatic(surface: Surface, axis: NDArray) -> bool:
     """Return whether all triangles are nearly parallel or normal to the axis.
 
-    Triangles on a cylinder are exactly parallel to its axis only if one of their edges
-    is, which is not the case in triangulations of STEP files.
+    In triangulations of STEP files, the triangles on a cylinder are not exactly
+    parallel to its axis.
     """
     a, b, c = np.moveaxis(surface.points[surface.triangles], 1, 0)
     normal = np.cross(b - a, c - a)
@@ -95,7 +95,7 @@ def _prismatic(surface: Surface, axis: NDArray) -> bool:
 def _section(
     shapes: tuple[Shape, ...], axis: NDArray
 ) -> tuple[dict[str, float], NDArray, NDArray] | None:
-    """Recognise the section's lengths, a point on the axis, and the first direction."""
+    """Find the dimensions of the section, a point on the axis, and the y axis."""
     if all(isinstance(shape, Cone) for shape in shapes):
         return _round_section([s for s in shapes if isinstance(s, Cone)], axis)
     if all(isinstance(shape, Plane) for shape in shapes) and len(shapes) in (4, 8):
@@ -106,7 +106,7 @@ def _section(
 def _round_section(
     cones: list[Cone], axis: NDArray
 ) -> tuple[dict[str, float], NDArray, NDArray] | None:
-    """Recognise the section of a solid or hollow circle."""
+    """Find the dimensions of a round bar or tube."""
     if len(cones) > 2 or not cones:
         return None
     largest = max(cones, key=lambda cone: cone.radius)
@@ -128,7 +128,7 @@ def _round_section(
 def _angular_section(
     planes: list[Plane], axis: NDArray
 ) -> tuple[dict[str, float], NDArray, NDArray] | None:
-    """Recognise the section of a rectangle, or of a box with equal wall thicknesses."""
+    """Find the dimensions of a rectangular bar or tube."""
     first = planes[0].normal
     second = np.cross(axis, first)
     middle = np.mean([plane.point for plane in planes], axis=0)
@@ -152,7 +152,7 @@ def _angular_section(
 
 
 def _wall(lengths: dict[str, float]) -> float:
-    """Return the smallest wall thickness [m]; infinite for a solid section."""
+    """Return the wall thickness [m], which is infinite for a solid section."""
     if "radius" in lengths:
         inner = lengths.get("inner_radius")
         return math.inf if inner is None else lengths["radius"] - inner
@@ -171,7 +171,7 @@ def _area(lengths: dict[str, float]) -> float:
 
 
 def _placed(bar: Solid, frame: NDArray, foot: NDArray, length: float) -> Solid:
-    """Rotate, scale and move a bar of unit length along z to its place."""
+    """Transform a bar of unit length along z to the axes of the surface."""
 
     def moved(shape: Shape | None) -> Shape | None:
         if isinstance(shape, Plane):

@@ -1,4 +1,4 @@
-"""Straight-edged tetrahedra of a link, with corners on the exact shapes."""
+"""Straight tetrahedra of a link."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -11,31 +11,31 @@ from forcefit.stiffness.mesh.lagrange import EDGES
 from forcefit.stiffness.surface.primitives import Shape, project
 from forcefit.stiffness.surface.true_surface import TrueSurface
 
-# corners of each face, ordered so that the normal points outward
+# corners of each face, counterclockwise as seen from outside
 FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
 
 
 @dataclass(frozen=True, eq=False)
 class Solid:
-    """Straight-edged tetrahedra of a link, and the shapes of its boundary.
+    """Straight tetrahedra of a link, and the exact shapes of its boundary.
 
     Attributes:
-        points: (n, 3) [m] corners; they are on the exact shapes as far as these are
-        known.
+        points: (n, 3) [m] positions of the corners. Boundary corners are on the exact
+            shapes.
         cells: (t, 4) corners of tetrahedra with positive volume.
-        faces: (f, 3) corners of boundary triangles, in outward orientation.
-        patch: (f,) number of each face's patch; 0 is the base interface, 1 the tip.
-        shapes: shape of each patch; None if the shape is unknown, so that the nodes of
-            the patch are not moved.
-        walls: wall through the common line of an interface and a patch that continues
-            it smoothly, for each such pair, see
+        faces: (f, 3) corners of the boundary triangles, counterclockwise as seen from
+            outside.
+        patch: (f,) patch number of each boundary triangle. Patch 0 is the base
+            interface, and patch 1 is the tip interface.
+        shapes: exact shape of each patch; None if the shape is unknown.
+        walls: wall through the common line of an interface and a tangent patch, for
+            each such pair of patches, see
             :mod:`forcefit.stiffness.surface.smooth_outline`.
-        surface: surface that the mesh approximates; None if the shapes of the patches
-            suffice.
-        inner: (k, 3) corners of triangles inside the link, between regions.
-        inner_patch: (k,) index of the shape of each inner triangle.
-        region: (t,) region of each tetrahedron, see
-            :mod:`forcefit.stiffness.mesh.regions`; None if the mesh was not cut.
+        surface: exact surface of the part; None if it is not needed.
+        inner: (k, 3) corners of triangles between regions inside the link.
+        inner_patch: (k,) index in ``shapes`` of each inner triangle.
+        region: (t,) number of the region of each tetrahedron, see
+            :mod:`forcefit.stiffness.mesh.regions`; None if no elements were split.
     """
 
     points: NDArray
@@ -52,7 +52,7 @@ class Solid:
     __repr__, _repr_html_ = short_repr, html_table
 
     def volumes(self) -> NDArray:
-        """Return the (t,) [m^3] volumes of the straight tetrahedra."""
+        """Return the volumes of the tetrahedra, (t,) [m^3]."""
         a, b, c, d = np.moveaxis(self.points[self.cells], 1, 0)
         return np.einsum("ij,ij->i", b - a, np.cross(c - a, d - a)) / 6
 
@@ -60,27 +60,29 @@ class Solid:
 def meeting_shapes(
     solid: Solid, key: tuple[int, ...], points: NDArray
 ) -> tuple[Shape, ...]:
-    """Return the shapes on which corners of a solid must lie.
+    """Return the shapes on which given corners must be.
 
     Args:
         solid: straight tetrahedra.
-        key: the patches of the corners; empty for inner corners.
+        key: patches of the corners; empty for inner corners.
         points: (n, 3) [m] positions of the corners.
 
     Returns:
-        The shapes of the patches, or their substitutes where two patches meet smoothly.
+        The shapes. For two tangent patches, the wall through their common line replaces
+        one of them.
     """
     return _meeting_shapes(key, solid.shapes, solid.walls, points) if key else ()
 
 
 def corner_groups(solid: Solid) -> list[tuple[tuple[int, ...], NDArray]]:
-    """Group the boundary corners by the shapes on which they must lie.
+    """Group the boundary corners by their shapes.
 
     Args:
         solid: straight tetrahedra.
 
     Returns:
-        Groups as in :func:`node_patches`, for boundary faces and faces between regions.
+        Groups as in :func:`node_patches`, for boundary faces and for faces between
+        regions.
     """
     faces = np.concatenate([solid.faces, solid.inner])
     patch = np.r_[solid.patch, solid.inner_patch]
@@ -93,8 +95,9 @@ def _meeting_shapes(
     walls: Mapping[tuple[int, int], Shape],
     points: NDArray,
 ) -> tuple[Shape, ...]:
-    """Return the shapes that intersect in the points shared by several patches."""
-    # tangent shapes determine their common line poorly, but the wall through it does
+    """Return the shapes that intersect in the common points of several patches."""
+    # the common line of tangent shapes is poorly determined, so one of them is replaced
+    # by the wall
     standing = {pair: wall for pair, wall in walls.items() if set(pair) <= set(key)}
     replaced = {other for _, other in standing}
     known = [s for p in key if p not in replaced and (s := shapes[p]) is not None]
@@ -105,7 +108,7 @@ def _meeting_shapes(
 
 
 def _tangent(one: Shape | None, other: Shape, points: NDArray) -> bool:
-    """Check whether two shapes have the same normals at given points."""
+    """Return whether two shapes have the same normals at given points."""
     if one is None:
         return False
     along = np.einsum("ni,ni->n", one.signed(points)[1], other.signed(points)[1])
@@ -119,20 +122,21 @@ def element_quality(solid: Solid) -> NDArray:
         solid: straight tetrahedra.
 
     Returns:
-        (t,) [-] 1 for a regular tetrahedron, 0 for a flat one, negative for an inverted
-        one.
+        (t,) [-] quality: 1 for a regular tetrahedron, 0 for a flat tetrahedron, and < 0
+        for an inverted tetrahedron.
     """
     return tetrahedra_quality(solid.points[solid.cells])
 
 
 def tetrahedra_quality(corners: NDArray) -> NDArray:
-    """Compute the quality of tetrahedra: 6 sqrt(2) volume over the cubed rms edge.
+    """Compute the quality of tetrahedra.
 
     Args:
-        corners: (t, 4, 3) [m] positions of the corners.
+        corners: (t, 4, 3) [m] positions of the corners of each tetrahedron.
 
     Returns:
-        (t,) [1] quality.
+        (t,) [-] quality: 6 sqrt(2) times the volume, divided by the cube of the root
+        mean square of the edge lengths.
     """
     i, j = EDGES.T
     mean_square = np.sum((corners[:, i] - corners[:, j]) ** 2, axis=2).mean(axis=1)
@@ -142,13 +146,13 @@ def tetrahedra_quality(corners: NDArray) -> NDArray:
 
 
 def boundary_faces(cells: NDArray) -> NDArray:
-    """Find the faces that belong to a single tetrahedron.
+    """Find the boundary faces of tetrahedra.
 
     Args:
         cells: (t, 4) corners of tetrahedra with positive volume.
 
     Returns:
-        (f, 3) corners of the faces, in outward orientation.
+        (f, 3) corners of the faces, counterclockwise as seen from outside.
     """
     faces = cells[:, FACES].reshape(-1, 3)
     key = np.sort(faces, axis=1)
@@ -162,15 +166,15 @@ def boundary_faces(cells: NDArray) -> NDArray:
 def node_patches(
     nodes: int, members: NDArray, patch: NDArray
 ) -> list[tuple[tuple[int, ...], NDArray]]:
-    """Group nodes by the set of patches on which they lie.
+    """Group nodes by the patches on which they are.
 
     Args:
         nodes: number of nodes.
-        members: (f, k) nodes of each boundary face.
-        patch: (f,) patch of each face.
+        members: (f, k) indices of the nodes of each boundary face.
+        patch: (f,) patch number of each boundary face.
 
     Returns:
-        Pairs of a set of patches and the nodes on exactly these patches.
+        Pairs of a set of patches and the nodes on these patches but on no other patch.
     """
     pairs = np.column_stack([members.ravel(), np.repeat(patch, members.shape[1])])
     pairs = np.unique(pairs, axis=0)
@@ -193,9 +197,9 @@ def on_shapes(
 
     Args:
         points: (n, 3) [m] points.
-        groups: points by their patches.
+        groups: indices of the points by their patches, from :func:`node_patches`.
         shapes: shapes of the patches.
-        reach: [m] largest displacement of a point.
+        reach: [m] largest accepted displacement of a point.
         walls: walls as in :class:`Solid`, or None.
 
     Returns:
@@ -212,14 +216,14 @@ def on_shapes(
 
 
 def corners_on_shapes(solid: Solid) -> NDArray:
-    """Project the corners of a solid onto its shapes.
+    """Compute the positions of the corners of a solid on its shapes.
 
     Args:
-        solid: solid whose corners may be off the shapes of their patches.
+        solid: straight tetrahedra.
 
     Returns:
-        (n, 3) [m] positions. A boundary corner farther from its shapes than a hundredth
-        of the part's size is not moved.
+        (n, 3) [m] positions. A boundary corner is not moved if its distance from its
+        shapes exceeds a hundredth of the size of the part.
     """
     size = float(np.linalg.norm(np.ptp(solid.points, axis=0)))
     groups = corner_groups(solid)
@@ -227,13 +231,13 @@ def corners_on_shapes(solid: Solid) -> NDArray:
 
 
 def moved_onto_shapes(solid: Solid) -> Solid:
-    """Move corners onto their shapes, less so where tetrahedra would be inverted.
+    """Move corners onto their shapes, as far as no tetrahedron becomes inverted.
 
     Args:
-        solid: solid whose corners may be off the shapes of their patches.
+        solid: straight tetrahedra.
 
     Returns:
-        The solid with moved corners.
+        The solid with the moved corners.
     """
     target = corners_on_shapes(solid)
     share = np.ones(len(target))

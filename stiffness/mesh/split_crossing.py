@@ -1,4 +1,4 @@
-"""Splitting of mesh edges until none crosses a given surface."""
+"""Splitting of mesh edges that cross a surface."""
 
 from collections.abc import Callable
 
@@ -15,17 +15,17 @@ Crossing = Callable[[Solid, NDArray, NDArray], tuple[NDArray, NDArray]]
 def split_crossing(
     solid: Solid, on: NDArray, crossing: Crossing
 ) -> tuple[Solid, NDArray]:
-    """Split edges of a mesh where they cross a surface.
+    """Split edges at the points where they cross a surface.
 
     Args:
-        solid: solid to split.
+        solid: straight tetrahedra.
         on: (n,) bool, True for a corner on the surface.
-        crossing: function of a solid, its corners on the surface (n,), and its edges
-            (e, 2), which returns the edges that cross the surface and the fraction of
-            their length at which they do.
+        crossing: function of the solid, its corners on the surface, (n,), and its
+            edges, (e, 2). It returns which edges cross the surface and at which
+            fraction of their length.
 
     Returns:
-        The solid, and (n,) bool, True for its corners on the surface.
+        The split solid, and (n,) bool, True for its corners on the surface.
     """
     for _ in range(_PASSES):
         ends, of_cell = edges_of(solid.cells, len(solid.points))
@@ -41,14 +41,14 @@ def split_crossing(
 
 
 def one_of_each(wanted: NDArray, of_cell: NDArray) -> NDArray:
-    """Select edges that can be split together, at most one in each tetrahedron.
+    """Select edges so that each tetrahedron has at most one selected edge.
 
     Args:
-        wanted: (e,) bool, True for edges to be split.
+        wanted: (e,) bool, True for edges that can be selected.
         of_cell: (t, 6) edges of each tetrahedron.
 
     Returns:
-        (e,) bool, True for the selected edges, at least one if any is wanted.
+        (e,) bool, True for the selected edges.
     """
     order = np.where(wanted, np.arange(len(wanted), 0, -1), 0)
     first = of_cell[np.arange(len(of_cell)), order[of_cell].argmax(axis=1)]

@@ -1,12 +1,10 @@
-"""Tetrahedral meshes of straight bars, extruded from their sections.
+"""Tetrahedral meshes of straight bars by extrusion of their sections.
 
-A triangulated section is extruded along z in layers, which are thin at the held ends
-and thicker in between, where the displacement field is that of a beam.  The prism over
-a triangle in a layer is split into three tetrahedra.  The diagonal of each side starts
-at the smallest corner number, so that neighbours split a common side in the same way
-(Dompierre et al. 1999).  One element spans a wall of any thickness. Because the
-elements are long along the bar and around a tube, a few thousand suffice, where a
-mesher with edges of equal length would need millions.
+A triangulated section is extruded along z in layers. Layers are thin at the clamped
+ends and thicker in between, where the displacements are those of a beam. In each layer,
+the prism over a triangle is divided into three tetrahedra. The diagonal of each side
+starts at the smallest corner number, so that neighbours have the same diagonal
+(Dompierre et al. 1999). There is one element across a wall.
 """
 
 import math
@@ -18,29 +16,29 @@ from numpy.typing import NDArray
 from forcefit.stiffness.mesh.solid import Solid, boundary_faces
 from forcefit.stiffness.surface.primitives import Cone, Plane, Shape
 
-_AROUND = 8  # smallest number of elements around a full circle
-# largest distance between an arc and its chord, relative to the bar's length, which
-# limits the refinement
+_AROUND = 8  # smallest number of elements around a circle
+# largest distance between an arc and its chord, relative to the length of the bar
 _OFF = 0.008
-# largest squared angle of an element over wall / radius, which keeps chords inside
+# largest ratio of the squared angle of an element [rad^2] to wall / radius, so that
+# chords stay in the wall
 _IN_WALL = 1.0
-_FLAT = 4.0  # largest ratio of width to height of an element in the section
+_FLAT = 4.0  # largest aspect ratio of an element in the section
 _GROWTH = 2.0  # ratio of the thicknesses of consecutive layers
-_LONGEST = 2.0  # thickness of the thickest layer, relative to the section's width
+_LONGEST = 2.0  # thickness of the thickest layer, relative to the width of the section
 _UP = np.array([0.0, 0.0, 1.0])
 
 
 def straight_bar(section: Mapping[str, float], longest: float = _LONGEST) -> Solid:
-    """Mesh a bar of unit length along z; the section's y and z are along x and y.
+    """Mesh a bar of unit length along z.
 
     Args:
-        section: lengths in the form of
-            :func:`forcefit.stiffness.beam.sections.declared_section`, relative to the
-            length of the bar.
-        longest: thickness of the thickest layer, relative to the section's width.
+        section: dimensions of the section divided by the length of the bar, with the
+            names of :func:`forcefit.stiffness.beam.sections.declared_section`.
+        longest: thickness of the thickest layer, relative to the width of the section.
 
     Returns:
-        A starting mesh with patch 0 at z = 0 and patch 1 at z = 1.
+        First mesh. Patch 0 is at z = 0, and patch 1 is at z = 1. The section's y and z
+        axes are along x and y.
     """
     flat, triangles = _round(section) if "radius" in section else _angular(section)
     heights = _heights(_thinnest(section), longest * float(np.ptp(flat[:, 0])))
@@ -73,7 +71,7 @@ def _thinnest(section: Mapping[str, float]) -> float:
 
 
 def _heights(first: float, longest: float) -> NDArray:
-    """Return layer heights from 0 to 1, with thicker layers towards the middle."""
+    """Return the heights of the borders of layers, from 0 to 1."""
     steps = [min(first, 0.25)]
     while sum(steps) < 0.5:
         steps.append(min(_GROWTH * steps[-1], longest))
@@ -103,7 +101,7 @@ def _round(section: Mapping[str, float]) -> tuple[NDArray, NDArray]:
 
 
 def _angular(section: Mapping[str, float]) -> tuple[NDArray, NDArray]:
-    """Triangulate a rectangle, a box or an I-section."""
+    """Triangulate a rectangle, a rectangular tube or an I-section."""
     width, height = section["width"], section["height"]
     x_cuts, y_cuts = [width / 2], [height / 2]
     if "wall" in section:
@@ -132,7 +130,7 @@ def _angular(section: Mapping[str, float]) -> tuple[NDArray, NDArray]:
 
 
 def _divided(cuts: NDArray, longest: float) -> NDArray:
-    """Add cuts until no gap between two cuts exceeds ``longest``."""
+    """Divide intervals until none is longer than ``longest``."""
     parts = [
         np.linspace(low, high, math.ceil((high - low) / longest - 1e-9) + 1)[:-1]
         for low, high in zip(cuts, cuts[1:], strict=False)
@@ -143,10 +141,10 @@ def _divided(cuts: NDArray, longest: float) -> NDArray:
 def _sides(
     section: Mapping[str, float], corners: NDArray
 ) -> tuple[NDArray, tuple[Shape | None, ...]]:
-    """Return the side (f,) of each face (f, 3, 3), and the shapes of the sides."""
+    """Return the side of each boundary face, (f,), and the shapes of the sides."""
     if "radius" in section:
         radii = [r for r in (section["radius"], section.get("inner_radius")) if r]
         off = np.linalg.norm(corners[:, 0, :2], axis=1)[:, None] - radii
         return np.abs(off).argmin(axis=1), tuple(Cone(0 * _UP, _UP, r) for r in radii)
-    # sides normal to x and sides normal to y are flat and meet at an edge
+    # sides normal to x and sides normal to y are planes
     return np.ptp(corners[:, :, :2], axis=1).argmin(axis=1), (None, None)

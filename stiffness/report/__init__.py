@@ -1,4 +1,4 @@
-"""Reports on K_E: text, comparison with a beam, export, and libraries.
+"""Reports, figures, exports and libraries of link stiffnesses.
 
-Start with ``library.py`` for many links, or with ``compare.py`` for one link.
+Start with ``compare.py`` for a single link, or with ``library.py`` for many links.
 """

@@ -1,14 +1,14 @@
-"""Comparison of beam theory with finite elements, with the cause of the difference.
+"""Comparison of a link stiffness by beam theory and by finite elements.
 
-The section of a beam warps and contracts freely, whereas a rigid face prevents both, so
-the ends of a solid link are stiffer than those of the beam. The solid is as stiff as a
-beam that is shorter by a fixed multiple of the section size r: K / K_beam = 1 + c r /
-L. The coefficient c depends only on the section and on Poisson's ratio. The difference
-vanishes as the link becomes slender; if it does not, one of the two models is wrong.
+In beam theory, the section can warp and contract freely. In a solid link, rigid
+interfaces prevent this, so the link is stiffer near its ends. This end effect is K /
+K_beam = 1 + c r / L, where r is the section size and L the length. The coefficient c
+depends on the section and on Poisson's ratio. For a slender link, both stiffnesses
+agree, unless one of the two models is wrong.
 
-The most common mistake is to swap width and height of the section, or to omit ``up``,
-so that the beam is rotated about its axis. Rotations of the beam by multiples of 90
-degrees are therefore compared too, and one that agrees much better is reported.
+If width and height of the section are exchanged, the beam is rotated about its axis.
+The comparison is therefore repeated for the beam rotated by multiples of 90 degrees. A
+rotation is reported if the agreement is much better.
 """
 
 from dataclasses import dataclass
@@ -21,22 +21,23 @@ from forcefit.results.display import html_table, short_repr
 from forcefit.stiffness.link import LinkStiffness, scaled
 from forcefit.stiffness.screws import rotation_matrix, screw_map
 
-# largest difference after a reported rotation, relative to the difference before it
+# largest ratio of the differences after and before a reported rotation
 _MUCH_BETTER = 0.25
-_TURNS = (90, 180, 270)  # [deg] trial rotations of the beam about its axis
+_TURNS = (90, 180, 270)  # [deg] compared rotations of the beam about its axis
 
 
 @dataclass(frozen=True, eq=False)
 class LinkComparison:
-    """A link computed both by a beam formula and by finite elements.
+    """The stiffness of a link by beam theory and by finite elements.
 
     Attributes:
-        beam: link by the beam formula.
-        fea: link by finite elements, with the same tip and axes.
-        difference: (6, 6) [1] fea minus beam, scaled by sqrt(K_ii K_jj) of the beam.
-        length: [m] length from base to tip along the beam.
+        beam: link by beam theory.
+        fea: link by finite elements, with the same tip and the same axes.
+        difference: (6, 6) [1] stiffness of ``fea`` minus that of ``beam``, divided by
+            sqrt(K_ii K_jj) of the beam.
+        length: [m] length of the beam.
         size: [m] section size: twice the radius of gyration, which is the radius of a
-            round bar.
+            solid round bar.
     """
 
     beam: LinkStiffness
@@ -49,20 +50,20 @@ class LinkComparison:
 
     @property
     def slenderness(self) -> float:
-        """Ratio L / r of the length to the section size."""
+        """Ratio L / r of length and section size."""
         return self.length / self.size
 
     @property
     def end_effect(self) -> NDArray:
-        """(6,) [1] coefficient c in ``K_ii / K_ii of the beam = 1 + c r / L``."""
+        """Coefficient c of the end effect for each diagonal entry, (6,)."""
         return np.diag(self.difference) * self.slenderness
 
     @property
     def better_turn(self) -> tuple[int, float]:
-        """Rotation of the beam about the line from base to tip that agrees much better.
+        """Rotation of the beam about its axis with a much better agreement.
 
-        Returns the angle [deg], or 0 if no rotation agrees much better, and the largest
-        remaining difference [1].
+        The values are the angle [deg], or 0 if there is no such rotation, and the
+        largest difference after the rotation.
         """
         worst = float(np.abs(self.difference).max())
         axis = self.fea.tip - self.fea.base
@@ -73,8 +74,8 @@ class LinkComparison:
             for angle in _TURNS
         }
         noise = 2 * self.fea.relative_error_estimate
-        # of several rotations that differ only by mesh error and round-off, use the
-        # smallest
+        # of several rotations with equal differences within mesh error and round-off,
+        # the smallest is reported
         least = min(remaining.values()) + noise + 1e-9 * worst
         best = min(angle for angle in remaining if remaining[angle] <= least)
         better = remaining[best] < _MUCH_BETTER * worst and worst > noise
@@ -110,7 +111,7 @@ class LinkComparison:
 
 
 def _turned_difference(comparison: LinkComparison, rotation: NDArray) -> float:
-    """Compute the largest difference [1] after rotating the beam about its tip."""
+    """Compute the largest difference after a rotation of the beam about its axis."""
     axis = rotation / np.linalg.norm(comparison.fea.tip - comparison.fea.base)
     A = screw_map(np.zeros(3), rotation_matrix(axis))
     K = A @ comparison.beam.stiffness @ A.T
@@ -123,19 +124,20 @@ def compare_link(
     size: float,
     length: float | None = None,
 ) -> LinkComparison:
-    """Compare the stiffness of a link by beam theory and by finite elements.
+    """Compare the stiffnesses of a link by beam theory and by finite elements.
 
     Args:
-        beam: link by the beam formula.
-        fea: link by finite elements, with the same tip and axes.
-        size: [m] section size; the radius of a round bar.
-        length: [m] length of the beam; by default from base to tip.
+        beam: link by beam theory.
+        fea: link by finite elements, with the same tip and the same axes.
+        size: [m] section size, which is the radius of a solid round bar.
+        length: [m] length of the beam. The default is the distance from base to tip.
 
     Returns:
         The comparison.
 
     Raises:
-        BadInput: the distance between the tips exceeds 1e-6 m and 0.1 % of the length.
+        BadInput: the distance between the two tips exceeds 1e-6 m and 0.1 % of the
+            length.
     """
     length = float(np.linalg.norm(fea.tip - fea.base)) if length is None else length
     gap = float(np.linalg.norm(fea.tip - beam.tip))
@@ -151,13 +153,14 @@ def compare_link(
 
 
 def entries_that_matter(stiffness: NDArray) -> list[tuple[int, int]]:
-    """Find the upper entries of a stiffness above a thousandth of their scale.
+    """Find the significant entries in the upper triangle of a stiffness.
 
     Args:
         stiffness: (6, 6) stiffness.
 
     Returns:
-        Rows and columns of these entries.
+        Rows and columns of the entries with an absolute value above sqrt(K_ii K_jj) /
+        1000.
     """
     matters = np.abs(np.triu(scaled(stiffness, stiffness))) > 1e-3
     return [(int(i), int(j)) for i, j in zip(*np.nonzero(matters), strict=True)]

@@ -1,4 +1,4 @@
-"""Export of stiffness matrices in the order and syntax of other programs."""
+"""Export of link stiffnesses as text for other programs."""
 
 import csv
 import io
@@ -11,32 +11,32 @@ from forcefit.inputs.table import BadInput, nearest
 from forcefit.stiffness.report.library import Entry
 from forcefit.stiffness.screws import SCREW
 
-# programs with translations first, whereas forcefit has rotations first
+# programs whose order is translations before rotations
 PROGRAMS = ("exudyn", "adams", "mapdl")
 _SWAPPED = [3, 4, 5, 0, 1, 2]
 
 
 def translations_first(matrix: ArrayLike) -> NDArray:
-    """Reorder a stiffness or compliance to [T R] / [F M].
+    """Reorder a matrix to translations before rotations.
 
     Args:
-        matrix: (6, 6) matrix in the order [R T] / [m f].
+        matrix: (6, 6) stiffness or compliance in the order [R T].
 
     Returns:
-        (6, 6) reordered matrix.
+        (6, 6) matrix in the order [T R].
     """
     return np.asarray(matrix, dtype=float)[np.ix_(_SWAPPED, _SWAPPED)]
 
 
 def stiffness_for(program: str, stiffness: ArrayLike, name: str = "link") -> str:
-    """Format K_E as text for another program, in SI units.
+    """Format a stiffness as text for another program, in SI units.
 
     Args:
-        program: ``"exudyn"`` for ``stiffness`` of a RigidBodySpringDamper; ``"adams"``
-            for the K matrix of a FIELD statement; ``"mapdl"`` for the lower triangle of
-            a MATRIX27 stiffness between the coincident nodes I (base) and J (tip).
-        stiffness: (6, 6) K_E in the order [R T] / [m f].
-        name: name of the link, for comments.
+        program: ``"exudyn"`` for the ``stiffness`` of a RigidBodySpringDamper,
+            ``"adams"`` for the K matrix of a FIELD statement, or ``"mapdl"`` for a
+            MATRIX27 element between two coincident nodes.
+        stiffness: (6, 6) stiffness in the order [R T].
+        name: name of the link, for comments in the text.
 
     Returns:
         The text.
@@ -52,7 +52,7 @@ def stiffness_for(program: str, stiffness: ArrayLike, name: str = "link") -> str
         body = ",\n    ".join(f"[{row}]" for row in rows)
         return f"# {name}: order [TX TY TZ RX RY RZ]\nstiffness = [\n    {body}]\n"
     if program == "adams":
-        # column by column, in the order of FIELD's KMATRIX
+        # column by column, as required by FIELD
         columns = ",\n, ".join(", ".join(f"{v:.12e}" for v in column) for column in K.T)
         return f"! {name}: order X Y Z AX AY AZ\n, KMATRIX = {columns}\n"
     both = np.block([[K, -K], [-K, K]])
@@ -66,13 +66,13 @@ def stiffness_for(program: str, stiffness: ArrayLike, name: str = "link") -> str
 
 
 def library_csv(entries: Sequence[Entry]) -> str:
-    """Format a library as CSV: parameters of each entry, then the upper half of K.
+    """Format a library as CSV text.
 
     Args:
-        entries: entries of one library.
+        entries: entries of a library.
 
     Returns:
-        CSV text with a header.
+        A header line, and for each entry its parameters and the upper triangle of K.
     """
     names = sorted({name for e in entries for name in e.parameters})
     upper = [(i, j) for i in range(6) for j in range(i, 6)]

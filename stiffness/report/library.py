@@ -1,8 +1,8 @@
-"""Libraries of link stiffnesses on disk, with provenance.
+"""Libraries of link stiffnesses.
 
-A library is a folder with one JSON file per entry. An entry contains the stiffness and
-its error, the mesh report, parameters and material, a hash of the geometry, the program
-version, and the date. :mod:`forcefit.stiffness.report.library_build` creates entries.
+A library is a folder with one JSON file for each entry. The file contains the stiffness
+and its estimated error, the parameters and material of the link, and the program
+version. Entries are computed by :mod:`forcefit.stiffness.report.library_build`.
 """
 
 import itertools
@@ -26,14 +26,14 @@ FORMAT = "forcefit link 1"
 
 @dataclass(frozen=True, eq=False)
 class Entry:
-    """A stored link stiffness.
+    """An entry of a library: a link stiffness with its parameters.
 
     Attributes:
         key: name of the entry in the library.
-        stiffness: (6, 6) stiffness at the tip, in the link's axes.
+        stiffness: (6, 6) stiffness at the tip, in the axes of the link.
         stiffness_error: (6, 6) estimated error of the stiffness.
         tip: (3,) [m] position of the tip.
-        parameters: lengths [m] and material constants of the link, by name.
+        parameters: dimensions [m] and material constants of the link, by name.
         about: complete content of the file.
     """
 
@@ -48,10 +48,10 @@ class Entry:
 
 
 def read_entry(path: Path | str, key: str) -> Entry:
-    """Read one entry of a library.
+    """Read an entry of a library.
 
     Args:
-        path: the library's folder.
+        path: folder of the library.
         key: name of the entry.
 
     Returns:
@@ -108,10 +108,10 @@ def _entry(file: Path) -> Entry:
 
 
 def read_compliance(path: Path | str, key: str) -> NDArray:
-    """Read the compliance of one entry.
+    """Read the compliance of an entry.
 
     Args:
-        path: the library's folder.
+        path: folder of the library.
         key: name of the entry.
 
     Returns:
@@ -124,7 +124,7 @@ def read_compliance(path: Path | str, key: str) -> NDArray:
 
 
 def read_library(path: Path | str) -> list[Entry]:
-    """Read all entries of a library, in the order of their keys.
+    """Read all entries of a library.
 
     Args:
         path: folder of the library.
@@ -145,22 +145,25 @@ def read_library(path: Path | str) -> list[Entry]:
 def look_up(
     entries: Sequence[Entry], wanted: Mapping[str, float], family: str = ""
 ) -> tuple[NDArray, NDArray]:
-    """Interpolate the stiffness between entries whose parameters form a grid.
+    """Interpolate the stiffness between the entries of a grid.
 
-    Link stiffnesses are nearly products of powers of lengths, so the logarithms of the
-    diagonal entries and the scaled off-diagonal entries are interpolated by polynomials
-    in the logarithms of the parameters, through up to four neighbours along each axis.
+    The interpolated quantities are the logarithms of the diagonal entries and the
+    off-diagonal entries divided by sqrt(K_ii K_jj). They are interpolated by
+    polynomials in the logarithms of the parameters, through up to four values of each
+    parameter. This is accurate because a stiffness is nearly a product of powers of
+    dimensions.
 
     Args:
         entries: entries of a full grid.
-        wanted: value of every parameter; a parameter with a single value in the grid
+        wanted: value of each parameter. A parameter with the same value in all entries
             may be omitted.
-        family: name of a family of parts given by surfaces; if empty, the grid of a
+        family: name of a family of parts given by surfaces. If empty, the grid of a
             shape or the only family is used.
 
     Returns:
-        (6, 6) stiffness and (6, 6) estimate of its error, which is the change when the
-        farthest entry along each axis is omitted, plus the errors of the entries.
+        Stiffness, (6, 6), and its estimated error, (6, 6). The error is the change of
+        the result if the farthest entry along each axis is omitted, plus the errors of
+        the entries.
 
     Raises:
         BadInput: a parameter is unknown, missing or outside the grid, or the entries do
@@ -211,7 +214,7 @@ def look_up(
 
 
 def _grid_of(entries: Sequence[Entry], family: str) -> list[Entry]:
-    """Return the entries of a family, or the entries on the grid of a shape."""
+    """Return the entries of a family or of the grid of a shape."""
     # single parts are not on a grid
     families = sorted({e.about["family"] for e in entries if e.about.get("family")})
     grid = [entry for entry in entries if "surface" not in entry.about]
@@ -236,7 +239,7 @@ def _interpolated(
     at: Sequence[float],
     most: Sequence[int],
 ) -> NDArray:
-    """Return the tensor-product Lagrange interpolation through the nearest values."""
+    """Interpolate by Lagrange polynomials through the nearest parameter values."""
     chosen, weights = [], []
     for axis, value, count in zip(axes, at, most, strict=True):
         near = sorted(axis, key=lambda v: abs(np.log(v / value)))[: max(count, 1)]

@@ -1,7 +1,7 @@
-"""Building of libraries from a file: a grid of one shape, and parts by surface.
+"""Computation of the entries of a library.
 
-Each entry is written completely or not at all, so a build can be interrupted and
-resumed, and several processes can share it.
+A build can be interrupted and continued later, and several processes can build the same
+library.
 """
 
 import itertools
@@ -39,15 +39,15 @@ _METHODS = ("beam", "fea")
 
 @dataclass(frozen=True)
 class Spec:
-    """Content of a library to build.
+    """Description of a library.
 
     Attributes:
         folder: folder of the library.
         shape: shape of all entries of the grid.
         method: ``"beam"`` or ``"fea"``.
-        grid: values of each parameter: lengths [m], ``young`` [Pa] and so on.
-        accuracy: required relative error of the finite elements.
-        links: parts given by surfaces, in addition to the grid or in its place.
+        grid: values of each parameter, such as ``length`` [m] and ``young`` [Pa].
+        accuracy: largest accepted relative error of the finite element stiffness.
+        links: parts given by surfaces.
     """
 
     folder: Path
@@ -58,7 +58,7 @@ class Spec:
     links: tuple[SurfaceLink, ...] = ()
 
     def points(self) -> list[dict[str, float]]:
-        """Return all combinations of the grid's values; empty without a shape."""
+        """Return all combinations of parameter values in the grid."""
         if not self.shape:
             return []
         names = list(self.grid)
@@ -72,15 +72,16 @@ def read_spec(path: Path | str) -> Spec:
     """Read a build file.
 
     Args:
-        path: TOML file with ``library`` and ``accuracy``, and either ``shape``,
-            ``method`` and a table ``grid`` of lists of numbers, or tables ``[[link]]``
-            of parts given by surfaces, or both.
+        path: TOML file with the keys ``library`` and ``accuracy``. A grid is defined by
+            the keys ``shape``, ``method`` and a table ``grid`` with lists of values.
+            Parts given by surfaces are defined by tables ``[[link]]`` or
+            ``[[family]]``.
 
     Returns:
-        The content, with the library folder relative to the folder of the file.
+        The description of the library.
 
     Raises:
-        BadInput: the file, a name or a value is invalid.
+        BadInput: the file, a key or a value is invalid.
     """
     path = Path(path)
     table = read_toml(path)
@@ -128,25 +129,25 @@ def read_spec(path: Path | str) -> Spec:
 
 
 def _is_number(value: object) -> bool:
-    """Check whether a value is a number of valid size other than a boolean."""
+    """Return whether a value is a number of valid size."""
     proper = isinstance(value, int | float) and not isinstance(value, bool)
     return proper and -LARGEST <= value <= LARGEST  # type: ignore[operator]
 
 
 def _lengths(point: Mapping[str, float]) -> dict[str, float]:
-    """Return the parameters that are lengths [m]."""
+    """Return the dimensions [m] among the parameters."""
     return {name: v for name, v in point.items() if name not in _MATERIAL}
 
 
 def entry_key(spec: Spec, point: Mapping[str, float]) -> str:
-    """Return the name of an entry, unique for its parameters.
+    """Return the key of an entry, which is unique for its parameters.
 
     Args:
-        spec: content of the library.
+        spec: description of the library.
         point: parameters of the entry.
 
     Returns:
-        The name, such as ``round-fea-length0.4-radius0.02-young6e+10-poisson0.3``.
+        The key, such as ``round-fea-length0.4-radius0.02-young6e+10-poisson0.3``.
     """
     values = "-".join(f"{name}{value:.9g}" for name, value in point.items())
     return f"{spec.shape}-{spec.method}-{values}"
@@ -157,15 +158,16 @@ def build_library(
     workers: int = 1,
     update: Callable[[int, int], None] | None = None,
 ) -> list[Path]:
-    """Compute the entries that are missing from the library.
+    """Compute the missing entries of a library.
 
     Args:
-        spec: content of the library.
+        spec: description of the library.
         workers: number of processes.
-        update: callback that receives the numbers of finished and of all entries.
+        update: callback that is called with the number of finished entries and the
+            number of all entries.
 
     Returns:
-        Paths of all entries of the library.
+        Paths of the files of all entries.
 
     Raises:
         BadInput: the folder cannot be created, or an entry cannot be computed.
@@ -199,7 +201,7 @@ def build_library(
 
 
 def _make_folder(folder: Path, write: bool = True) -> None:
-    """Create the library folder; without ``write`` only check that this is possible."""
+    """Create the folder of a library, or check that it can be created."""
     try:
         made = [one for one in (folder, *folder.parents) if not one.exists()]
         folder.mkdir(parents=True, exist_ok=True)
@@ -211,14 +213,14 @@ def _make_folder(folder: Path, write: bool = True) -> None:
 
 
 def _key(spec: Spec, wanted: dict[str, float] | SurfaceLink) -> str:
-    """Return the name of a grid entry, or of a part given by its surface."""
+    """Return the key of an entry."""
     if isinstance(wanted, SurfaceLink):
         return wanted.name
     return entry_key(spec, wanted)
 
 
 def _make_entry(spec: Spec, wanted: dict[str, float] | SurfaceLink) -> None:
-    """Compute an entry and write its file."""
+    """Compute an entry, and write its file."""
     if isinstance(wanted, SurfaceLink):
         request = wanted.request()
         link, parameters = wanted.solve(), wanted.parameters
@@ -246,7 +248,7 @@ def _make_entry(spec: Spec, wanted: dict[str, float] | SurfaceLink) -> None:
 
 
 def _solve_point(spec: Spec, point: dict[str, float]) -> tuple[LinkStiffness, str]:
-    """Compute the link at a grid point, and a hash of its geometry."""
+    """Compute the link for given parameters, and a hash of its geometry."""
     lengths, E, nu = _lengths(point), point["young"], point["poisson"]
     tip = np.array([0.0, 0.0, lengths["length"]])
     if spec.method == "beam":

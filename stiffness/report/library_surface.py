@@ -1,7 +1,8 @@
-"""Library entries for parts given by surfaces: single parts and families.
+"""Library entries for parts given by surfaces.
 
-A family is a table of surface files and sizes, between which ``look_up`` interpolates.
-An entry is recomputed if the content of its surface file or any setting has changed.
+A family of parts is a CSV table with surface files and sizes. The function ``look_up``
+interpolates between the parts of a family. An entry is recomputed if its surface file
+or a setting has changed.
 """
 
 import hashlib
@@ -25,22 +26,23 @@ _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
 
 @dataclass(frozen=True)
 class SurfaceLink:
-    """A library part given by its surface.
+    """A part in a library, given by its surface.
 
     Attributes:
         name: name of the entry in the library.
-        surface: surface file, relative to the folder of the build file or absolute.
-        base: text of the held interface.
-        tip: text of the moving interface.
+        surface: path of the surface file.
+        base: text of the clamped interface.
+        tip: text of the loaded interface.
         young: [Pa] Young's modulus.
         poisson: [-] Poisson's ratio.
         density: [kg/m^3] density; 0 to omit mass and inertia.
         unit: unit of length in the surface file.
         interface: one of :data:`forcefit.stiffness.fem.condensation.KINDS`.
-        accuracy: [1] required relative error of every entry of K.
-        family: name of a family of parts that differ in size; empty for a single part.
-        sizes: [m] sizes of this part in a family, by name.
-        parts: texts for regions of another material, as on the command line.
+        accuracy: [1] largest accepted relative error of the stiffness.
+        family: name of the family of this part; empty for a single part.
+        sizes: [m] sizes of this part, by name; empty for a single part.
+        parts: texts of materials in parts of the link, see
+            :func:`forcefit.stiffness.fem.part_text.parse_part`.
     """
 
     name: str
@@ -59,15 +61,15 @@ class SurfaceLink:
 
     @property
     def parameters(self) -> dict[str, float]:
-        """Sizes and material constants by name, as for a grid entry."""
+        """Sizes [m] and material constants by name."""
         given = dict(self.sizes) | {"young": self.young, "poisson": self.poisson}
         return given | ({"density": self.density} if self.density else {})
 
     def request(self) -> dict[str, Any]:
-        """Collect all data on which the entry depends, including a hash of the surface.
+        """Collect all data on which the entry depends.
 
         Returns:
-            Plain values, which are equal for equal settings.
+            The settings and a hash of the surface file, as plain values.
 
         Raises:
             BadInput: the surface file cannot be read.
@@ -119,8 +121,8 @@ def read_surface_links(root: Table, accuracy: float) -> tuple[SurfaceLink, ...]:
     """Read the tables ``[[link]]`` and ``[[family]]`` of a build file.
 
     Args:
-        root: root table of the file.
-        accuracy: required accuracy of parts without one in the file.
+        root: content of the file.
+        accuracy: default of the accuracy of a part.
 
     Returns:
         The parts in the order of the file.
@@ -146,7 +148,7 @@ def read_surface_links(root: Table, accuracy: float) -> tuple[SurfaceLink, ...]:
 
 
 def _add(links: dict[str, SurfaceLink], link: SurfaceLink, table: Table) -> None:
-    """Add a part; reject a name that is already in use."""
+    """Add a part, and reject a name that is already in use."""
     if link.name in links:
         found = f"found {quoted(link.name)} twice, expected other names"
         raise table.bad("name", found)
@@ -154,7 +156,7 @@ def _add(links: dict[str, SurfaceLink], link: SurfaceLink, table: Table) -> None
 
 
 def _link(table: Table, surface: Path, accuracy: float) -> SurfaceLink:
-    """Read the keys common to the tables of links and families."""
+    """Read the common keys of the tables ``[[link]]`` and ``[[family]]``."""
     from forcefit.stiffness.fem.condensation import KINDS
     from forcefit.stiffness.fem.part_text import read_parts
 
@@ -180,16 +182,16 @@ def _link(table: Table, surface: Path, accuracy: float) -> SurfaceLink:
 
 
 def family_of(common: SurfaceLink, file: Path) -> list[SurfaceLink]:
-    """Read the parts of a family from a CSV table of files and sizes.
+    """Read the parts of a family from a CSV table.
 
     Args:
-        common: common settings of all parts, with the name of the family. Interface
-            texts may contain sizes in braces, such as ``"z={length}"``.
-        file: table with a column ``surface``, relative to the table's folder, and a
-            column for each size [m].
+        common: settings of all parts. The texts of the interfaces may contain names of
+            sizes in braces, such as ``"z={length}"``.
+        file: CSV table with a column ``surface``, whose paths are relative to the
+            folder of the table, and a column for each size [m].
 
     Returns:
-        One part per row.
+        A part for each row of the table.
 
     Raises:
         BadInput: the table, a file or an interface is invalid.
@@ -227,7 +229,7 @@ def family_of(common: SurfaceLink, file: Path) -> list[SurfaceLink]:
 
 
 def _size(place: str, name: str, cell: str) -> float:
-    """Parse the length [m] in a cell."""
+    """Parse the size [m] in a cell of the table."""
     try:
         value = float(cell)
     except ValueError:
@@ -239,7 +241,7 @@ def _size(place: str, name: str, cell: str) -> float:
 
 
 def _filled(interface: Any, sizes: Mapping[str, float]) -> Any:
-    """Replace size names in the text of an interface by their values."""
+    """Replace the names of sizes in the text of an interface by their values."""
     if not isinstance(interface, str):
         return interface
     for name, value in sizes.items():
@@ -248,14 +250,14 @@ def _filled(interface: Any, sizes: Mapping[str, float]) -> Any:
 
 
 def is_current(file: Path, link: SurfaceLink) -> bool:
-    """Check whether an entry exists and was computed with the current settings.
+    """Return whether an entry exists and was computed with the current settings.
 
     Args:
         file: file of the entry.
-        link: the requested part.
+        link: the part.
 
     Returns:
-        True if the entry can be used; False if its file is damaged.
+        True if the entry can be used.
 
     Raises:
         BadInput: the surface file cannot be read.

@@ -1,4 +1,4 @@
-"""HTML report on a link's finite element stiffness: K_E, its error and mesh."""
+"""HTML report on the finite element stiffness of a link."""
 
 import math
 from typing import Any
@@ -29,14 +29,14 @@ _UNITS = {"surface_volume": "m^3", "surface_area": "m^2",
 
 
 def link_page(link: LinkStiffness, provenance: Provenance) -> str:
-    """Format the report page of a link computed by finite elements.
+    """Format the HTML report of a link.
 
     Args:
         link: result of :func:`forcefit.stiffness.fem.fea.solve_link`.
-        provenance: command and files.
+        provenance: command and files from which the link was computed.
 
     Returns:
-        Self-contained HTML.
+        HTML text without references to other files.
     """
     place = ", ".join(f"{v:g}" for v in link.tip)
     return page(
@@ -60,7 +60,7 @@ def link_page(link: LinkStiffness, provenance: Provenance) -> str:
 
 
 def _errors(link: LinkStiffness) -> str:
-    """Plot the estimated errors of the entries of K_E."""
+    """Plot the estimated error of each entry of K_E."""
     errors = 100 * link.relative_errors
     return matrix(
         errors, SCREW, "error [%]",
@@ -70,7 +70,7 @@ def _errors(link: LinkStiffness) -> str:
 
 
 def _verdict(link: LinkStiffness) -> str:
-    """Format a sentence on the estimated error, the requirement and any doubts."""
+    """Format a sentence on the estimated error and the required accuracy."""
     mesh, error = link.mesh, 100 * link.relative_error_estimate
     outcome = "reached" if mesh["reached"] else "not reached within the budget"
     text = (
@@ -82,14 +82,14 @@ def _verdict(link: LinkStiffness) -> str:
 
 
 def _good(link: LinkStiffness) -> bool | None:
-    """Return whether the accuracy was reached; None if the surface is doubtful."""
+    """Return whether the accuracy was reached, or None if the surface is doubtful."""
     if not link.mesh["reached"]:
         return False
     return None if _doubtful(link) else True
 
 
 def _doubtful(link: LinkStiffness) -> list[str]:
-    """List doubts about the surface and its mesh as sentences."""
+    """List possible defects of the surface and the mesh as sentences."""
     mesh = link.mesh
     found = [f"Repaired: {one}." for one in mesh["repairs"]]
     if not mesh["closed"]:
@@ -103,13 +103,13 @@ def _doubtful(link: LinkStiffness) -> list[str]:
 
 
 def _doubts(link: LinkStiffness) -> str:
-    """Format the section on doubts about the surface; empty without doubts."""
+    """Format the section on possible defects of the surface."""
     found = _doubtful(link)
     return section("Doubts about the surface", listed(found)) if found else ""
 
 
 def _tiles(link: LinkStiffness) -> list[Tile]:
-    """Return tiles for the error, the smallest stiffnesses, the mesh and the mass."""
+    """Return tiles with the main results."""
     K = np.diag(link.stiffness)
     turn, shift = int(np.argmin(K[:3])), 3 + int(np.argmin(K[3:]))
     tiles = [
@@ -146,15 +146,14 @@ def matrix_table(
     """Format a (6, 6) matrix as an HTML table.
 
     Args:
-        values: (6, 6) stiffness or compliance.  Entries that are round-off relative to
-            sqrt(K_ii K_jj) are shown as zero; entries that are not finite are shown as
-            ``rigid``.
+        values: (6, 6) stiffness or compliance. Entries that are negligible relative to
+            sqrt(K_ii K_jj) are shown as zero, and infinite entries as ``rigid``.
         rows: names of the rows.
-        name: name of the table.
+        name: title of the table.
         columns: names of the columns.
 
     Returns:
-        HTML of the table.
+        HTML text of the table.
     """
     size = np.sqrt(np.abs(np.nan_to_num(np.diag(values), posinf=0.0)))
     shown = np.where(np.abs(values) < 1e-10 * np.outer(size, size), 0.0, values)
@@ -171,7 +170,7 @@ def stiffness_unit(i: int, j: int) -> str:
 
 
 def _mesh(link: LinkStiffness) -> str:
-    """Format the section on the mesh and the mass."""
+    """Format the section on the mesh and the mass properties."""
     rows: list[list[Cell]] = [
         [in_words(key), _cell(key, link.mesh[key])] for key in _MESH if key in link.mesh
     ]
@@ -185,7 +184,7 @@ def _mesh(link: LinkStiffness) -> str:
 
 
 def _cell(key: str, value: Any) -> Cell:
-    """Return a value from the mesh report with its unit."""
+    """Format a value from the mesh report with its unit."""
     if isinstance(value, str):
         return value
     unit = _UNITS.get(key) or unit_of(key)

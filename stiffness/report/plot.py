@@ -1,4 +1,4 @@
-"""Figures of stiffnesses. Each function takes a result and returns a figure."""
+"""Figures of link stiffnesses and stresses."""
 
 from typing import TYPE_CHECKING
 
@@ -22,13 +22,13 @@ if TYPE_CHECKING:
 
 
 def plot_comparison(comparison: LinkComparison) -> "Figure":
-    """Plot K_E by finite elements and by beam theory, and their difference.
+    """Plot the stiffnesses by finite elements and by beam theory, and their difference.
 
     Args:
-        comparison: comparison of one link by two methods.
+        comparison: comparison of the two stiffnesses of a link.
 
     Returns:
-        A figure with a pair of bars per significant entry, and a map of differences.
+        A figure with two bars for each significant entry, and a map of the differences.
     """
     from matplotlib.figure import Figure
 
@@ -54,7 +54,7 @@ def plot_comparison(comparison: LinkComparison) -> "Figure":
 
 
 def _plot_entries(axes: "Axes", links: "Sequence[LinkStiffness]") -> None:
-    """Plot the entries above a thousandth of their scale, as bars for each link."""
+    """Plot the significant entries as bars."""
     entries = entries_that_matter(links[0].stiffness)
     width = 0.8 / len(links)
     for k, link in enumerate(links):
@@ -72,13 +72,14 @@ def _plot_entries(axes: "Axes", links: "Sequence[LinkStiffness]") -> None:
 
 
 def plot_slenderness(sweep: SlendernessSweep) -> "Figure":
-    """Plot the difference between elements and beam over L / r with its fit.
+    """Plot the end effect over slenderness, with its fit.
 
     Args:
         sweep: comparisons of one section at several lengths.
 
     Returns:
-        A figure with one curve per significant entry, and mesh errors as error bars.
+        A figure with a curve for each significant entry. Error bars show the mesh
+        errors.
     """
     from matplotlib.figure import Figure
 
@@ -87,7 +88,7 @@ def plot_slenderness(sweep: SlendernessSweep) -> "Figure":
     ratio = sweep.slenderness
     fine = np.geomspace(ratio.min(), ratio.max(), 200)
     errors = [100 * c.fea.relative_error_estimate for c in sweep.comparisons]
-    # entries of a round section occur in equal pairs, of which only one is plotted
+    # of two equal entries of a round section, only the first is plotted
     plotted: list[tuple[int, int]] = []
     for entry in entries_that_matter(sweep.comparisons[0].beam.stiffness):
         c, d = sweep.end_effect[entry], sweep.second[entry]
@@ -120,19 +121,19 @@ def plot_stress(
     section: "Mapping[str, float] | None" = None,
     up: ArrayLike | None = None,
 ) -> "Figure":
-    """Plot the von Mises stress due to one wrench from base to tip.
+    """Plot the von Mises stress due to a wrench over the position along the link.
 
     Args:
-        everywhere: stresses of unit wrenches at all nodes, including the interfaces.
-        peak: peak stress of the wrench.
+        everywhere: stresses due to unit wrenches at all nodes.
+        peak: peak stress due to the wrench.
         base: (3,) [m] position of the base.
         tip: (3,) [m] position of the tip.
-        section: section of a beam whose stress is plotted too.
-        up: (3,) vector along the section's z axis.
+        section: section of a beam, to plot the stress by beam theory.
+        up: (3,) vector in the direction of the section's z axis.
 
     Returns:
-        A figure with one dot per node. A line shows the largest stress in each section
-        of the beam, and the evaluated region is white.
+        A figure with a dot for each node, and a line for the largest stress in each
+        section of the beam. Regions that were not evaluated are shaded.
     """
     from matplotlib.figure import Figure
 

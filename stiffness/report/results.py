@@ -1,4 +1,4 @@
-"""Link stiffness results as plain values and as text."""
+"""Results on link stiffnesses as plain values and as text."""
 
 import math
 from typing import TYPE_CHECKING, Any
@@ -17,13 +17,13 @@ if TYPE_CHECKING:
 
 
 def link_results(link: LinkStiffness) -> dict[str, Any]:
-    """Return the object that ``--json`` writes for one link.
+    """Return the JSON object of a link.
 
     Args:
         link: a link.
 
     Returns:
-        Arrays and numbers in SI units under the keys of the public format.
+        Dictionary of arrays and numbers in SI units.
     """
     results: dict[str, Any] = {
         "method": link.method,
@@ -45,13 +45,13 @@ def link_results(link: LinkStiffness) -> dict[str, Any]:
 
 
 def comparison_results(comparison: LinkComparison) -> dict[str, Any]:
-    """Return the object that ``--json`` writes for a beam and finite elements.
+    """Return the JSON object of a comparison of beam and finite elements.
 
     Args:
-        comparison: comparison of one link by two methods.
+        comparison: comparison of the two stiffnesses of a link.
 
     Returns:
-        Both links, the difference of each entry, and an explanatory text.
+        Dictionary with both links, the difference of each entry, and an explanation.
     """
     return {
         "beam": link_results(comparison.beam),
@@ -66,13 +66,14 @@ def comparison_results(comparison: LinkComparison) -> dict[str, Any]:
 
 
 def sweep_results(sweep: "SlendernessSweep") -> dict[str, Any]:
-    """Return the object that ``--json`` writes for a sweep over slenderness.
+    """Return the JSON object of a sweep over slenderness.
 
     Args:
         sweep: comparisons of one section at several lengths.
 
     Returns:
-        Both stiffnesses at each length, their differences, and an explanatory text.
+        Dictionary with both stiffnesses at each length, their differences, and an
+        explanation.
     """
     return {
         "size": sweep.comparisons[0].size,
@@ -92,14 +93,13 @@ def sweep_results(sweep: "SlendernessSweep") -> dict[str, Any]:
 
 
 def stress_results(peak: "PeakStress") -> dict[str, Any]:
-    """Return the object that ``--json`` writes for the peak stress of a wrench.
+    """Return the JSON object of a peak stress.
 
     Args:
-        peak: peak stress by finite elements, and by the beam formula for a known
-            section.
+        peak: peak stress due to a wrench.
 
     Returns:
-        Stresses, their positions and the evaluated region.
+        Dictionary with stresses, their positions and the evaluated region.
     """
     results: dict[str, Any] = {
         "wrench": peak.wrench,
@@ -119,7 +119,7 @@ def stress_results(peak: "PeakStress") -> dict[str, Any]:
 
 
 def link_text(link: LinkStiffness) -> str:
-    """Format a link as text: its stiffness, estimated error and mesh.
+    """Format the stiffness of a link as text.
 
     Args:
         link: a link.
@@ -167,7 +167,7 @@ def comparison_text(comparison: LinkComparison) -> str:
     """Format a comparison of beam and finite elements as text.
 
     Args:
-        comparison: comparison of one link by two methods.
+        comparison: comparison of the two stiffnesses of a link.
 
     Returns:
         Lines of text.
@@ -211,11 +211,10 @@ def sweep_text(sweep: "SlendernessSweep") -> str:
 
 
 def stress_text(peak: "PeakStress") -> str:
-    """Format the peak stress of a wrench as text.
+    """Format a peak stress as text.
 
     Args:
-        peak: peak stress by finite elements, and by the beam formula for a known
-            section.
+        peak: peak stress due to a wrench.
 
     Returns:
         Lines of text.
@@ -234,7 +233,7 @@ def stress_text(peak: "PeakStress") -> str:
 
 
 def _stress_error(peak: "PeakStress") -> str:
-    """Format the estimated error of a stress, or the reason why it is undefined."""
+    """Format the estimated error of a stress."""
     if not math.isfinite(peak.error):
         return "none, the peak lies on an inner edge where stress has no finite value"
     share = peak.error / peak.von_mises if peak.von_mises else 0.0
@@ -248,7 +247,7 @@ def _megapascals(stress: float, place: NDArray) -> str:
 
 
 def matrix_text(stiffness: NDArray) -> str:
-    """Format a stiffness as text, with named rows and columns.
+    """Format a stiffness as text with names of rows and columns.
 
     Args:
         stiffness: (6, 6) stiffness.
@@ -260,7 +259,7 @@ def matrix_text(stiffness: NDArray) -> str:
 
 
 def _matrix(matrix: NDArray, form: str) -> list[str]:
-    """Format a 6 by 6 matrix as lines of text, with round-off shown as zero."""
+    """Format a 6 by 6 matrix as lines of text. Round-off is shown as zero."""
     head = "   " + "".join(f"{name:>14}" for name in SCREW)
     noise = 1e-12 * np.abs(matrix).max()
     rows = np.where(np.abs(matrix) < noise, 0.0, matrix)

@@ -1,12 +1,13 @@
-r"""End effect: comparison of beam theory and finite elements over slenderness.
+r"""Comparison of beam theory and finite elements over slenderness.
 
-One section is compared at several lengths. Near a rigid face, the section cannot warp
-or contract. The size of this zone depends on the section but not on the length, so the
-link is as stiff as a beam that is shorter by a fixed length:
+Near a rigid interface, the section cannot warp or contract. The extent of this end
+effect does not depend on the length L of the link. With the section size r, the ratio
+of the stiffnesses is
 
     K / K_beam = 1 + c r / L + d (r / L)^2.
 
-The coefficient c depends on the section, the interfaces and Poisson's ratio. The
+The coefficients c and d depend on the section, the interfaces and Poisson's ratio. They
+are fitted to the stiffnesses of links with the same section and different lengths. The
 residual of the fit should not exceed the mesh errors.
 """
 
@@ -34,14 +35,15 @@ _SHAPES = {
 
 @dataclass(frozen=True, eq=False)
 class SlendernessSweep:
-    """Comparisons of a section at several lengths, and the fitted end effect.
+    """Comparisons for a section at several lengths, and the fitted end effect.
 
     Attributes:
-        comparisons: comparisons of beam and finite elements, shortest link first.
-        end_effect: (6, 6) [1] fitted c, for K scaled by sqrt(K_ii K_jj) of the beam.
-        end_effect_error: (6, 6) [1] error of c caused by the estimated mesh errors.
-        second: (6, 6) [1] fitted coefficient d of the second-order term.
-        residual: (n, 6, 6) [1] differences minus the fit.
+        comparisons: comparisons of beam theory and finite elements, shortest link
+            first.
+        end_effect: (6, 6) [1] fitted coefficient c of each entry.
+        end_effect_error: (6, 6) [1] error of c due to the estimated mesh errors.
+        second: (6, 6) [1] fitted coefficient d of each entry.
+        residual: (n, 6, 6) [1] residual of the fit at each length.
     """
 
     comparisons: tuple[LinkComparison, ...]
@@ -54,7 +56,7 @@ class SlendernessSweep:
 
     @property
     def slenderness(self) -> NDArray:
-        """(n,) slenderness L / r of each comparison."""
+        """Slenderness L / r of each comparison, (n,)."""
         return np.array([c.slenderness for c in self.comparisons])
 
     @property
@@ -82,25 +84,25 @@ def sweep_slenderness(
     interface: str = "rigid",
     update: Callable[[int, int], None] | None = None,
 ) -> SlendernessSweep:
-    """Compare beam theory and finite elements for one section at several lengths.
+    """Compare beam theory and finite elements for a section at several lengths.
 
     Args:
-        section: ``radius`` and optionally ``inner_radius``, or ``width`` and ``height``
-            and optionally ``wall`` [m].
+        section: dimensions [m] by name: ``radius`` and optionally ``inner_radius``, or
+            ``width``, ``height`` and optionally ``wall``.
         E: [Pa] Young's modulus.
         nu: [-] Poisson's ratio.
-        ratios: two or more values of L / r, with r as in
+        ratios: two or more values of L / r, where r is
             :attr:`forcefit.stiffness.beam.sections.Section.size`.
-        accuracy: [1] required relative error of the finite elements.
-        interface: kind of the interfaces of the solid.
-        update: callback that receives the numbers of finished and of all lengths.
+        accuracy: [1] largest accepted relative error of the finite element stiffness.
+        interface: kind of the interfaces, one of ``KINDS``.
+        update: callback that is called with the number of finished lengths and the
+            number of all lengths.
 
     Returns:
         The comparisons with the fit.
 
     Raises:
-        BadInput: the section is not of these kinds, or fewer than two lengths are
-        given.
+        BadInput: the section is invalid, or fewer than two ratios are given.
     """
     from forcefit.stiffness.fem.fea import FemOptions, solve_link
     from forcefit.stiffness.fem.material import Material
@@ -139,7 +141,7 @@ def fit_end_effect(comparisons: Sequence[LinkComparison]) -> SlendernessSweep:
     """Fit c and d of K / K_beam = 1 + c r / L + d (r / L)^2.
 
     Args:
-        comparisons: comparisons of one section at two or more lengths.
+        comparisons: comparisons for a section at two or more lengths.
 
     Returns:
         The comparisons with the fit.

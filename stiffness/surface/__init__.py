@@ -1,4 +1,4 @@
-"""Surface of a part: reading, checking, and division at its two interfaces.
+"""Surfaces of links: readers, checks, interfaces and exact shapes.
 
-Start with ``surface.py``.  ``interface.py`` defines the faces that are held and moved.
+Start with ``surface.py``, which reads a surface, and ``interface.py``.
 """

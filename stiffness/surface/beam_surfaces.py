@@ -1,4 +1,4 @@
-"""Surfaces of common link shapes from lengths, along z with the base at z = 0."""
+"""Surfaces of common link shapes."""
 
 from collections.abc import Mapping
 
@@ -10,7 +10,7 @@ from forcefit.stiffness.beam.curve import Piece, straight_piece
 from forcefit.stiffness.beam.sections import Section, declared_section, round_section
 from forcefit.stiffness.surface.surface import Surface, check_surface
 
-# names of the lengths of each shape, with defaults of optional lengths
+# names and defaults of the dimensions of each shape; None if there is no default
 SHAPES: dict[str, dict[str, float | None]] = {
     "round": {"length": None, "radius": None},
     "tube": {"length": None, "radius": None, "inner_radius": None},
@@ -22,14 +22,14 @@ _FACETS = 64
 
 
 def check_shape(shape: str, lengths: Mapping[str, float]) -> None:
-    """Reject an unknown shape or wrong names of lengths.
+    """Check a shape and its dimensions.
 
     Args:
         shape: one of ``SHAPES``.
-        lengths: lengths [m] by name.
+        lengths: dimensions [m] by name.
 
     Raises:
-        BadInput: a name is unknown or missing, or a length is not > 0.
+        BadInput: a name is unknown or missing, or a dimension is not > 0.
     """
     if shape not in SHAPES:
         raise BadInput(f'shape: unknown "{shape}"{nearest(shape, SHAPES)}')
@@ -51,23 +51,23 @@ def check_shape(shape: str, lengths: Mapping[str, float]) -> None:
 
 
 def shape_surface(shape: str, lengths: Mapping[str, float]) -> Surface:
-    """Create the closed surface of a shape.
+    """Create the surface of a shape.
 
     Args:
         shape: one of ``SHAPES``.
-        lengths: lengths [m] by name.
+        lengths: dimensions [m] by name.
 
     Returns:
-        The surface, with facet corners on the exact shape.
+        The closed surface. The axis of the link is z, and the base is at z = 0.
 
     Raises:
-        BadInput: the shape or a length is invalid.
+        BadInput: the shape or a dimension is invalid.
     """
     check_shape(shape, lengths)
     L = lengths["length"]
     if shape in {"rectangle", "box"}:
         corner = np.array([[1, -1], [1, 1], [-1, 1], [-1, -1]]) / 2
-        # the height is along y, because ``up`` of a beam along z is y by default
+        # the height is along y, which is the default of ``up`` for a beam along z
         sides = np.array([lengths["width"], lengths["height"]])
         hole = corner * (sides - 2 * lengths["wall"]) if shape == "box" else None
         return _prism(corner * sides, corner * sides, L, shape, hole)
@@ -88,7 +88,7 @@ def _prism(
     name: str,
     hole: NDArray | None = None,
 ) -> Surface:
-    """Create the surface between two outlines, closed by fans or by rings."""
+    """Create the surface between two outlines."""
     count = len(base)
     inner = np.zeros((1, 2)) if hole is None else hole
     layers = [base, tip, inner, inner]
@@ -111,18 +111,18 @@ def _prism(
 
 
 def shape_beam(shape: str, lengths: Mapping[str, float], nu: float) -> list[Piece]:
-    """Create the beam equivalent to a shape, along z with its height along y.
+    """Create the beam of a shape.
 
     Args:
         shape: one of ``SHAPES``.
-        lengths: lengths [m] by name.
+        lengths: dimensions [m] by name.
         nu: [-] Poisson's ratio, which determines the shear factors.
 
     Returns:
-        A list with the single piece of the beam.
+        A list with one segment. The beam is along z, and its height is along y.
 
     Raises:
-        BadInput: the shape or a length is invalid.
+        BadInput: the shape or a dimension is invalid.
     """
     check_shape(shape, lengths)
     top = [0.0, 0.0, lengths["length"]]

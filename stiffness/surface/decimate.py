@@ -1,8 +1,8 @@
-"""Reduction of the number of surface triangles, to save meshing time.
+"""Reduction of the number of triangles of a surface.
 
-CAD programs create long thin triangles for bars and bores. These slow pytetwild down,
-because it cuts its first tetrahedra along all triangles. Mesh corners are later
-projected onto the exact shapes of the part, so the mesher may read a coarser surface.
+The surfaces of bars and bores from CAD programs consist of long thin triangles, for
+which the mesher is slow. Because mesh corners are moved onto the exact shapes after
+meshing, a coarser surface is sufficient for the mesher.
 """
 
 import numpy as np
@@ -10,26 +10,25 @@ from numpy.typing import NDArray
 
 from forcefit.stiffness.surface.surface import Surface, directed_edges, signed_volume
 
-_VOLUME = 0.01  # accepted relative difference of the enclosed volumes
-# trial numbers of triangles relative to the original number, in this order
+_VOLUME = 0.01  # largest accepted relative difference between the enclosed volumes
+# tested ratios of the number of triangles to the original number
 _PARTS = 0.01 * 1.4 ** np.arange(13)
 
 
 def coarser_surface(surface: Surface, tolerance: float) -> tuple[NDArray, NDArray]:
-    """Coarsen a surface within a tolerance; return the best of a dozen attempts.
+    """Reduce the number of triangles of a surface within a tolerance.
 
     Args:
         surface: closed surface.
-        tolerance: [m] largest distance between both surfaces, evaluated at the corners
-            of the given surface and at the corners, edge midpoints and centres of the
-            coarser surface.
+        tolerance: [m] largest accepted distance between the two surfaces.
 
     Returns:
-        Points (n, 3) [m] and triangles (m, 3) of a closed surface with the same genus,
-        and the same volume within 1 %. If no attempt succeeds, the given surface.
+        Points, (n, 3) [m], and triangles, (m, 3), of a closed surface with the same
+        number of holes, and with the same volume to 1 %. If there is no such surface,
+        the result is the given surface.
 
     Sources:
-        Garland & Heckbert (1997) for the quadric decimation, as implemented in VTK.
+        Garland & Heckbert (1997) for the decimation, as implemented in VTK.
     """
     import pyvista
 
@@ -59,25 +58,25 @@ def coarser_surface(surface: Surface, tolerance: float) -> tuple[NDArray, NDArra
 
 
 def _distance(mesh: object, points: NDArray) -> float:
-    """Return the distance [m] of the farthest point from a mesh."""
+    """Return the largest distance of points from a mesh [m]."""
     _, near = mesh.find_closest_cell(points, return_closest_point=True)  # type: ignore[attr-defined]
     return float(np.linalg.norm(near - points, axis=1).max())
 
 
 def _closed(triangles: NDArray) -> bool:
-    """Check whether every edge belongs to two triangles."""
+    """Return whether every edge belongs to two triangles."""
     edges = np.sort(directed_edges(triangles), axis=1)
     return bool((np.unique(edges, axis=0, return_counts=True)[1] == 2).all())
 
 
 def euler_characteristic(triangles: NDArray) -> int:
-    """Return vertices minus edges plus triangles: 2 - 2 genus for each closed shell.
+    """Return the number of vertices minus edges plus triangles.
 
     Args:
-        triangles: (m, 3) corners.
+        triangles: (m, 3) corners of the triangles.
 
     Returns:
-        The Euler characteristic, summed over all shells.
+        The Euler characteristic, which is 2 - 2 g for a closed surface with g holes.
     """
     edges = np.sort(directed_edges(triangles), axis=1)
     corners = len(np.unique(triangles))

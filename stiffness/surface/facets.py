@@ -1,10 +1,10 @@
-"""Curved patches of unknown shape, smoothed by Phong tessellation.
+"""Smooth surfaces through triangles, for patches of unknown shape.
 
-A point on a facet is projected onto the tangent planes at the three corners, and the
-point is displaced by half of the weighted mean of the offsets to these projections
-(Boubekeur & Alexa 2008, Phong tessellation). Along each edge, the smaller of the two
-offsets is used. For an arc of half-angle a, the error is about a^4 times the radius,
-compared with about a^2 times the radius for flat facets.
+A point on a facet is projected onto the tangent planes at the three corners. It is then
+lifted by half of the weighted mean of these projections (Boubekeur & Alexa 2008, Phong
+tessellation). Along each edge, the smaller of two lifts is used. For an arc with the
+half-angle a, the error is about a^4 times the radius. For flat facets, it is about a^2
+times the radius.
 """
 
 from dataclasses import dataclass, field
@@ -18,12 +18,12 @@ from forcefit.stiffness.surface.surface import area_vectors
 
 @dataclass(frozen=True, eq=False)
 class Facets:
-    """A patch of triangles, lifted to approximate a smooth surface.
+    """A smooth surface through the corners of triangles.
 
     Attributes:
         points: (n, 3) [m] corners of the triangles.
-        triangles: (m, 3) indices of points, in outward orientation.
-        normals: (n, 3) unit normals at the points, computed from this patch only.
+        triangles: (m, 3) indices of points, counterclockwise as seen from outside.
+        normals: (n, 3) unit normals at the points.
     """
 
     points: NDArray
@@ -39,7 +39,7 @@ class Facets:
         object.__setattr__(self, "normals", self._corner_normals())
 
     def _corner_normals(self) -> NDArray:
-        """Return the corner normals, averages of facet normals weighted by angle."""
+        """Return the means of facet normals at corners, weighted by angle, (n, 3)."""
         facing = area_vectors(self.points, self.triangles)
         facing /= np.maximum(np.linalg.norm(facing, axis=1), 1e-300)[:, None]
         corners = self.points[self.triangles]
@@ -53,22 +53,22 @@ class Facets:
         return total / np.maximum(np.linalg.norm(total, axis=1), 1e-300)[:, None]
 
     def edge_lifts(self, edges: NDArray) -> NDArray:
-        """Return (e,) [m] lifts at the midpoints of edges, from their ends' planes."""
+        """Return the lifts at the midpoints of edges, (e,) [m]."""
         rises = _rises(self.points[edges], self.normals[edges], limited=False)
         return np.asarray(np.linalg.norm(rises, axis=1) / 4)
 
     def lifts(self) -> NDArray:
-        """Return (m,) [m] largest lift of each facet at the midpoints of edges."""
+        """Return the largest lift on the edges of each facet, (m,) [m]."""
         sides = [self.edge_lifts(self.triangles[:, [k, k - 1]]) for k in range(3)]
         return np.asarray(np.max(sides, axis=0))
 
     def distance(self, points: NDArray) -> NDArray:
-        """Return the (n,) [m] distances of points from the flat facets."""
+        """Return the distances of points from the flat facets, (n,) [m]."""
         _, foot = self._mesh.find_closest_cell(points, return_closest_point=True)
         return np.asarray(np.linalg.norm(points - np.atleast_2d(foot), axis=1))
 
     def signed(self, points: NDArray) -> tuple[NDArray, NDArray]:
-        """Return signed distances (n,) [m] from the lifted facets, and gradients."""
+        """Return signed distances, (n,) [m], and their gradients, (n, 3)."""
         cell, foot = self._mesh.find_closest_cell(points, return_closest_point=True)
         members = self.triangles[np.atleast_1d(cell)]
         foot = np.atleast_2d(foot)
@@ -85,9 +85,9 @@ class Facets:
 
 
 def _rises(corners: NDArray, normals: NDArray, limited: bool) -> NDArray:
-    """Return (e, 3) [m] four times the lifts at the midpoints of edges."""
-    # Of the lifts at the two ends, the smaller is used. If they have different signs,
-    # as where a flat side meets a fillet, the lift is zero.
+    """Return four times the lifts at the midpoints of edges, (e, 3) [m]."""
+    # The smaller of the lifts at the two ends is used. If their signs differ, as
+    # between a flat side and a fillet, the lift is zero.
     along = corners[:, 0] - corners[:, 1]
     heights = np.stack([
         np.einsum("ei,ei->e", sign * along, normals[:, k])
@@ -100,7 +100,7 @@ def _rises(corners: NDArray, normals: NDArray, limited: bool) -> NDArray:
 
 
 def _barycentric(corners: NDArray, points: NDArray) -> NDArray:
-    """Return the (p, 3) barycentric coordinates of points in triangles (p, 3, 3)."""
+    """Return the barycentric coordinates of points in triangles, (p, 3)."""
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     size = np.maximum(np.einsum("pi,pi->p", normal, normal), 1e-300)
     shares = [

@@ -1,4 +1,4 @@
-"""Solids in a STEP file that together form one link, and the faces between them."""
+"""Solids in a STEP file that form one link."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,13 +9,14 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True, eq=False)
 class FilledSolids:
-    """Touching solids and their triangles.
+    """Solids that touch, and their triangles.
 
     Attributes:
         names: names of the solids.
         points: (n, 3) [m] corners.
-        triangles: (m, 3) indices of points; solids that touch share triangles.
-        sides: (m, 2) index in ``names`` of the solid on each side, or -1.
+        triangles: (m, 3) indices of points. A triangle between two solids belongs to
+            both.
+        sides: (m, 2) index in ``names`` of the solid on each side of a triangle, or -1.
         overlaps: descriptions of pairs of solids that overlap.
     """
 
@@ -26,14 +27,14 @@ class FilledSolids:
     overlaps: tuple[str, ...] = ()
 
     def around(self, members: Sequence[str]) -> tuple[NDArray, NDArray]:
-        """Return the boundary of selected solids.
+        """Return the boundary of given solids.
 
         Args:
             members: names of the solids.
 
         Returns:
-            (k, 3) triangles of their boundary, and (k,) bool, True for a triangle
-            inside the link.
+            Triangles on the boundary of the union, (k, 3), and (k,) bool, True for
+            triangles inside the link.
         """
         chosen = [number for number, name in enumerate(self.names) if name in members]
         one, other = (np.isin(side, chosen) for side in self.sides.T)

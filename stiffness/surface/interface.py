@@ -1,4 +1,4 @@
-"""Interfaces between a link and its joints: planes of the surface, discs, bores."""
+"""Interfaces between a link and its joints."""
 
 import math
 from collections.abc import Mapping
@@ -12,21 +12,20 @@ from forcefit.inputs.table import BadInput, describe, nearest
 from forcefit.stiffness.beam.beam import unit_vector
 from forcefit.stiffness.screws import UNIT_VECTORS
 
-# [m] largest accepted coordinate or radius, so that squares of lengths do not overflow
+# [m] largest accepted coordinate or radius
 _FARTHEST = 1e6
 _EXPECTED = '"z=0.452", "bore=px,py,pz/ax,ay,az/r", a table {plane, radius} or {bore}'
 
 
 @dataclass(frozen=True, eq=False)
 class Interface:
-    """Part of a link's surface that a joint holds, in mesh axes.
+    """Part of the surface of a link that is connected to a joint.
 
     Attributes:
-        kind: ``"plane"`` for the part of the surface on a plane; ``"disc"`` for the
-            part of the plane within a radius of the point; ``"bore"`` for a cylindrical
-            seat.
-        point: (3,) [m] point on the plane, centre of the disc, or reference point for
-            screws on the axis of the bore.
+        kind: ``"plane"`` for the part of the surface in a plane, ``"disc"`` for a
+            circular part of a plane, or ``"bore"`` for a cylinder.
+        point: (3,) [m] point in the plane, centre of the disc, or reference point on
+            the axis of the bore.
         direction: (3,) unit normal of the plane, or axis of the bore.
         radius: [m] radius of the disc or the bore; infinite for a plane.
     """
@@ -59,7 +58,7 @@ class Interface:
         return f"{self.kind}={p}/{d}{radius}"
 
     def distance(self, points: ArrayLike) -> NDArray:
-        """Compute the distance of points from the interface's plane or cylinder.
+        """Compute the distances of points from the plane or cylinder of the interface.
 
         Args:
             points: (..., 3) [m] points.
@@ -82,14 +81,14 @@ def parse_interface(text: object, place: str = "interface") -> Interface:
         text: ``"z=0.452"`` (also x, y), ``"bore=px,py,pz/ax,ay,az/r"``,
             ``"disc=px,py,pz/nx,ny,nz/r"``, ``"plane=px,py,pz/nx,ny,nz"``, or a table
             ``{plane = {point, normal}, radius}`` or ``{bore = {point, axis, radius}}``.
-            All lengths are in metres, in the axes of the mesh.
-        place: name of the option or key, for messages.
+            All lengths are in metres, in the axes of the surface.
+        place: name of the option or key, for error messages.
 
     Returns:
         The interface.
 
     Raises:
-        BadInput: the value has none of these forms.
+        BadInput: the value has a different form.
     """
     try:
         if isinstance(text, str):
@@ -102,7 +101,7 @@ def parse_interface(text: object, place: str = "interface") -> Interface:
 
 
 def _from_text(text: str) -> Interface:
-    """Parse an interface from a text."""
+    """Parse the text of an interface."""
     kind, equals, value = (part.strip() for part in text.partition("="))
     parts = [comma_numbers(part) for part in value.split("/")]
     lengths = [len(part) for part in parts]
@@ -117,7 +116,7 @@ def _from_text(text: str) -> Interface:
 
 
 def _from_table(table: Mapping) -> Interface:
-    """Parse an interface from a table of a robot file."""
+    """Parse the table of an interface in a robot file."""
     kind = "bore" if "bore" in table else "plane"
     known = {"bore"} if kind == "bore" else {"plane", "radius"}
     _refuse_unknown(table, known, "")

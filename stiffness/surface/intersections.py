@@ -5,15 +5,16 @@ from numpy.typing import NDArray
 
 
 def crossing_triangles(points: NDArray, triangles: NDArray) -> NDArray:
-    """Find pairs of intersecting triangles without a common vertex.
+    """Find pairs of triangles that intersect.
 
     Args:
-        points: (n, 3) [m] corners.
+        points: (n, 3) [m] positions of the corners.
         triangles: (m, 3) indices of points.
 
     Returns:
-        (k, 2) indices of triangles of which an edge of one passes through the inside of
-        the other. Triangles that merely touch are not included.
+        (k, 2) indices of the triangles of each pair. An edge of one triangle passes
+        through the interior of the other, and they have no common corner. Pairs that
+        only touch are not included.
     """
     pairs = _near_pairs(points, triangles)
     shared = (
@@ -26,7 +27,7 @@ def crossing_triangles(points: NDArray, triangles: NDArray) -> NDArray:
 
 
 def _near_pairs(points: NDArray, triangles: NDArray) -> NDArray:
-    """Find the pairs (i, j) of triangles whose bounding boxes overlap."""
+    """Find the pairs of triangles whose bounding boxes overlap."""
     corners = points[triangles]
     low, high = corners.min(axis=1), corners.max(axis=1)
     axis = int(np.argmax(np.ptp(points, axis=0)))
@@ -49,7 +50,7 @@ def _near_pairs(points: NDArray, triangles: NDArray) -> NDArray:
 
 
 def _edge_through(points: NDArray, triangles: NDArray, pairs: NDArray) -> NDArray:
-    """Check whether an edge of the first triangle passes through the second."""
+    """Return whether an edge of the first triangle passes through the second."""
     a, b, c = np.moveaxis(points[triangles[pairs[:, 1]]], 1, 0)
     normal = np.cross(b - a, c - a)
     size = np.linalg.norm(normal, axis=1)
@@ -57,8 +58,8 @@ def _edge_through(points: NDArray, triangles: NDArray, pairs: NDArray) -> NDArra
     for k in range(3):
         p = points[triangles[pairs[:, 0], k]]
         q = points[triangles[pairs[:, 0], (k + 1) % 3]]
-        # signed volumes give the side of the plane, and of each edge, on which a line
-        # passes
+        # the signs of volumes determine whether the edge crosses the plane inside the
+        # triangle
         dp = np.einsum("ij,ij->i", normal, p - a)
         dq = np.einsum("ij,ij->i", normal, q - a)
         tiny = 1e-9 * size * np.linalg.norm(q - p, axis=1)

@@ -1,7 +1,7 @@
-"""Reader of Wavefront OBJ files: points and polygons.
+"""Reader of Wavefront OBJ files.
 
-Texture coordinates, normals, groups and materials do not affect the shape and are not
-read, so faces may even refer to texture coordinates and normals that are absent.
+Only points and faces are read. Texture coordinates, normals, groups and materials are
+ignored.
 """
 
 from collections.abc import Iterator
@@ -14,17 +14,16 @@ from forcefit.inputs.table import BadInput, describe
 
 
 def read_obj(path: Path) -> tuple[NDArray, list[list[int]]]:
-    """Read the points and polygons of an OBJ file.
+    """Read the points and the faces of an OBJ file.
 
     Args:
         path: path of an existing file.
 
     Returns:
-        (n, 3) points in the unit of the file, and the corner indices of each polygon.
+        Points in the unit of the file, (n, 3), and the corner indices of each face.
 
     Raises:
-        BadInput: a line is invalid, or a face has a corner that is not among the
-            points.
+        BadInput: a line is invalid, or a face has an unknown corner.
     """
     points: list[list[float]] = []
     faces: list[list[int]] = []
@@ -55,7 +54,7 @@ def read_obj(path: Path) -> tuple[NDArray, list[list[int]]]:
 
 
 def _statements(path: Path) -> Iterator[tuple[int, list[str]]]:
-    """Yield number and words of each line, where a backslash continues a line."""
+    """Yield the number and the words of each line."""
     text = path.read_bytes().removeprefix(b"\xef\xbb\xbf").decode("latin-1")
     words: list[str] = []
     for number, line in enumerate(text.split("\n"), 1):
@@ -67,6 +66,6 @@ def _statements(path: Path) -> Iterator[tuple[int, list[str]]]:
 
 
 def _corner(word: str, points: int) -> int:
-    """Return the index of a corner, counted from 1 or, if negative, from the end."""
+    """Return the index of a point from its number in a face."""
     index = int(word.partition("/")[0])
     return index - 1 if index >= 0 else points + index

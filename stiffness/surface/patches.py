@@ -1,4 +1,4 @@
-"""Division of a surface into smooth patches with exact shapes."""
+"""Division of a surface into smooth patches."""
 
 from dataclasses import dataclass
 
@@ -16,13 +16,14 @@ from forcefit.stiffness.surface.triangle_graph import SHARP, TriangleGraph
 
 @dataclass(frozen=True, eq=False)
 class Patches:
-    """Patches of a surface: the patch of each triangle and the shape of each patch.
+    """Patches of a surface and their exact shapes.
 
     Attributes:
-        patch: (m,) patch number of each triangle; 0 is the base interface, 1 the tip.
-        shapes: shape of each patch, or lifted facets if no shape was recognised.
-        outlines: parts of the interface outlines across which the surface continues
-            smoothly.
+        patch: (m,) patch number of each triangle. Patch 0 is the base interface, and
+            patch 1 is the tip interface.
+        shapes: exact shape of each patch, or a smooth surface through its facets if no
+            shape was recognised.
+        outlines: parts of the outlines of interfaces without a sharp edge.
     """
 
     patch: NDArray
@@ -35,15 +36,15 @@ def find_patches(surface: Surface, base: Interface, tip: Interface) -> Patches:
 
     Args:
         surface: surface of the link.
-        base: the held interface.
-        tip: the loaded interface.
+        base: clamped interface.
+        tip: loaded interface.
 
     Returns:
         The patches.
 
     Raises:
-        BadInput: no part of the surface is on an interface, or both interfaces
-            coincide.
+        BadInput: no part of the surface is on an interface, or the interfaces are
+            equal.
     """
     patch = np.full(len(surface.triangles), -1)
     shapes: list[Shape] = []
@@ -67,7 +68,7 @@ def find_patches(surface: Surface, base: Interface, tip: Interface) -> Patches:
 def _outlines(
     graph: TriangleGraph, patch: NDArray, shapes: list[Shape]
 ) -> list[SmoothOutline]:
-    """Find outlines across which an interface continues smoothly into another patch."""
+    """Find parts of the outlines of interfaces without a sharp edge."""
     one, other = patch[graph.left], patch[graph.right]
     smooth = (graph.cosine > SHARP) & (one != other)
     found = []
@@ -85,13 +86,13 @@ def _outlines(
 
 
 def interface_shape(interface: Interface) -> Shape:
-    """Return the plane or cylinder of an interface.
+    """Return the exact shape of an interface.
 
     Args:
-        interface: a plane, disc or bore.
+        interface: the interface.
 
     Returns:
-        The shape of the interface.
+        A plane or a cylinder.
     """
     if interface.kind == "bore":
         return Cone(interface.point, interface.direction, interface.radius)
@@ -99,15 +100,15 @@ def interface_shape(interface: Interface) -> Shape:
 
 
 def refuse_common_edges(surface: Surface, base: Interface, tip: Interface) -> None:
-    """Reject interfaces that share an edge, because the stiffness would be infinite.
+    """Reject interfaces with a common edge, for which the stiffness is infinite.
 
     Args:
         surface: surface of the link.
-        base: the held interface.
-        tip: the loaded interface.
+        base: clamped interface.
+        tip: loaded interface.
 
     Raises:
-        BadInput: the interfaces share an edge, or no part of the surface is on an
+        BadInput: the interfaces have a common edge, or no part of the surface is on an
             interface.
     """
     codes: list[NDArray] = []
@@ -127,18 +128,18 @@ def refuse_common_edges(surface: Surface, base: Interface, tip: Interface) -> No
 
 
 def triangles_on(surface: Surface, interface: Interface, name: str) -> NDArray:
-    """Find the triangles of a surface that lie on an interface.
+    """Find the triangles on an interface.
 
     Args:
         surface: surface of the link.
-        interface: a plane, disc or bore.
-        name: base or tip, for messages.
+        interface: the interface.
+        name: ``"base"`` or ``"tip"``, for error messages.
 
     Returns:
-        (k,) indices of triangles.
+        (k,) indices of the triangles.
 
     Raises:
-        BadInput: no triangle lies on the interface, or the outline of a disc crosses
+        BadInput: no triangle is on the interface, or the outline of a disc crosses
             triangles.
     """
     near = 1e-5 * surface.diagonal
@@ -151,7 +152,8 @@ def triangles_on(surface: Surface, interface: Interface, name: str) -> NDArray:
     along = np.abs(normals @ interface.direction)
     on &= along < 0.5 if interface.kind == "bore" else along > 0.9
     if interface.kind == "bore":
-        # a flat face with all corners on the cylinder, such as a bar's end, is no bore
+        # excludes a flat face whose corners are on the cylinder, such as the end of a
+        # bar
         middle = corners.mean(axis=1) - interface.point
         middle -= (middle @ interface.direction)[:, None] * interface.direction
         radial = np.abs((normals * middle).sum(axis=1))

@@ -1,11 +1,11 @@
-"""Smooth shapes recognised in the patches of a surface.
+"""Planes, cones, spheres and tori, and their fits to points.
 
-The vertices of a faceted surface lie on the true surface, but its facets cut convex
-sides short. A patch whose vertices all lie on a plane, cone (or cylinder), sphere or
-torus is therefore replaced by this shape, and the mesh nodes are moved onto it.
+The corners of facets are on the exact surface of a part, but the facets deviate from a
+curved surface. If all corners of a patch are on a plane, cone, sphere or torus, this
+shape is therefore used in place of the facets. A cylinder is a cone without slope.
 
-The method ``signed(points)`` of every shape returns signed distances (n,) [m] and their
-gradients (n, 3).
+The method ``signed(points)`` of each shape returns the signed distances of points, (n,)
+[m], and their gradients, (n, 3).
 """
 
 from collections.abc import Callable
@@ -16,39 +16,39 @@ import numpy as np
 from numpy.typing import NDArray
 
 S = TypeVar("S", bound="Shape")
-# largest numbers of residual evaluations, of any fit and of a fit that may still
-# succeed
+# maximum numbers of residual evaluations: of every fit, and of a fit with a small
+# residual
 _CALLS = (25, 100)
-# largest residual of a fit that may still succeed, relative to the size of the points
+# residual below which a fit is continued, relative to the extent of the points
 _MAY_FIT = 0.02
-_FITS = 1e-9  # largest residual of a shape that fits, relative to the points' size
-_TINY = 1e-300  # prevents division by zero on the axis of a shape
+_FITS = 1e-9  # largest residual of a successful fit, relative to the extent
+_TINY = 1e-300  # prevents a division by zero on the axis of a shape
 
 
 class Shape(Protocol):
     """A surface onto which points can be projected."""
 
     def signed(self, points: NDArray) -> tuple[NDArray, NDArray]:
-        """Return signed distances (n,) [m] and unit gradients (n, 3)."""
+        """Return signed distances of points, (n,) [m], and their gradients, (n, 3)."""
         ...
 
 
 @dataclass(frozen=True, eq=False)
 class Plane:
-    """Plane: all points x with normal . (x - point) = 0."""
+    """Plane of all points x with normal . (x - point) = 0."""
 
     point: NDArray
     normal: NDArray
 
     def signed(self, points: NDArray) -> tuple[NDArray, NDArray]:
-        """Return the signed distances (n,) [m] and unit gradients (n, 3)."""
+        """Return signed distances of points, (n,) [m], and their gradients, (n, 3)."""
         distances = (points - self.point) @ self.normal
         return distances, np.broadcast_to(self.normal, points.shape)
 
 
 @dataclass(frozen=True, eq=False)
 class Cone:
-    """Cone with the radius ``radius + slope * t`` at position t along its axis."""
+    """Cone whose radius is ``radius + slope * t`` at the position t on its axis."""
 
     point: NDArray
     axis: NDArray
@@ -56,7 +56,7 @@ class Cone:
     slope: float = 0.0
 
     def signed(self, points: NDArray) -> tuple[NDArray, NDArray]:
-        """Return the signed distances (n,) [m] and unit gradients (n, 3)."""
+        """Return signed distances of points, (n,) [m], and their gradients, (n, 3)."""
         offset = points - self.point
         along = offset @ self.axis
         across = offset - along[:, None] * self.axis
@@ -69,13 +69,13 @@ class Cone:
 
 @dataclass(frozen=True, eq=False)
 class Sphere:
-    """Sphere: all points at a constant distance from a centre."""
+    """Sphere with a centre and a radius."""
 
     point: NDArray
     radius: float
 
     def signed(self, points: NDArray) -> tuple[NDArray, NDArray]:
-        """Return the signed distances (n,) [m] and unit gradients (n, 3)."""
+        """Return signed distances of points, (n,) [m], and their gradients, (n, 3)."""
         offset = points - self.point
         radius = np.linalg.norm(offset, axis=1)
         return radius - self.radius, offset / np.maximum(radius, _TINY)[:, None]
@@ -83,7 +83,7 @@ class Sphere:
 
 @dataclass(frozen=True, eq=False)
 class Torus:
-    """Torus: all points at a constant distance (``tube``) from a circle."""
+    """Torus of all points at the distance ``tube`` from a circle."""
 
     point: NDArray
     axis: NDArray
@@ -91,7 +91,7 @@ class Torus:
     tube: float
 
     def signed(self, points: NDArray) -> tuple[NDArray, NDArray]:
-        """Return the signed distances (n,) [m] and unit gradients (n, 3)."""
+        """Return signed distances of points, (n,) [m], and their gradients, (n, 3)."""
         offset = points - self.point
         along = offset @ self.axis
         across = offset - along[:, None] * self.axis
@@ -102,23 +102,23 @@ class Torus:
 
 
 def project(points: NDArray, shapes: tuple[Shape, ...]) -> NDArray:
-    """Project points onto a shape, or onto the intersection of several shapes.
+    """Project points onto a shape or onto the intersection of several shapes.
 
     Args:
-        points: (n, 3) [m] near the shapes.
-        shapes: one to three shapes, or more if they share a point.
+        points: (n, 3) [m] points near the shapes.
+        shapes: shapes that intersect.
 
     Returns:
-        (n, 3) [m] projected points, by Newton's method, whose step is the shortest one
-        that removes all distances to first order.
+        (n, 3) [m] projected points. They are computed by Newton's method with steps of
+        minimal length.
     """
     points = points.copy()
     for _ in range(12):
         pairs = [shape.signed(points) for shape in shapes]
         distances = np.stack([d for d, _ in pairs], axis=1)
         gradients = np.stack([g for _, g in pairs], axis=1)
-        # truncate small singular values, because the equations of tangent shapes are
-        # inconsistent in these directions
+        # small singular values are truncated, because the equations of tangent shapes
+        # are inconsistent
         inverse = np.linalg.pinv(gradients, rcond=0.05)
         step = np.einsum("nij,nj->ni", inverse, distances)
         points -= step
@@ -132,7 +132,8 @@ def fit_plane(points: NDArray, normals: NDArray) -> Plane:
 
     Args:
         points: (n, 3) [m] points.
-        normals: (k, 3) facet normals, which orient the plane.
+        normals: (k, 3) normals of the facets, which determine the orientation of the
+            plane.
 
     Returns:
         The plane.
@@ -159,8 +160,8 @@ def fit_sphere(points: NDArray, normals: NDArray) -> Sphere:
 
 
 def _circle(points: NDArray) -> tuple[NDArray, float]:
-    """Fit a circle or sphere to points; return centre and radius."""
-    # |x|^2 = 2 x . c + (r^2 - |c|^2) is linear in c and in the term in parentheses
+    """Fit a circle or a sphere to points, and return its centre and its radius."""
+    # |x|^2 = 2 x . c + (r^2 - |c|^2) is linear in c and in r^2 - |c|^2
     system = np.column_stack([2 * points, np.ones(len(points))])
     squares = np.sum(points**2, axis=1)
     center = np.linalg.lstsq(system, squares, rcond=None)[0][:-1]
@@ -168,11 +169,11 @@ def _circle(points: NDArray) -> tuple[NDArray, float]:
 
 
 def fit_cone(points: NDArray, normals: NDArray) -> Cone:
-    """Fit a cone or cylinder to points.
+    """Fit a cone or a cylinder to points.
 
     Args:
         points: (n, 3) [m] points.
-        normals: (k, 3) facet normals, from which an initial axis is estimated.
+        normals: (k, 3) normals of the facets, from which an initial axis is estimated.
 
     Returns:
         The cone.
@@ -192,15 +193,14 @@ def fit_cone(points: NDArray, normals: NDArray) -> Cone:
 
 
 def fit_torus(points: NDArray, normals: NDArray) -> Torus:
-    """Fit a torus to points on a part of its surface.
+    """Fit a torus to points.
 
     Args:
         points: (n, 3) [m] points.
-        normals: (k, 3) facet normals, which determine only the orientation.
+        normals: (k, 3) normals of the facets, which determine the orientation.
 
     Returns:
-        The torus with the smallest residual among three fits with different initial
-        axes.
+        The torus with the smallest residual of three fits with different initial axes.
     """
     center = points.mean(axis=0)
     size = float(np.ptp(points, axis=0).max())

@@ -1,10 +1,9 @@
-"""Recognition of planes, cones, spheres and tori in a faceted surface.
+"""Recognition of planes, cones, spheres and tori in a surface of triangles.
 
-The surface between sharp edges consists of one shape or of several shapes that meet
-tangentially. Candidate shapes are fitted to a few facets around a seed facet. A
-candidate is accepted if connected facets lie on it and if these are facets of a curved
-shape. The second condition is needed because the corners of a few flat faces may lie on
-a circle too.
+Between sharp edges, a surface consists of one shape or of several tangent shapes.
+Shapes are fitted to a few facets around a facet, the seed. A shape is accepted if
+connected facets are on the shape and if they are facets of a curved surface. The second
+condition is necessary because the corners of a few flat faces can also be on a circle.
 """
 
 from collections.abc import Callable
@@ -23,35 +22,35 @@ from forcefit.stiffness.surface.primitives import (
 )
 from forcefit.stiffness.surface.triangle_graph import SHARP, TriangleGraph
 
-# largest numbers of failed seeds in a part, for strip shapes and for any shape
+# maximum numbers of failed seeds in a part: for planes and cones, and for all shapes
 _MISSES = (60, 20)
-# accepted relative difference of the areas of facets
+# largest relative difference between the areas of congruent facets
 _CONGRUENT = 1e-6
-_CONE = 10  # smallest number of points that identify a cone
-# slope below which a cone counts as a cylinder, for which seven points suffice
+_CONE = 10  # smallest number of points that determine a cone
+# slope below which a cone is a cylinder, which is determined by seven points
 _CYLINDER = 1e-4
-_FEW = 12  # smallest number of flat faces of a faceted curve
-_STEP = 2e-3  # [rad] smallest difference between two distinct angles
-_MANY = 5  # number of distinct angles from which points count as on a circle
-# smallest width relative to the widest facet for a facet to count as equally wide
+_FEW = 12  # smallest number of facets around a curved surface
+_STEP = 2e-3  # [rad] smallest difference between distinct angles
+_MANY = 5  # smallest number of distinct angles of points on a circle
+# smallest ratio of the widths of equally wide facets
 _EVEN = 0.75
-# lift relative to the part's median, above which a face or edge counts as straight
+# lift, relative to the median of the part, above which a face is flat
 _LIFT = 4.0
-# lift relative to the median, above which an edge counts as a ruling, not as curved
+# lift, relative to the median of the part, above which an edge is a ruling
 _RULING = 2.0
-_NO_LIFT = 0.01  # lift relative to the median, below which an edge is straight
+_NO_LIFT = 0.01  # lift, relative to the median, below which an edge is straight
 
 
 def recognise(graph: TriangleGraph, part: NDArray) -> list[tuple[NDArray, Shape]]:
-    """Recognise the shapes of a smooth part of a surface.
+    """Recognise the shapes of a part of a surface.
 
     Args:
         graph: triangle graph of the surface.
         part: (k,) triangles of the part between sharp edges.
 
     Returns:
-        Triangles and shape of each patch, which may be the whole part. Triangles
-        outside recognised shapes become flat faces or lifted facets.
+        Triangles and shape of each patch of the part. The shape of a patch is a flat
+        face or a smooth surface through its facets if no shape is recognised.
     """
     shape = fitted_shape(graph, part)
     if shape is not None and graph.fits(shape, part).all():
@@ -73,7 +72,7 @@ def recognise(graph: TriangleGraph, part: NDArray) -> list[tuple[NDArray, Shape]
 
 
 class _Lifts:
-    """Lifts of a part's edges, computed as if the part were a single curved shape."""
+    """Lifts of edges, computed as if all facets were on a single curved surface."""
 
     def __init__(self, graph: TriangleGraph, part: NDArray) -> None:
         self._facets = graph.lifted(part)
@@ -83,31 +82,31 @@ class _Lifts:
         self._usual = max(float(np.median(self._facets.lifts())), 1e-300)
 
     def share(self, edges: NDArray) -> float:
-        """Return the median lift of edges (e, 2), relative to that of the part."""
+        """Return the median lift of edges, relative to the median of the part."""
         own = self._facets.edge_lifts(self._place[edges])
         return float(np.median(own)) / self._usual
 
 
 def fitted_shape(graph: TriangleGraph, part: NDArray, kinds: int = 4) -> Shape | None:
-    """Find the simplest shape of which the triangles can be facets.
+    """Find the simplest shape with the given facets.
 
     Args:
         graph: triangle graph of the surface.
         part: (k,) triangles.
-        kinds: number of kinds to try, in the order plane, cone, sphere, torus.
+        kinds: number of kinds of shapes to fit, in the order plane, cone, sphere,
+            torus.
 
     Returns:
-        The shape, or None if no shape fits or there are too few corners to identify
-        one.
+        The shape, or None if no shape fits or there are too few corners.
     """
     points = graph.points[np.unique(graph.triangles[part])]
     normals = graph.normals[part]
-    # a few corners decide whether a shape is fitted to all corners
+    # a shape is first fitted to at most about 50 corners
     few = points[:: max(1, len(points) // 50)]
     tries: list[tuple[Callable[[NDArray, NDArray], Shape], int]] = [
         (fit_plane, 3),
         (fit_cone, 7),
-        (fit_sphere, 9),  # the eight corners of a four-sided frustum lie on a sphere
+        (fit_sphere, 9),  # the eight corners of a four-sided frustum are on a sphere
         (fit_torus, 12),
     ]
     for fit, least in tries[:kinds]:
@@ -125,14 +124,14 @@ def fitted_shape(graph: TriangleGraph, part: NDArray, kinds: int = 4) -> Shape |
 
 
 def _lies_on(shape: Shape, points: NDArray, graph: TriangleGraph) -> bool:
-    """Check whether points lie on a shape within the tolerance of the surface."""
+    """Return whether points are on a shape within a tolerance."""
     return bool(np.abs(shape.signed(points)[0]).max() < graph.tolerance)
 
 
 def _is_faceted(shape: Shape, points: NDArray) -> bool:
-    """Check whether points on a shape are corners of facets along its curvature."""
-    # The corners of any two adjacent flat faces, and of three symmetric ones, lie on a
-    # circle.  Either three facets as wide as the widest, or many facets, are therefore
+    """Return whether points on a shape are corners of facets of a curved surface."""
+    # The corners of two adjacent flat faces, or of three symmetric flat faces, are
+    # always on a circle. Therefore, many facets or three equally wide facets are
     # required.
     if not isinstance(shape, Cone | Torus):
         return True
@@ -152,10 +151,10 @@ def _is_faceted(shape: Shape, points: NDArray) -> bool:
 
 
 def _even(angles: NDArray) -> bool:
-    """Check for many distinct angles, or three equally wide facets."""
+    """Return whether angles belong to many facets or to three equally wide facets."""
     angles = np.sort(angles)
     gaps = np.diff(np.r_[angles, angles[0] + 2 * np.pi])
-    if gaps[-1] > _STEP:  # if the arc is not closed, the largest gap is outside it
+    if gaps[-1] > _STEP:  # the largest gap is outside of an open arc
         widest = int(np.argmax(gaps))
         outside = gaps[widest] > 1.5 * np.sort(gaps)[-2]
         gaps = np.delete(gaps, widest) if outside else gaps
@@ -168,7 +167,7 @@ def _even(angles: NDArray) -> bool:
 def _pieces(
     graph: TriangleGraph, lifts: _Lifts, part: NDArray, strips: bool, most: int
 ) -> list[tuple[NDArray, Shape]]:
-    """Find pieces of recognisable shape; with ``strips``, only planes and cones."""
+    """Find parts on planes, cones, spheres and tori, or only on planes and cones."""
     inside = np.zeros(len(graph.triangles), dtype=bool)
     inside[part] = True
     waiting, flat = inside.copy(), graph.flat_faces(part)
@@ -188,8 +187,7 @@ def _pieces(
         if not shapes and not strips:
             missed.append(seed)
             if misses == most and (kinds := _kinds(missed, order, area)) is not None:
-                # facets congruent to failed seeds, for example around a shaft, are
-                # tried last
+                # facets that are congruent to failed seeds are the last seeds
                 order, misses, missed = np.where(kinds, order - 2.0, order), 0, []
         if shapes:
             best = max(shapes, key=lambda s: float(graph.areas[s[0]].sum()))
@@ -199,7 +197,7 @@ def _pieces(
 
 
 def _kinds(missed: list[int], order: NDArray, area: NDArray) -> NDArray | None:
-    """Return (m,) bool, True for facets like failed seeds; None if too many failed."""
+    """Return which facets are similar to failed seeds, or None if seeds vary much."""
     kinds = np.zeros(len(order), dtype=bool)
     count = 0
     for seed in missed:
@@ -214,7 +212,7 @@ def _kinds(missed: list[int], order: NDArray, area: NDArray) -> NDArray | None:
 def _evenness(
     graph: TriangleGraph, inside: NDArray, flat: NDArray, area: NDArray
 ) -> NDArray:
-    """Return (m,) the smallest ratio, at most 1, of a face's area to a neighbour's."""
+    """Return the smallest ratio of the areas of each face and its neighbours, (m,)."""
     touch = inside[graph.left] & inside[graph.right] & (graph.cosine > SHARP)
     left, right = graph.left[touch], graph.right[touch]
     ratio = np.minimum(area[left], area[right]) / np.maximum(area[left], area[right])
@@ -230,7 +228,7 @@ def _evenness(
 def _shapes_around(
     graph: TriangleGraph, inside: NDArray, flat: NDArray, seed: int, strips: bool
 ) -> list[tuple[NDArray, Shape]]:
-    """Fit shapes around a seed; return each with the connected facets on it."""
+    """Fit shapes to facets around a seed, and find the facets on each shape."""
     part = np.flatnonzero(inside)
     if strips:
         near = [ring(graph, inside, flat, seed, 0), _chain(graph, inside, flat, seed)]
@@ -251,8 +249,8 @@ def _shapes_around(
 def _is_proper(
     graph: TriangleGraph, lifts: _Lifts, piece: NDArray, shape: Shape
 ) -> bool:
-    """Check whether a piece is a separate shape and not facets of a curved shape."""
-    # two coplanar triangles may form a single facet of another shape
+    """Return whether facets on a shape are not facets of another curved shape."""
+    # two coplanar triangles can be a single facet of another shape
     straight = not isinstance(shape, Cone) or _is_straight(graph, lifts, piece, shape)
     return len(piece) > 2 and straight
 
@@ -260,8 +258,8 @@ def _is_proper(
 def _is_straight(
     graph: TriangleGraph, lifts: _Lifts, piece: NDArray, shape: Cone
 ) -> bool:
-    """Check whether a cone's rulings are straight and not facets of a curved shape."""
-    # two rings of corners on any surface of revolution lie on a cone
+    """Return whether the rulings of a cone are straight lines on the exact surface."""
+    # two rings of corners on any surface of revolution are on a cone
     inside = np.zeros(len(graph.triangles), dtype=bool)
     inside[piece] = True
     both = np.flatnonzero(inside[graph.left] & inside[graph.right])
@@ -279,14 +277,14 @@ def _is_straight(
 def ring(
     graph: TriangleGraph, inside: NDArray, flat: NDArray, seed: int, rings: int
 ) -> NDArray:
-    """Return a seed's flat face and the rings of faces that join it smoothly.
+    """Return the flat face of a seed and the faces around it.
 
     Args:
         graph: triangle graph of the surface.
-        inside: (m,) bool, True for triangles that may be included.
-        flat: (m,) number of each triangle's flat face.
+        inside: (m,) bool, True for triangles that can be included.
+        flat: (m,) number of the flat face of each triangle.
         seed: a triangle.
-        rings: number of rings.
+        rings: number of rings of adjacent faces.
 
     Returns:
         (k,) triangles of the faces.
@@ -301,8 +299,8 @@ def ring(
 
 
 def _chain(graph: TriangleGraph, inside: NDArray, flat: NDArray, seed: int) -> NDArray:
-    """Return a seed's flat face and two faces on each side, across long edges."""
-    # strips of a cylinder or cone are adjacent across long edges, whatever their ends
+    """Return the flat face of a seed and two faces on each side of it."""
+    # the facets of a cylinder or cone are adjacent at long edges
     touch = inside[graph.left] & inside[graph.right] & (graph.cosine > SHARP)
     left, right = flat[graph.left[touch]], flat[graph.right[touch]]
     length = np.linalg.norm(np.diff(graph.points[graph.ends[touch]], axis=1), axis=2)
@@ -322,9 +320,9 @@ def _chain(graph: TriangleGraph, inside: NDArray, flat: NDArray, seed: int) -> N
 
 
 def _flat_or_lifted(graph: TriangleGraph, part: NDArray) -> list[tuple[NDArray, Shape]]:
-    """Divide a part of unknown shape into single flat faces and lifted facets."""
-    # facets of a curved surface have similar lifts, because CAD programs apply a
-    # tolerance; a facet with a much larger lift is a flat face that meets a fillet
+    """Divide a part of unknown shape into flat faces and smooth surfaces."""
+    # The facets of a curved surface have similar lifts, because CAD programs use a
+    # tolerance. A facet with a much larger lift is a flat face next to a fillet.
     flat = graph.flat_faces(part)
     faces = np.unique(flat[part])
     if len(faces) < _FEW:

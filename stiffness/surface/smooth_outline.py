@@ -1,8 +1,9 @@
-"""Outlines of an interface across which the surface continues without a sharp edge.
+"""Outlines of interfaces without a sharp edge.
 
-Where a held face continues into a fillet, the two shapes touch along a line that is
-poorly determined by their equations. The wall is the surface through this line normal
-to the face. Because face and wall meet at a right angle, they determine the line well.
+Where an interface continues smoothly into a fillet, the common line of the two tangent
+shapes is poorly determined by their equations. The line is therefore computed as the
+intersection of the interface and a wall, which is the surface through the line and
+normal to the interface.
 """
 
 from dataclasses import dataclass
@@ -13,23 +14,23 @@ from numpy.typing import NDArray
 from forcefit.stiffness.surface.facets import Facets
 from forcefit.stiffness.surface.primitives import Shape, fit_cone, fit_plane
 
-# cosine of the largest angle at a corner of an outline that counts as smooth
+# cosine of the largest change of direction at a smooth corner of an outline
 _CORNER = np.cos(np.radians(35.0))
-# largest distance of a point on the wall, relative to the size of the outline
+# largest distance of the outline from its wall, relative to the size of the outline
 _ON_WALL = 1e-5
-_CIRCLE = 10  # number of corners from which a polygon counts as a circle
+_CIRCLE = 10  # smallest number of corners of a polygon that approximates a circle
 
 
 @dataclass(frozen=True, eq=False)
 class SmoothOutline:
-    """Part of an interface's outline across which another patch continues smoothly.
+    """Part of the outline of an interface without a sharp edge.
 
     Attributes:
-        patches: patch numbers of the interface and of its neighbour.
+        patches: patch numbers of the interface and of the adjacent patch.
         wall: surface through the outline, normal to the interface.
-        ends: (e, 2, 3) [m] ends of the outline's edges.
-        side: 1 if the wall's signed distance is positive outside the interface, else
-            -1.
+        ends: (e, 2, 3) [m] ends of the edges of the outline.
+        side: 1 if signed distances from the wall are positive outside the interface,
+            otherwise -1.
     """
 
     patches: tuple[int, int]
@@ -38,11 +39,11 @@ class SmoothOutline:
     side: float
 
     def outside(self, points: NDArray) -> NDArray:
-        """Return (n,) [m] distances of points (n, 3) from the wall, negative inside."""
+        """Return the distances of points from the wall, negative inside, (n,) [m]."""
         return self.side * self.wall.signed(points)[0]
 
     def distance(self, points: NDArray) -> NDArray:
-        """Return the (n,) [m] distances of points (n, 3) from the nearest edge."""
+        """Return the distances of points from the nearest edge, (n,) [m]."""
         start, along = self.ends[:, 0], self.ends[:, 1] - self.ends[:, 0]
         square = np.maximum(np.einsum("ei,ei->e", along, along), 1e-300)
         nearest = np.full(len(points), np.inf)
@@ -57,17 +58,18 @@ class SmoothOutline:
 def smooth_outline(
     points: NDArray, edges: NDArray, normals: NDArray, patches: tuple[int, int]
 ) -> SmoothOutline:
-    """Build the outline formed by given edges, and its wall.
+    """Create an outline from its edges.
 
     Args:
-        points: (n, 3) [m] points of the surface.
-        edges: (e, 2) indices of points, counterclockwise around the interface.
-        normals: (e, 3) unit normals of the interface's triangles at the edges.
-        patches: patch numbers of the interface and of its neighbour.
+        points: (n, 3) [m] positions of the corners of the surface.
+        edges: (e, 2) indices of the ends of each edge, counterclockwise around the
+            interface.
+        normals: (e, 3) unit normal of the interface at each edge.
+        patches: patch numbers of the interface and of the adjacent patch.
 
     Returns:
-        The outline, whose wall is a plane or a cone if one fits, and otherwise consists
-        of facets through the edges.
+        The outline. Its wall is a plane or a cone, or consists of facets if neither
+        fits.
     """
     ends = points[edges]
     along = ends[:, 1] - ends[:, 0]
@@ -81,9 +83,9 @@ def smooth_outline(
 
 
 def _wall(points: NDArray, edges: NDArray, normals: NDArray, outward: NDArray) -> Shape:
-    """Fit a plane, cone or faceted wall through the edges, normal to the face."""
+    """Fit a wall through the edges, normal to the interface."""
     size = float(np.linalg.norm(np.ptp(points[edges.ravel()], axis=0)))
-    across = size * normals[:, None]  # added at both ends of an edge
+    across = size * normals[:, None]
     standing = np.concatenate([points[edges] + across, points[edges] - across])
     corners = standing.reshape(-1, 3)
     for fit, least in ((fit_plane, 1), (fit_cone, _CIRCLE)):
@@ -98,7 +100,7 @@ def _wall(points: NDArray, edges: NDArray, normals: NDArray, outward: NDArray) -
 def _faceted_wall(
     ends: NDArray, edges: NDArray, across: NDArray, outward: NDArray
 ) -> Facets:
-    """Return two triangles per edge; at a corner, edges do not share points."""
+    """Create a wall of two triangles for each edge."""
     corners = np.concatenate([ends - across, ends + across], axis=1)
     label = np.arange(4 * len(ends)).reshape(-1, 4)
     begins = {int(start): k for k, start in enumerate(edges[:, 0])}

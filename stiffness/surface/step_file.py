@@ -1,7 +1,7 @@
-"""Reader of STEP files by gmsh: names of solids, and fine triangles.
+"""Reader of STEP files, which uses gmsh.
 
-Because a damaged file can crash gmsh and its process, these functions run in a separate
-process (:mod:`forcefit.stiffness.surface.surface_worker`).
+A damaged file can crash gmsh. These functions therefore run in a separate process
+(:mod:`forcefit.stiffness.surface.surface_worker`).
 """
 
 from collections.abc import Generator, Mapping
@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from forcefit.inputs.packages import naming_packages
 from forcefit.inputs.table import BadInput, nearest, quoted
 
-_FACETS = 48  # number of facets around a full circle
-# overlap relative to a solid's volume below which it counts as rounding in the file
+_FACETS = 48  # number of facets around a circle
+# ratio of an overlap to the volume of a solid below which the overlap is ignored
 _TOUCHING = 1e-6
-_ALL, _AND = "*", "+"  # signs in a name: all solids of a file; several solids as one
+_ALL, _AND = "*", "+"  # name of all solids; sign between the names of several solids
 
 
 def read_solids(path: Path) -> tuple[list[str], list[float], list[list[float]]]:
@@ -29,7 +29,8 @@ def read_solids(path: Path) -> tuple[list[str], list[float], list[list[float]]]:
         path: path of the file.
 
     Returns:
-        Names; volumes [m^3]; lower and upper corner of each bounding box [m].
+        Names of the solids; volumes [m^3]; and lower and upper corners of the bounding
+        boxes [m].
 
     Raises:
         BadInput: the file cannot be read, or gmsh is not installed.
@@ -43,7 +44,7 @@ def read_solids(path: Path) -> tuple[list[str], list[float], list[list[float]]]:
 
 @contextmanager
 def _gmsh_model(path: Path) -> Generator[Any, None, None]:
-    """Yield the gmsh model of a STEP file, converted to metres."""
+    """Yield the gmsh model of a STEP file in metres."""
     try:
         with naming_packages(f"{path}: STEP", "export the surface as STL"):
             import gmsh
@@ -51,7 +52,7 @@ def _gmsh_model(path: Path) -> Generator[Any, None, None]:
         gmsh.initialize(interruptible=False)
     except BadInput:
         raise
-    except Exception as error:  # gmsh's module may be present without its library
+    except Exception as error:  # the library of gmsh may be missing
         raise BadInput(
             f"{path}: STEP needs the package gmsh, which does not start: {error}"
         ) from None
@@ -61,7 +62,7 @@ def _gmsh_model(path: Path) -> Generator[Any, None, None]:
         gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", _FACETS)
         try:
             gmsh.open(str(path))
-        # gmsh raises only this class for files that it cannot read
+        # gmsh has no specific exception class
         except Exception as error:
             raise BadInput(f"{path}: not a readable STEP file") from error
         yield gmsh.model
@@ -71,13 +72,13 @@ def _gmsh_model(path: Path) -> Generator[Any, None, None]:
 
 @dataclass(frozen=True, eq=False)
 class StepTriangles:
-    """Triangles of selected solids, which share triangles where they touch.
+    """Triangles of selected solids.
 
     Attributes:
-        points: (n, 3) [m] corners.
+        points: (n, 3) [m] positions of the corners.
         triangles: (m, 3) indices of points.
-        sides: (m, 2) index in ``names`` of the solid on each side, or -1.
-        names: names of the solids; empty if the faces in the file belong to no solid.
+        sides: (m, 2) index in ``names`` of the solid on each side of a triangle, or -1.
+        names: names of the solids; empty if the file contains faces without a solid.
         overlaps: descriptions of pairs of solids that overlap.
     """
 
@@ -89,15 +90,15 @@ class StepTriangles:
 
 
 def read_step(path: Path, solid: str) -> StepTriangles:
-    """Read fine triangles of the solids in a STEP file, converted to metres.
+    """Triangulate solids in a STEP file.
 
     Args:
         path: path of the file.
-        solid: name of a solid, ``one+other`` for several solids as one, or ``*`` for
-            all solids as one; may be empty if the file contains a single solid.
+        solid: name of a solid, ``one+other`` for several solids, or ``*`` for all
+            solids. It may be empty if the file contains a single solid.
 
     Returns:
-        The triangles, including those between two solids.
+        The triangles in metres, including those between two solids.
 
     Raises:
         BadInput: the file cannot be read, the solid does not exist, solids do not
@@ -133,7 +134,7 @@ def read_step(path: Path, solid: str) -> StepTriangles:
 
 
 def _solids(model: Any) -> dict[str, int]:
-    """Return the tags of a model's solids by name."""
+    """Return the tags of the solids by name."""
     solids = dict[str, int]()
     for _, tag in model.getEntities(3):
         own = model.getEntityName(3, tag).rpartition("/")[2] or f"solid{tag}"
@@ -147,13 +148,14 @@ def chosen_solids(model: Any, path: Path, solid: str) -> dict[str, int]:
     Args:
         model: gmsh model of the file.
         path: path of the file, for error messages.
-        solid: see :func:`read_step`; required if the file has several solids.
+        solid: names of solids, see :func:`read_step`.
 
     Returns:
-        Tags of the solids by name; empty if the faces in the file belong to no solid.
+        Tags of the solids by name; empty if the file contains faces without a solid.
 
     Raises:
-        BadInput: the solid does not exist, or no name is given for several solids.
+        BadInput: a solid does not exist, or the name is empty and there are several
+            solids.
     """
     solids = _solids(model)
     several = list(solids) if solid == _ALL else solid.split(_AND)
@@ -174,15 +176,14 @@ def chosen_solids(model: Any, path: Path, solid: str) -> dict[str, int]:
 
 
 def sides(model: Any, owners: Mapping[int, int]) -> dict[int, tuple[int, int]]:
-    """Find the faces of solids, with the solids on both sides of each face.
+    """Find the solids on both sides of each face.
 
     Args:
         model: gmsh model of the file.
-        owners: number of the solid to which each volume belongs.
+        owners: number of the solid of each volume.
 
     Returns:
-        For each face tag, the numbers of both solids, -1 for none; all faces of the
-        model if no face belongs to a volume.
+        Dictionary from face tags to the numbers of both solids, or -1 for no solid.
     """
     found: dict[int, list[int]] = {}
     for volume, owner in owners.items():
@@ -197,7 +198,7 @@ def sides(model: Any, owners: Mapping[int, int]) -> dict[int, tuple[int, int]]:
 def _fragments(
     model: Any, path: Path, chosen: Mapping[str, int]
 ) -> tuple[dict[int, int], tuple[str, ...]]:
-    """Split solids at common faces; return each volume's solid, and the overlaps."""
+    """Split solids at common faces; return the solid of each volume and overlaps."""
     solids, names = [(3, tag) for tag in chosen.values()], list(chosen)
     volume = [float(model.occ.getMass(*solid)) for solid in solids]
     _, made = model.occ.fragment(solids[:1], solids[1:])
@@ -223,7 +224,7 @@ def _fragments(
 
 
 def _bodies(model: Any, volumes: list[int]) -> int:
-    """Count the bodies formed by volumes with common faces."""
+    """Count the connected bodies of volumes with common faces."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 

@@ -1,7 +1,7 @@
-"""Reader of STL files in text and binary form, based on NumPy alone.
+"""Reader of text and binary STL files.
 
-Like most programs, the reader accepts keywords in capitals, a truncated or missing last
-line, bytes after the last triangle, and a placeholder for the number of triangles.
+The reader accepts keywords in capitals, an incomplete last line, bytes after the last
+triangle, and a placeholder for the number of triangles.
 """
 
 import re
@@ -12,25 +12,26 @@ from numpy.typing import NDArray
 
 from forcefit.inputs.table import BadInput, describe
 
-_HEAD = 84  # bytes before the triangles of a binary file: header and count
+_HEAD = 84  # number of bytes before the triangles of a binary file
 _TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("tag", "<u2")])
-# placeholders that programs write in place of the number of triangles
+# placeholders that programs write if the number of triangles is unknown
 _UNKNOWN_COUNTS = (0, 2**32 - 1)
 # the name of a solid ends at its first facet or at the end of the line
 _NAME = re.compile(rb"(?im)^[ \t]*(?:end)?solid\b.*?(?=\bfacet\s+normal\b|\r|\n|\Z)")
 
 
 def read_stl(path: Path) -> tuple[NDArray, NDArray]:
-    """Read the points and triangles of an STL file, without merging equal points.
+    """Read the triangles of an STL file.
 
     Args:
         path: path of an existing file.
 
     Returns:
-        (3 m, 3) points in the unit of the file, and (m, 3) indices of these points.
+        Points in the unit of the file, (3 m, 3), and their indices for each triangle,
+        (m, 3).
 
     Raises:
-        BadInput: the file is not STL, or ends within a triangle.
+        BadInput: the file is not an STL file or is truncated.
     """
     content = path.read_bytes()
     corners = _text(path, content) if _is_text(content) else _binary(path, content)
@@ -40,12 +41,12 @@ def read_stl(path: Path) -> tuple[NDArray, NDArray]:
 
 
 def _count(content: bytes) -> int:
-    """Return the number of triangles stated in a binary file."""
+    """Return the number of triangles in the header of a binary file."""
     return int.from_bytes(content[_HEAD - 4 : _HEAD], "little")
 
 
 def _is_text(content: bytes) -> bool:
-    """Check whether a file is text; a binary header may begin with "solid" too."""
+    """Return whether a file is a text file."""
     size = _HEAD + _TRIANGLE.itemsize * _count(content)
     if len(content) >= _HEAD and len(content) == size:
         return False
@@ -54,14 +55,14 @@ def _is_text(content: bytes) -> bool:
 
 
 def _binary(path: Path, content: bytes) -> NDArray:
-    """Return the (m, 3, 3) corners of the triangles in a binary file."""
+    """Return the corners of the triangles in a binary file, (m, 3, 3)."""
     stated, size = _count(content), _TRIANGLE.itemsize
     body = content[_HEAD:]
     if len(content) < _HEAD:
         raise BadInput(f"{path}: not a readable STL file")
     if stated in _UNKNOWN_COUNTS:
         stated = len(body) // size
-    if len(body) < size * stated - 2:  # the last two bytes are unused
+    if len(body) < size * stated - 2:  # the last two bytes are not used
         raise BadInput(
             f"{path}: found {len(body) // size} whole triangles, expected {stated}, "
             "the number in the file's head; the file is cut, or is not STL"
@@ -71,12 +72,12 @@ def _binary(path: Path, content: bytes) -> NDArray:
 
 
 def _text(path: Path, content: bytes) -> NDArray:
-    """Return the (m, 3, 3) corners of the triangles in a text file."""
+    """Return the corners of the triangles in a text file, (m, 3, 3)."""
     words = _NAME.sub(b" ", content.removeprefix(b"\xef\xbb\xbf")).lower().split()
-    found = np.array(words, dtype=object)  # an array of str would take more memory
+    found = np.array(words, dtype=object)  # an array of str would need more memory
     facets = np.flatnonzero(found == b"facet")
     vertices = np.flatnonzero(found == b"vertex")
-    owner = np.searchsorted(facets, vertices)  # 0 means before the first facet
+    owner = np.searchsorted(facets, vertices)  # 0 for a vertex before the first facet
     corners = np.bincount(owner, minlength=len(facets) + 1)
     wrong = np.flatnonzero(corners[1:] != 3)
     if corners[0] or len(wrong):

@@ -1,4 +1,4 @@
-"""Surface of a link: read from a file, checked, and repaired with a report."""
+"""Surfaces of links: reader, checks and repairs."""
 
 import hashlib
 import math
@@ -16,12 +16,11 @@ from forcefit.stiffness.surface.surface_files import STEP, named_solid, read_tri
 UNITS = {"m": 1.0, "dm": 0.1, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}
 UNITS |= {"in": 0.0254, "inch": 0.0254, "ft": 0.3048}
 FORMATS = (".stl", ".obj", ".ply", ".vtk", ".vtp", ".msh", ".step", ".stp")
-# [m] largest accepted diagonal; a larger one indicates a wrong unit
+# [m] largest accepted diagonal of the bounding box
 _LARGEST_LINK = 20.0
-_SMALLEST_LINK = 1e-3  # [m] smallest accepted diagonal
+_SMALLEST_LINK = 1e-3  # [m] smallest accepted diagonal of the bounding box
 _STATED = "stated in the file"
-# accepted mean number of vertices within 1e-7 of the size around each vertex, to limit
-# memory
+# largest accepted mean number of points near each point, which limits the memory
 _CROWD = 100
 
 
@@ -30,11 +29,11 @@ class Surface:
     """A closed surface of triangles, counterclockwise as seen from outside.
 
     Attributes:
-        points: (n, 3) [m] corners.
+        points: (n, 3) [m] positions of the corners.
         triangles: (m, 3) indices of points.
-        name: name of the file, for messages.
-        repairs: descriptions of the repairs made.
-        solids: solids of a STEP file with several solids; otherwise None.
+        name: name of the file, for error messages.
+        repairs: descriptions of the repairs.
+        solids: solids of a STEP file with several solids, otherwise None.
     """
 
     points: NDArray
@@ -46,51 +45,51 @@ class Surface:
     __repr__, _repr_html_ = short_repr, html_table
 
     def normals(self) -> NDArray:
-        """Return (m, 3) [m^2] outward normals, with the areas as their lengths."""
+        """Return the area vectors of the triangles, (m, 3) [m^2]."""
         return area_vectors(self.points, self.triangles)
 
     @property
     def volume(self) -> float:
-        """[m^3] enclosed volume."""
+        """Enclosed volume [m^3]."""
         return signed_volume(self.points, self.triangles)
 
     @property
     def area(self) -> float:
-        """[m^2] total area."""
+        """Total area [m^2]."""
         return float(np.linalg.norm(self.normals(), axis=1).sum())
 
     @property
     def diagonal(self) -> float:
-        """[m] diagonal of the bounding box."""
+        """Diagonal of the bounding box [m]."""
         return float(np.linalg.norm(np.ptp(self.points, axis=0)))
 
     def digest(self) -> str:
-        """Return a hash of the coordinates, with all digits, and the triangles."""
+        """Return a hash of the points and the triangles."""
         content = hashlib.sha256(np.ascontiguousarray(self.points).tobytes())
         content.update(np.ascontiguousarray(self.triangles, dtype=np.int64).tobytes())
         return content.hexdigest()
 
 
 def area_vectors(points: NDArray, triangles: NDArray) -> NDArray:
-    """Compute the normals of triangles, each with the triangle's area as length.
+    """Compute the area vectors of triangles.
 
     Args:
-        points: (n, 3) [m] points.
+        points: (n, 3) [m] positions of the corners.
         triangles: (m, 3) indices of points.
 
     Returns:
-        (m, 3) [m^2] normals.
+        (m, 3) [m^2] normals, whose lengths are the areas.
     """
     a, b, c = np.moveaxis(points[triangles], 1, 0)
     return np.cross(b - a, c - a) / 2
 
 
 def signed_volume(points: NDArray, triangles: NDArray) -> float:
-    """Compute the volume inside a closed surface; negative if it is inside out.
+    """Compute the volume inside a closed surface, negative for inward normals.
 
     Args:
-        points: (n, 3) [m].
-        triangles: (m, 3) indices.
+        points: (n, 3) [m] positions of the corners.
+        triangles: (m, 3) indices of points.
 
     Returns:
         [m^3] volume.
@@ -101,28 +100,28 @@ def signed_volume(points: NDArray, triangles: NDArray) -> float:
 
 
 def directed_edges(triangles: NDArray) -> NDArray:
-    """Return the edges of triangles, directed by the orientation of each triangle.
+    """Return the directed edges of triangles.
 
     Args:
-        triangles: (m, 3) indices.
+        triangles: (m, 3) indices of points.
 
     Returns:
-        (3 m, 2) indices of points, three rows per triangle.
+        (3 m, 2) indices of points. Each triangle has three consecutive edges.
     """
     return triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
 
 
 def read_surface(path: Path | str, unit: str = "m") -> Surface:
-    """Read a surface from a file, and check that it encloses a solid.
+    """Read the surface of a link from a file, check it and repair it.
 
     Args:
-        path: STL, OBJ, PLY, VTK, VTP or MSH file, or STEP file if gmsh is installed;
-            ``part.step#name`` selects one of several solids in a STEP file.
-        unit: unit of length in the file: m, cm, mm, um or inch. The unit stated in a
-            STEP file takes precedence.
+        path: STL, OBJ, PLY, VTK, VTP or MSH file, or STEP file if gmsh is installed.
+            ``part.step#name`` selects a solid in a STEP file.
+        unit: unit of length in the file: m, cm, mm, um or inch. It is not used for STEP
+            files, which contain their unit.
 
     Returns:
-        The surface in metres, closed and oriented outward.
+        The closed surface in metres.
 
     Raises:
         BadInput: the file cannot be read or does not contain a closed surface of
@@ -142,7 +141,7 @@ def read_surface(path: Path | str, unit: str = "m") -> Surface:
 def _read_triangles(
     path: Path, solid: str
 ) -> tuple[NDArray, NDArray, FilledSolids | None]:
-    """Read points and triangles in the unit of the file, and its solids."""
+    """Read the points, the triangles and the solids of a file."""
     if path.suffix.lower() not in FORMATS:
         hint = nearest(path.suffix, FORMATS)
         raise BadInput(f"{path}: unknown kind of surface file{hint}")
@@ -161,19 +160,19 @@ def check_surface(
     """Check and repair a triangulated surface.
 
     Args:
-        points: (n, 3) [m].
-        triangles: (m, 3) indices.
-        name: name for error messages.
-        unit: stated unit, for messages.
+        points: (n, 3) [m] positions of the corners.
+        triangles: (m, 3) indices of points.
+        name: name of the surface, for error messages.
+        unit: unit of length in the file, for error messages.
 
     Returns:
-        The surface, with vertices merged, degenerate triangles removed, and normals
-        pointing outward.
+        The surface. Equal points are merged, triangles without an area are removed, and
+        normals point outward.
 
     Raises:
-        BadInput: the surface is empty, open, self-intersecting, not finite or of
-            implausible size, it consists of several bodies, or more than two triangles
-            share an edge.
+        BadInput: the surface is empty, open, not finite, self-intersecting or of
+            implausible size, consists of several bodies, or has an edge of more than
+            two triangles.
     """
     if len(triangles) == 0:
         raise BadInput(f"{name}: contains no triangles")
@@ -201,14 +200,14 @@ def check_surface(
 
 
 def _place(point: NDArray) -> str:
-    """Format the coordinates of a point as text for a message."""
+    """Format the coordinates of a point for an error message."""
     return "(" + ", ".join(f"{v:.4g}" for v in point) + ") m"
 
 
 def _check_coordinates(
     points: NDArray, triangles: NDArray, name: str, unit: str
 ) -> None:
-    """Reject coordinates that are not finite, and a size that suggests a wrong unit."""
+    """Check that coordinates are finite and that the size is plausible."""
     used = points[np.unique(triangles)]
     wrong = ~np.isfinite(used).all(axis=1)
     if wrong.any():
@@ -225,7 +224,7 @@ def _check_coordinates(
 def _merge(
     points: NDArray, triangles: NDArray, name: str
 ) -> tuple[NDArray, NDArray, list[str]]:
-    """Merge coincident vertices and remove triangles without area."""
+    """Merge equal points, and remove triangles without an area."""
     repairs = []
     used, triangles = np.unique(triangles, return_inverse=True)
     points, triangles = points[used], triangles.reshape(-1, 3)
@@ -235,7 +234,7 @@ def _merge(
 
     size = float(np.linalg.norm(np.ptp(points, axis=0)))
     tree, near = cKDTree(points), 1e-7 * size
-    # there would be too many pairs to list
+    # a list of all pairs would need too much memory
     if tree.count_neighbors(tree, near) > _CROWD * len(points):
         raise BadInput(
             f"{name}: most of its {len(points)} vertices are less than "
@@ -261,7 +260,7 @@ def _merge(
 
 
 def _check_closed(points: NDArray, triangles: NDArray, name: str) -> None:
-    """Check that exactly two triangles share every edge."""
+    """Check that every edge belongs to exactly two triangles."""
     edges = np.sort(directed_edges(triangles), axis=1)
     edges, count = np.unique(edges, axis=0, return_counts=True)
     if (count == 1).any():
@@ -279,7 +278,7 @@ def _check_closed(points: NDArray, triangles: NDArray, name: str) -> None:
 
 
 def _encloses(points: NDArray, outer: NDArray, inner: NDArray) -> bool:
-    """Check whether a shell lies in the box of another one and starts inside it."""
+    """Return whether a shell is inside another shell."""
     a, b = points[inner].reshape(-1, 3), points[outer].reshape(-1, 3)
     in_box = (a.min(axis=0) >= b.min(axis=0)) & (a.max(axis=0) <= b.max(axis=0))
     return bool(in_box.all()) and _inside(a[0], points, outer)
@@ -288,7 +287,7 @@ def _encloses(points: NDArray, outer: NDArray, inner: NDArray) -> bool:
 def _orient(
     points: NDArray, triangles: NDArray, name: str
 ) -> tuple[NDArray, list[str]]:
-    """Orient all triangles outward; reject several bodies."""
+    """Orient all triangles outward, and reject several bodies."""
     triangles, shell, flipped = orient_shells(triangles)
     repairs = (
         [f"{flipped} triangles reoriented to agree with their neighbours"]
@@ -316,13 +315,13 @@ def _orient(
 
 
 def orient_shells(triangles: NDArray) -> tuple[NDArray, NDArray, int]:
-    """Reorient the triangles of closed shells so that neighbours agree.
+    """Orient the triangles of each closed shell consistently.
 
     Args:
         triangles: (m, 3) indices of points.
 
     Returns:
-        The triangles, the shell (m,) of each triangle, and the number of reoriented
+        The triangles; the shell of each triangle, (m,); and the number of reversed
         triangles.
     """
     from scipy.sparse import coo_array
@@ -332,9 +331,10 @@ def orient_shells(triangles: NDArray) -> tuple[NDArray, NDArray, int]:
     directed = directed_edges(triangles)
     owner = np.repeat(np.arange(count), 3)
     order = np.lexsort(np.sort(directed, axis=1).T)
-    first, second = order[::2], order[1::2]  # edges in a closed surface occur in pairs
+    first, second = order[::2], order[1::2]  # every edge belongs to two triangles
     left, right = owner[first], owner[second]
-    # neighbouring triangles with different orientation
+    # two triangles with the same direction of their common edge have different
+    # orientations
     same = directed[first, 0] == directed[second, 0]
     ends = (np.r_[left, right], np.r_[right, left])
     graph = coo_array((np.r_[same, same] + 1.0, ends), (count, count)).tocsr()
@@ -356,7 +356,7 @@ def orient_shells(triangles: NDArray) -> tuple[NDArray, NDArray, int]:
 
 
 def _inside(point: NDArray, points: NDArray, triangles: NDArray) -> bool:
-    """Check whether a surface encloses a point, where its solid angle is 4 pi."""
+    """Return whether a point is inside a closed surface."""
     a, b, c = np.moveaxis(points[triangles] - point, 1, 0)
     la, lb, lc = (np.linalg.norm(v, axis=1) for v in (a, b, c))
     top = np.einsum("ij,ij->i", a, np.cross(b, c))

@@ -1,7 +1,7 @@
 """Readers of surface files.
 
-STL files are read by forcefit, and all other formats by VTK, meshio or gmsh. Because a
-damaged file can crash these packages and their process, they run in a separate process
+STL files are read by forcefit, and other formats by VTK, meshio or gmsh. A damaged file
+can crash these packages. They therefore run in a separate process
 (:mod:`forcefit.stiffness.surface.surface_worker`).
 """
 
@@ -22,18 +22,18 @@ from forcefit.stiffness.surface.filled_solids import FilledSolids
 from forcefit.stiffness.surface.stl_file import read_stl
 
 STEP = (".step", ".stp")
-_TIME_LIMIT = 300.0  # [s] time limit of a reader; gmsh takes 1 s for 35 000 triangles
+_TIME_LIMIT = 300.0  # [s] time limit of a reader; gmsh needs 1 s for 35 000 triangles
 
 
 def named_solid(path: Path | str) -> tuple[Path, str]:
-    """Split a path into a surface file and the name of a solid in a STEP file.
+    """Split a text into a path and the name of a solid in a STEP file.
 
     Args:
-        path: path of a file, or ``part.step#name``; ``part.step#one+other`` or
-            ``part.step#*`` selects several solids as one.
+        path: path of a file, optionally with the name of a solid, such as
+            ``part.step#name``.
 
     Returns:
-        The file and the name of the solid, which is empty if the path has none.
+        The path and the name of the solid, or an empty name.
     """
     file, mark, name = str(path).rpartition("#")
     if mark and Path(file).suffix.lower() in STEP:
@@ -44,19 +44,19 @@ def named_solid(path: Path | str) -> tuple[Path, str]:
 def read_triangles(
     path: Path | str, solid: str = ""
 ) -> tuple[NDArray, NDArray, FilledSolids | None]:
-    """Read the points and triangles of a surface file, in metres for STEP.
+    """Read the points and the triangles of a surface file.
 
     Args:
-        path: an existing file of a known kind.
+        path: path of an existing file with a known suffix.
         solid: name of one of several solids in a STEP file.
 
     Returns:
-        (n, 3) points, (m, 3) indices of points and, for several solids in a STEP file,
-        the solids that they bound.
+        Points, (n, 3), in the unit of the file, or in metres for a STEP file;
+        triangles, (m, 3); and the solids of a STEP file with several solids.
 
     Raises:
-        BadInput: the content does not match the suffix of the file, or the package that
-            reads this format is not installed.
+        BadInput: the file cannot be read, or the package that reads this format is not
+            installed.
     """
     path = Path(path)
     if path.suffix.lower() == ".stl":
@@ -81,7 +81,7 @@ class StepSolid:
     """A solid in a STEP file.
 
     Attributes:
-        name: name after ``#``, as in ``part.step#name``.
+        name: name of the solid.
         volume: [m^3] volume.
         low: (3,) [m] lower corner of the bounding box.
         high: (3,) [m] upper corner of the bounding box.
@@ -100,7 +100,7 @@ def step_solids(path: Path | str) -> list[StepSolid]:
         path: path of the file.
 
     Returns:
-        The solids in file order, converted to metres.
+        The solids in the order of the file.
 
     Raises:
         BadInput: the file cannot be read or contains no solid, or gmsh is not
@@ -118,11 +118,11 @@ def step_solids(path: Path | str) -> list[StepSolid]:
 
 
 def _in_own_process(wanted: str, path: Path, solid: str = "") -> dict[str, NDArray]:
-    """Run a reader that may crash, hang or exhaust memory; return its arrays."""
+    """Run a reader in a separate process, and return its arrays."""
     kind = path.suffix[1:].upper()
     with tempfile.TemporaryDirectory(prefix="forcefit-") as folder:
         made = Path(folder, "read.npz")
-        # -P prevents modules in the current folder from shadowing installed modules
+        # with -P, modules are not imported from the current folder
         module = "forcefit.stiffness.surface.surface_worker"
         command = [sys.executable, "-P", "-m", module, wanted, str(path), str(made)]
         search = {"PYTHONPATH": os.pathsep.join(sys.path)}

@@ -1,10 +1,10 @@
-"""Program that reads a user's file with VTK, meshio or gmsh, any of which may crash.
+"""Program that reads a surface file with VTK, meshio or gmsh.
 
 ``python -m forcefit.stiffness.surface.surface_worker triangles|solids FILE READ.npz
 [SOLID]``
 
-:mod:`forcefit.stiffness.surface.surface_files` runs this program in a separate process,
-so that a damaged file can crash only that process.
+This program is run by :mod:`forcefit.stiffness.surface.surface_files`, because a
+damaged file can crash the process that reads it.
 """
 
 import sys
@@ -21,16 +21,17 @@ from forcefit.stiffness.surface.step_file import read_solids, read_step
 
 
 def main(wanted: str, path: Path, made: Path, solid: str = "") -> None:
-    """Read a file, and write the requested data or the reason for rejecting it.
+    """Read a file, and write its data or an error message.
 
     Args:
-        wanted: "triangles", or "solids" for a STEP file.
+        wanted: ``"triangles"``, or ``"solids"`` for a list of the solids in a STEP
+            file.
         path: path of an existing file.
-        made: output file with ``points`` (n, 3) and ``faces`` (m, 3), for STEP also
-            ``sides`` (m, 2), ``names`` and ``overlaps``, see
-            :class:`forcefit.stiffness.surface.step_file.StepTriangles`; or with
-            ``names`` (n,), ``volumes`` (n,) and ``boxes`` (n, 6); or with ``refused``,
-            one line of text.
+        made: output file. For triangles, it contains ``points``, (n, 3), and ``faces``,
+            (m, 3), and for a STEP file also the attributes of
+            :class:`forcefit.stiffness.surface.step_file.StepTriangles`. For solids, it
+            contains ``names``, (n,), ``volumes``, (n,), and ``boxes``, (n, 6). For an
+            invalid file, it contains the error message ``refused``.
         solid: name of one of several solids in a STEP file.
     """
     _limit_memory()
@@ -53,7 +54,7 @@ def _solids(path: Path) -> dict[str, Any]:
 
 
 def _triangles(path: Path, solid: str) -> dict[str, Any]:
-    """Read the points and triangles; for STEP also the solids on both sides."""
+    """Read the points and the triangles of a file, and the solids of a STEP file."""
     if path.suffix.lower() in {".step", ".stp"}:
         step = read_step(path, solid)
         return {
@@ -69,7 +70,7 @@ def _triangles(path: Path, solid: str) -> dict[str, Any]:
 
 
 def _limit_memory() -> None:
-    """Limit the memory of this process, so that an excessive size raises an error."""
+    """Limit the memory of this process."""
     try:
         import os
         import resource
@@ -79,7 +80,7 @@ def _limit_memory() -> None:
         if hard == resource.RLIM_INFINITY or hard > memory:
             resource.setrlimit(resource.RLIMIT_AS, (memory, hard))
     except (ImportError, ValueError, OSError):
-        return  # this operating system has no such limit
+        return  # there is no such limit in this operating system
 
 
 def _with_vtk(path: Path) -> tuple[NDArray, NDArray]:
@@ -92,7 +93,7 @@ def _with_vtk(path: Path) -> tuple[NDArray, NDArray]:
 
 
 def _obj(path: Path) -> tuple[NDArray, NDArray]:
-    """Read a surface from an OBJ file, with polygons split into triangles by VTK."""
+    """Read a surface from an OBJ file, and split polygons into triangles."""
     import pyvista
 
     points, faces = read_obj(path)
@@ -103,7 +104,7 @@ def _obj(path: Path) -> tuple[NDArray, NDArray]:
 
 
 def _check_points(path: Path, mesh: Any) -> None:
-    """Reject cells that refer to absent points, which would crash VTK."""
+    """Reject cells with unknown points, which would crash VTK."""
     import pyvista
     from vtkmodules.util.numpy_support import vtk_to_numpy
 
@@ -123,9 +124,9 @@ def _check_points(path: Path, mesh: Any) -> None:
 
 
 def _volume(mesh: Any) -> Any:
-    """Return the cells with a volume; all cells if none has a volume.
+    """Return the cells with a volume, or all cells if none has a volume.
 
-    Gmsh writes the triangles of the surface together with the tetrahedra.
+    Gmsh writes tetrahedra and the triangles of the surface into the same file.
     """
     kinds, first = np.unique(mesh.celltypes, return_index=True)
     solid = [
@@ -139,7 +140,7 @@ def _volume(mesh: Any) -> Any:
 
 
 def _boundary(path: Path, mesh: Any) -> tuple[NDArray, NDArray]:
-    """Extract points and triangles of a VTK mesh, or of the boundary of its volume."""
+    """Extract the triangles of a mesh, or of the boundary of its volume."""
     import pyvista
 
     _check_points(path, mesh)
@@ -153,7 +154,7 @@ def _boundary(path: Path, mesh: Any) -> tuple[NDArray, NDArray]:
 
 
 def _msh(path: Path) -> tuple[NDArray, NDArray]:
-    """Read surface elements, or the volume boundary, of a gmsh MSH file (2.2, 4.1)."""
+    """Read the surface, or the boundary of the volume, from an MSH file of gmsh."""
     import meshio
     import pyvista
 

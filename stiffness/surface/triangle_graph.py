@@ -1,4 +1,4 @@
-"""Graph of neighbouring surface triangles, with smooth and flat parts."""
+"""Graph of neighbouring triangles of a surface."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -7,12 +7,12 @@ from forcefit.stiffness.surface.facets import Facets
 from forcefit.stiffness.surface.primitives import Shape
 from forcefit.stiffness.surface.surface import Surface, directed_edges
 
-# cosine of 35 degrees; edges with a larger angle separate two patches
+# cosine of the angle above which an edge is sharp
 SHARP = np.cos(np.radians(35.0))
-# relative to the part's size: largest distance of a point on a shape; STL rounds to
-# 1e-7
+# largest distance of a point on a shape, relative to the size of the part; coordinates
+# in STL files are rounded to 1e-7
 _ON_SHAPE = 2e-6
-# largest number of seeds on a surface; remaining triangles stay flat facets
+# maximum number of seeds on a surface
 _TRIES = 500
 
 
@@ -36,7 +36,7 @@ class TriangleGraph:
         )
 
     def connected_parts(self, members: NDArray, bend: float) -> NDArray:
-        """Number connected parts, bordered by edges with a cosine <= ``bend``."""
+        """Number the parts between edges with a cosine of at most ``bend``."""
         from scipy.sparse import coo_array
         from scipy.sparse.csgraph import connected_components
 
@@ -48,32 +48,32 @@ class TriangleGraph:
         return connected_components(graph, directed=False)[1]
 
     def smooth_parts(self, members: NDArray) -> list[NDArray]:
-        """Return the triangle indices of each part between sharp edges."""
+        """Return the triangles of each part between sharp edges."""
         label = self.connected_parts(members, SHARP)
         return [
             np.flatnonzero(members & (label == k)) for k in np.unique(label[members])
         ]
 
     def directed(self, edges: NDArray, owner: NDArray) -> NDArray:
-        """Return the (e, 2) ends of edges in the direction of the owner triangle."""
+        """Return the ends of edges in the direction of the given triangles, (e, 2)."""
         ends = self.ends[edges]
         first = (self.triangles[owner] == ends[:, :1]).argmax(axis=1)
         follows = self.triangles[owner, (first + 1) % 3] == ends[:, 1]
         return np.where(follows[:, None], ends, ends[:, ::-1])
 
     def flat_faces(self, part: NDArray) -> NDArray:
-        """Return the flat-face number of each triangle, valid only in the part."""
+        """Return the number of the flat face of each triangle in a part."""
         inside = np.zeros(len(self.triangles), dtype=bool)
         inside[part] = True
         return self.connected_parts(inside, 1 - 1e-10)
 
     def lifted(self, part: NDArray) -> Facets:
-        """Return a part of unknown shape as lifted facets."""
+        """Return the smooth surface through the triangles of a part."""
         used, index = np.unique(self.triangles[part], return_inverse=True)
         return Facets(self.points[used], index.reshape(-1, 3))
 
     def fits(self, shape: Shape, part: NDArray) -> NDArray:
-        """Find the triangles of a part that lie on a shape, by corners and normals."""
+        """Find the triangles of a part whose corners and normals fit a shape."""
         corners = self.points[self.triangles[part]].reshape(-1, 3)
         distances = np.abs(shape.signed(corners)[0]).reshape(-1, 3).max(axis=1)
         centers = corners.reshape(-1, 3, 3).mean(axis=1)

@@ -1,7 +1,7 @@
-"""Exact surface approximated by the facets in a file, and distances from it.
+"""Exact surface of a part, and distances from it.
 
-Where two patches meet smoothly, the shape of each patch extends beyond its border. A
-point on a mesh boundary is compared with the shape of the nearest facet.
+The shape of a patch extends beyond a smooth border of the patch. A point on the
+boundary of a mesh is therefore compared with the shape of the nearest facet.
 """
 
 from functools import cached_property
@@ -15,8 +15,8 @@ from forcefit.stiffness.surface.patches import Patches
 from forcefit.stiffness.surface.surface import Surface
 from forcefit.stiffness.surface.triangle_graph import SHARP, TriangleGraph
 
-_UNSURE = 0.3  # relative uncertainty of the lift of facets with unknown shape
-# barycentric coordinates of six points on a triangle, exact to degree 4 (Dunavant 1985)
+_UNSURE = 0.3  # relative uncertainty of the lift of facets of unknown shape
+# quadrature points on a triangle, exact to degree 4 (Dunavant 1985)
 _NEAR, _FAR = 0.445948490915965, 0.091576213509771
 _PLACES = np.concatenate([np.full((3, 3), a) + (1 - 3 * a) * np.eye(3)
                           for a in (_NEAR, _FAR)])  # fmt: skip
@@ -24,12 +24,11 @@ _WEIGHTS = np.repeat([0.223381589678011, 0.109951743655322], 3)
 
 
 class TrueSurface:
-    """Facets of a surface, together with the recognised shapes.
+    """Facets of a surface and the recognised shapes.
 
     Attributes:
-        volume: [m^3] volume enclosed by the shapes.
-        unsure_volume: [m^3] volume that depends on the smoothing of facets with unknown
-            shape.
+        volume: [m^3] volume inside the exact surface.
+        unsure_volume: [m^3] uncertainty of the volume due to patches of unknown shape.
     """
 
     def __init__(self, surface: Surface, patches: Patches) -> None:
@@ -41,7 +40,7 @@ class TrueSurface:
 
     @cached_property
     def tangent(self) -> NDArray:
-        """(p,) bool, True for a patch that joins another patch without a sharp edge."""
+        """Whether each patch has a border without a sharp edge, (p,) bool."""
         graph, patch = TriangleGraph(self._surface), self._patches.patch
         one, other = patch[graph.left], patch[graph.right]
         smooth = (graph.cosine > SHARP) & (one != other)
@@ -57,14 +56,14 @@ class TrueSurface:
         return pyvista.PolyData.from_regular_faces(surface.points, surface.triangles)
 
     def outside(self, points: NDArray, normals: NDArray) -> NDArray:
-        """Compute the distances of points on a mesh boundary from the exact surface.
+        """Compute the distances of boundary points from the exact surface.
 
         Args:
-            points: (n, 3) [m].
+            points: (n, 3) [m] points on the boundary of a mesh.
             normals: (n, 3) outward normals of the mesh at these points.
 
         Returns:
-            (n,) [m] distances; negative for points inside the surface.
+            (n,) [m] distances, negative for points inside the surface.
         """
         cell = np.atleast_1d(self._mesh.find_closest_cell(points))
         patch = self._patches.patch[cell]
@@ -77,7 +76,8 @@ class TrueSurface:
         return away
 
     def _volumes_between(self) -> NDArray:
-        """Compute the volume (p,) [m^3] between facets and shape of each patch."""
+        """Compute the volume between the facets and the shape of each patch, (p,)
+        [m^3]."""
         surface, patches = self._surface, self._patches
         areas = surface.normals()
         volumes = np.zeros(len(patches.shapes))
@@ -87,8 +87,8 @@ class TrueSurface:
             places = np.einsum("qk,mkx->mqx", _PLACES, corners)
             distance, slope = shape.signed(places.reshape(-1, 3))
             slope = slope.reshape(places.shape)
-            # distance along the facet's normal, which is the distance times the
-            # gradient's component along this normal
+            # distance along the normal of the facet: the distance times the component
+            # of the gradient along this normal
             flux = np.einsum("mqx,mx->mq", slope, areas[members])
             gap = -distance.reshape(flux.shape) * flux
             volumes[number] = float((gap @ _WEIGHTS).sum())
