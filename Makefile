@@ -1,14 +1,14 @@
-# make study   install everything and run the main study
-# make test    install everything and run the fast tests
-# make docs    install everything and build the site, build/site/index.html
+# make study   install all packages and run the main study
+# make test    install all packages and run the fast tests
+# make docs    install all packages and build the site build/site/index.html
 #
-# Variables: PYTHON=python3.13 selects another Python; VENV=PATH selects another folder
-# for the environment.
+# The variable PYTHON, such as PYTHON=python3.13, selects another Python version.
+# VENV=PATH selects another folder for the virtual environment.
 
 PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
-# an environment of another Python version is created again
+# the environment is created again if the Python version has changed
 VERSION := $(shell $(PYTHON) -c 'import sys; print("%d.%d" % sys.version_info[:2])')
 EMPTY := $(VENV)/empty-$(VERSION)
 READY := $(VENV)/ready-$(VERSION)
@@ -46,7 +46,7 @@ $(EMPTY): pyproject.toml
 	$(BIN)/python -m pip install --quiet --upgrade pip
 	@touch $@
 
-# installing the package compiles the C++ code
+# the installation of the package compiles the C++ code
 $(READY): $(EMPTY) $(CPP)
 	$(BIN)/python -m pip install --quiet -e ".[all,mkl,dev]"
 	@touch $@

@@ -1,4 +1,4 @@
-"""Find the words of plain_words.txt in sources and pages; exit status 1 if any.
+"""Report words of plain_words.txt in sources and pages.
 
 Run ``python .ci/plain_words.py`` at the root of the repository.
 """
@@ -16,11 +16,11 @@ FOLDERS = (
 )  # fmt: skip
 LIBRARY = {"assembly", "examples", "forcefit", "meshes", "stiffness", "validation"}
 SOURCES = {".py", ".h", ".cpp", ".md"}
-SKIPPED = {"CHANGELOG.md"}  # history keeps the words of its time
+SKIPPED = {"CHANGELOG.md"}  # old entries are not changed
 
 
 def read_list(text):
-    """Return the sections of a word list: {section: {word: replacement}}."""
+    """Return the sections of a word list, {section: {word: replacement}}."""
     sections, words = {}, {}
     for line in text.splitlines():
         if line.startswith("["):
@@ -32,10 +32,10 @@ def read_list(text):
 
 
 def find_words(text, words, names=()):
-    """Yield line number, word found and replacement; ``names`` are left out."""
+    """Yield line number, word and replacement; ignore given names."""
     for name in names:
         text = text.replace(name, "")
-    # words of a phrase may be on two lines, with a comment's mark between them
+    # a phrase may continue on the next line of a comment
     gap = r"(?:\s|#|//)+"
     phrases = [gap.join(map(re.escape, word.split())) for word in words]
     for match in re.finditer(rf"\b(?:{'|'.join(phrases)})\b", text, re.IGNORECASE):
@@ -44,7 +44,7 @@ def find_words(text, words, names=()):
 
 
 def comments(text, python=True):
-    """Return the comments and docstrings of a source, on the same lines."""
+    """Return the comments and docstrings of a source at their original lines."""
     if not python:  # C++
         return "\n".join(line.partition("//")[2] for line in text.splitlines())
     found, before = "", tokenize.NEWLINE
@@ -58,7 +58,7 @@ def comments(text, python=True):
 
 
 def main():
-    """Print every word that is found, with its file, line and replacement."""
+    """Print each word with its file, line and replacement."""
     sections = read_list(LIST.read_text("utf-8"))
     paths = [*Path().glob("*.md")]
     paths += [path for folder in FOLDERS for path in Path(folder).rglob("*")]

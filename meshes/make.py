@@ -1,7 +1,6 @@
-"""Make the surfaces in this folder: ``python meshes/make.py`` (needs manifold3d).
+"""Create the surfaces in this folder: ``python meshes/make.py`` (needs manifold3d).
 
-Lengths are in metres.  The link's axis is z, and the base interface is at z = 0.  The
-same versions of Python and manifold3d give the same bytes.
+Lengths are in metres. The axis of each link is z, and the base interface is at z = 0.
 """
 
 from pathlib import Path
@@ -10,11 +9,11 @@ import manifold3d as m3
 import numpy as np
 
 HERE = Path(__file__).parent
-LENGTH = 0.452  # [m] from base joint to tip joint of the paper's distal link
+LENGTH = 0.452  # [m] distance between the joints of the IRSBot-2 distal link
 
 
 def bar(radius, z0, z1, facets, tip_radius=None):
-    """Return a round bar or cone along z."""
+    """Return a round bar or a cone along z."""
     tip_radius = radius if tip_radius is None else tip_radius
     solid = m3.Manifold.cylinder(z1 - z0, radius, tip_radius, facets)
     return solid.translate((0, 0, z0))
@@ -27,18 +26,18 @@ def block(low, high):
 
 
 def pin(radius, y0, y1, z, facets):
-    """Return a round bar along y through (0, ., z)."""
+    """Return a round bar along y whose axis is at x = 0 and height z."""
     solid = m3.Manifold.cylinder(y1 - y0, radius, radius, facets)
     return solid.rotate((-90, 0, 0)).translate((0, y0, z))
 
 
 def distal_plain():
-    """Return the paper's distal link: a round bar, r = 40 mm, L = 452 mm."""
+    """Return the IRSBot-2 distal link of the paper, which is a round bar."""
     return bar(0.040, 0.0, LENGTH, 64)
 
 
 def fork():
-    """Return an end plug with a weight hole, and two lugs with a bore along y."""
+    """Return the end of a tube with two lugs, which have a bore along y."""
     solid = bar(0.040, 0.042, 0.060, 96) - bar(0.015, 0.03, 0.07, 48)
     for y0, y1 in ((0.016, 0.030), (-0.030, -0.016)):
         lug = block((-0.025, y0, 0.0), (0.025, y1, 0.045)) + pin(0.025, y0, y1, 0, 64)
@@ -47,37 +46,37 @@ def fork():
 
 
 def distal_forks():
-    """Return a realistic distal link: tube 80 x 6 mm, two-bore forks at both ends."""
+    """Return a distal link with details: a tube with forks at both ends."""
     tube = bar(0.040, 0.060, LENGTH - 0.060, 96) - bar(0.034, 0.0, LENGTH, 96)
     tip = fork().mirror((0, 0, 1)).translate((0, 0, LENGTH))
     return fork() + tube + tip
 
 
 def tube():
-    """Return a tube 60 x 4 mm, 400 mm long."""
+    """Return a tube of 60 x 4 mm with a length of 400 mm."""
     return bar(0.030, 0.0, 0.4, 64) - bar(0.026, -0.1, 0.5, 64)
 
 
 def tapered_arm():
-    """Return a solid cone from r = 45 mm to r = 25 mm over 350 mm."""
+    """Return a solid cone with radii of 45 mm and 25 mm and a length of 350 mm."""
     return bar(0.045, 0.0, 0.35, 64, tip_radius=0.025)
 
 
 def l_bracket():
-    """Return an L of a 40 x 40 mm bar: up z by 0.2 m (axis), then along x by 0.15 m."""
+    """Return an L-shaped bar: 0.2 m along z, then 0.15 m along x."""
     leg = block((-0.02, -0.02, 0.0), (0.02, 0.02, 0.22))
     return leg + block((-0.02, -0.02, 0.18), (0.15, 0.02, 0.22))
 
 
 def delta_forearm():
-    """Return rod of a Delta's forearm: tube 14 x 2 mm with solid ball-socket heads."""
+    """Return a rod of the forearm of a Delta robot: a tube with solid ends."""
     head = bar(0.012, 0.0, 0.030, 48)
     rod = bar(0.007, 0.030, 0.370, 48) - bar(0.005, 0.030, 0.370, 48)
     return head + rod + head.translate((0, 0, 0.370))
 
 
 def save_stl(solid, path):
-    """Write a binary STL file with its triangles in a fixed order."""
+    """Write a binary STL file."""
     mesh = solid.to_mesh()
     points = np.asarray(mesh.vert_properties, dtype=np.float64)[:, :3]
     corners = points[np.asarray(mesh.tri_verts)].astype("<f4")

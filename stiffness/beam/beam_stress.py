@@ -39,7 +39,7 @@ _CHUNK = 2048  # number of sections in a batch, whose stresses occupy 54 MB
 # number of sections of a beam with weight, which limits the relative error of a
 # parabolic peak to 1e-3
 _ALONG = 33
-_SHAPES = "radius (inner_radius), or width and height (wall)"
+_SHAPES = "radius and optionally inner_radius, or width, height and optionally wall"
 
 
 def peak_beam_stress(

@@ -102,7 +102,8 @@ def arc_piece(
     spoke = p - c
     if abs(spoke @ axis) > 1e-9 * np.linalg.norm(spoke):
         raise BadInput(
-            "arc: found a turn about an axis that is not normal to the radius"
+            "arc: found a rotation axis that is not normal to the radius, expected a "
+            "normal axis"
         )
     return Piece(
         place=lambda t: c + rotation_matrix(t * angle) @ spoke,
@@ -164,7 +165,7 @@ def curve_compliance(
             f"curve_compliance: theory = {describe(theory)}{nearest(theory, THEORIES)}"
         )
     if not pieces:
-        raise BadInput("curve_compliance: no pieces; expected at least one")
+        raise BadInput("curve_compliance: found no pieces, expected at least one")
     _check_joined(pieces)
     tip = pieces[-1].place(1.0)
 
@@ -182,8 +183,8 @@ def curve_compliance(
             return (finer + finer.T) / 2
         parts, C = 2 * parts, finer
     raise BadInput(
-        "curve_compliance: the integral did not converge to a relative error "
-        f"of {tolerance:g}; split pieces where the section changes abruptly"
+        "curve_compliance: the integral did not converge to a relative error of "
+        f"{tolerance:g}; divide the pieces at points where the section changes abruptly"
     )
 
 
@@ -242,8 +243,8 @@ def _check_joined(pieces: Sequence[Piece]) -> None:
         size = float(np.linalg.norm(one.tangent(1.0)))
         if gap > 1e-6 * size:
             raise BadInput(
-                f"curve_compliance: piece {number} begins {gap:.3g} m away from where "
-                "the piece before it ends"
+                f"curve_compliance: piece {number} starts {gap:.3g} m from the end of "
+                "the previous piece; expected the same point"
             )
 
 

@@ -156,8 +156,8 @@ def box_section(width: float, height: float, wall: float, nu: float) -> Section:
     check_poisson("box_section", nu)
     if not 2 * wall < min(width, height):
         raise BadInput(
-            f"box_section: found wall = {wall:g} m, expected less than half of "
-            "width and of height"
+            f"box_section: found wall = {wall:g} m, expected less than half of the "
+            "width and half of the height"
         )
     inner_width, inner_height = width - 2 * wall, height - 2 * wall
     b, h = width - wall, height - wall
@@ -281,7 +281,8 @@ def check_section(place: str, given: Mapping[str, float]) -> None:
             raise BadInput(f'{place}: unknown "{name}"{nearest(name, known)}')
     kinds = "; ".join(", ".join(sorted(kind)) for kind in _SECTIONS)
     raise BadInput(
-        f"{place}: found {', '.join(given) or 'nothing'}, expected one of: {kinds}"
+        f"{place}: found {', '.join(given) or 'nothing'}, expected one of these sets: "
+        f"{kinds}"
     )
 
 

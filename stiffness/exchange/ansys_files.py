@@ -61,8 +61,8 @@ def harwell_boeing(path: Path, text: str) -> csr_array:
         ) from None
     if kind.upper() not in {"RSA", "RUA"} or len(counts) < 4 or len(formats) < 3:
         raise BadInput(
-            f"{path}: found the kind {describe(kind)}, expected RSA or RUA: a real, "
-            "assembled matrix in ASCII"
+            f"{path}: found the matrix type {describe(kind)}, expected RSA or RUA (a "
+            "real assembled matrix)"
         )
     if not 0 < rows == columns <= LARGEST:
         raise BadInput(
@@ -82,8 +82,8 @@ def harwell_boeing(path: Path, text: str) -> csr_array:
         or (starts[0], starts[-1]) != (1, entries + 1)
     ):
         raise BadInput(
-            f"{path}: found {found[1]} row indices and {found[2]} values of "
-            f"{columns} columns, expected {entries} of each"
+            f"{path}: found {found[1]} row indices and {found[2]} values in {columns} "
+            f"columns, expected {entries} row indices and {entries} values"
         )
     i = places.astype(int) - 1
     j = np.repeat(np.arange(columns), np.diff(starts).astype(int))
@@ -134,7 +134,7 @@ def read_mapping(path: Path) -> list[int] | list[tuple[int, int]]:
         if columns != 1 or len(nodes) != rows or len(set(nodes)) != rows:
             raise BadInput(
                 f"{path}: found {len(set(nodes))} different nodes, expected one column "
-                f"with {rows} nodes"
+                f"with {rows} different nodes"
             )
         return nodes
     freedoms: dict[int, tuple[int, int]] = {}
@@ -144,8 +144,8 @@ def read_mapping(path: Path) -> list[int] | list[tuple[int, int]]:
             continue  # this line is a heading
         if len(words) != 3:
             raise BadInput(
-                f"{path}: found {describe(line.strip())}, expected the number of a "
-                "row, the number of a node and a label such as UX"
+                f"{path}: found {describe(line.strip())}, expected a row number, a "
+                "node number and a label such as UX"
             )
         label = words[2].upper()
         if label not in LABELS:

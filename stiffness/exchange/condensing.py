@@ -48,8 +48,8 @@ def read_nodes(path: Path | str, unit: float) -> dict[int, NDArray]:
     head = _WORKBENCH.match(text)
     if head and abs(_LENGTHS.get(head[1], 0.0) - unit) > 1e-9 * unit:
         raise BadInput(
-            f"{path}: found lengths in {head[1]}, but a different --unit; expected "
-            "the same unit"
+            f"{path}: the lengths in the file are in {head[1]}, but --unit is "
+            "different; expected the same unit"
         )
     for number, words, line in _node_lines(text):
         try:
@@ -60,7 +60,7 @@ def read_nodes(path: Path | str, unit: float) -> dict[int, NDArray]:
         if place.shape != (3,) or not np.isfinite(place).all() or node in nodes:
             raise BadInput(
                 f"{path}: line {number}: found {describe(line.strip())}, expected the "
-                "number of a further node and its x, y, z"
+                "number of another node and its coordinates x, y, z"
             )
         nodes[node] = unit * place
     if not nodes:
@@ -132,15 +132,14 @@ def interface_rows(
             named = f" (nodes with rotations: {', '.join(map(str, whole[:4]))}{more})"
             raise BadInput(
                 f"{option}: node {node} of {matrix.file} has the degrees of freedom "
-                f"{has or 'none'}, expected a node with 1 to 6"
-                f"{named if whole else ''}, or an interface such as z=0 with --nodes"
+                f"{has or 'none'}, expected a node with the degrees of freedom 1 to "
+                f"6{named if whole else ''}, or an interface such as z=0 with --nodes"
             )
         return np.array(rows), np.eye(6), None if nodes is None else nodes.get(node)
     interface = parse_interface(asked, option)
     if nodes is None:
         raise BadInput(
-            f"{option}: found an interface without positions of the nodes; add "
-            "--nodes FILE"
+            f"{option}: found an interface, but no node positions; add --nodes FILE"
         )
     known = [node for node in nodes if (node, 1) in row]
     places = np.array([nodes[node] for node in known]).reshape(-1, 3)
@@ -202,8 +201,8 @@ def condensed(
     for k, (rows, motions) in enumerate(ends):
         if not free[rows].all():
             raise BadInput(
-                f"{matrix.file}: found degrees of freedom that base and tip "
-                "share, expected interfaces without a common node"
+                f"{matrix.file}: base and tip have common degrees of freedom; expected "
+                "interfaces without a common node"
             )
         fields[rows, 6 * k : 6 * k + 6] = motions
         free[rows] = False
@@ -215,15 +214,14 @@ def condensed(
             node, direction = np.array(matrix.freedoms)[free][int(np.argmax(loose))]
             raise BadInput(
                 f"{matrix.file}: degree of freedom {direction} of node {node} has no "
-                "stiffness; expected a body in one piece, whose nodes are all "
-                "connected"
+                "stiffness; expected a body whose nodes are all connected"
             )
         loads = -(K @ fields)[free]
         fields[free] = solve(triu(inner, format="csr"), loads)
         if not np.isfinite(fields).all():
             raise BadInput(
-                f"{matrix.file}: found a singular stiffness between the "
-                "interfaces; expected a body in one piece that connects them"
+                f"{matrix.file}: the stiffness between the interfaces is singular; "
+                "expected a body that connects them"
             )
     # computed from the strain energy, because its error is quadratic in the solution
     # error

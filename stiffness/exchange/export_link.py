@@ -37,9 +37,8 @@ def read_link_results(path: Path | str) -> tuple[NDArray, NDArray]:
     except (ValueError, TypeError, KeyError, RecursionError) as error:
         reason = one_line(str(error), 80)
         raise BadInput(
-            f"{path}: found no stiffness, base and tip of a link ({reason}); "
-            "expected a file that stiffness beam, fea or convert writes with "
-            "--json"
+            f"{path}: found no stiffness, base and tip of a link ({reason}); expected "
+            "a file that forcefit stiffness beam, fea or convert wrote with --json"
         ) from None
     if K.shape != (6, 6) or offset.shape != (3,) or not np.isfinite(K).all():
         raise BadInput(f"{path}: stiffness: expected 6 rows of 6 finite numbers")

@@ -64,8 +64,8 @@ def import_link(
     if set(matrix.freedoms) == {(node, direction) for direction in range(1, 7)}:
         if mass is not None:
             raise BadInput(
-                "--mass: found a stiffness of 6 rows, which has no nodes for a "
-                "mass matrix; expected the full matrix of a body, or no --mass"
+                "--mass: the stiffness matrix has only 6 rows; expected the full "
+                "stiffness matrix of a body, or no --mass"
             )
         rows = interface_rows(matrix, str(node), "--tip", None)[0]
         K = matrix.matrix.toarray()[np.ix_(rows, rows)]
@@ -89,8 +89,8 @@ def import_link(
     strange = [freedom for freedom in heavy.freedoms if freedom not in row]
     if strange or len(heavy.freedoms) < len(row) and not heavy.named:
         raise BadInput(
-            f"{mass}: found nodes or directions that {path} does not have, or too "
-            "few; expected the same in both files"
+            f"{mass}: the nodes and directions differ from those in {path}; expected "
+            "the same in both files"
         )
     # a mass matrix with named rows has no rows for degrees of freedom without mass
     moved = fields[[row[freedom] for freedom in heavy.freedoms]]

@@ -130,8 +130,8 @@ def _mapped(path: Path, n: int) -> list[Freedom]:
             freedoms += [(item, direction) for direction in range(1, each + 1)]
     if len(freedoms) != n or each > 6:
         raise BadInput(
-            f"{path}: found {len(given)} rows or nodes, expected those of a matrix "
-            f"with {n} rows"
+            f"{path}: found {len(given)} rows or nodes, but the matrix has {n} rows; "
+            "expected a mapping of all rows"
         )
     return freedoms
 
@@ -160,8 +160,8 @@ def _checked(
         k = int(np.argmax(np.where(wrong, gap.data, -1.0)))
         i, j = int(gap.row[k]), int(gap.col[k])
         raise BadInput(
-            f"{path}: not symmetric: found [{i + 1}, {j + 1}] = {matrix[i, j]:.6e} but "
-            f"[{j + 1}, {i + 1}] = {matrix[j, i]:.6e}"
+            f"{path}: the matrix is not symmetric: [{i + 1}, {j + 1}] = "
+            f"{matrix[i, j]:.6e} but [{j + 1}, {i + 1}] = {matrix[j, i]:.6e}"
         )
     both = csr_array((matrix + matrix.T) / 2)
     return FileMatrix(str(path), both, tuple(given), freedoms is not None)
@@ -177,8 +177,8 @@ def _in_order(path: Path, n: int, nodes: Sequence[int] | None) -> list[Freedom]:
         f"three or six for each of the {len(nodes)} nodes"
     )  # fmt: skip
     raise BadInput(
-        f"{path}: found {n} rows without names, expected {expected}, or a format that "
-        "names them"
+        f"{path}: found {n} rows without names, expected {expected}, or a file with "
+        "names of the rows"
     )
 
 
@@ -203,7 +203,7 @@ def _numpy(path: Path) -> csr_array:
         raise
     except Exception as error:  # a damaged archive may raise any exception
         raise BadInput(
-            f"{path}: not a matrix of NumPy or SciPy: {one_line(str(error), 100)}"
+            f"{path}: not a NumPy or SciPy matrix: {one_line(str(error), 100)}"
         ) from None
 
 
@@ -233,8 +233,8 @@ def _user_element(path: Path, text: str, which: str) -> tuple[csr_array, list[Fr
             values[part] += [real(path, word) for word in words]
     if not nodes or not lines or not lines[0]:
         raise BadInput(
-            f"{path}: found no ** ELEMENT NODES with their degrees of freedom, "
-            "expected these lines in *USER ELEMENT"
+            f"{path}: found no nodes and degrees of freedom, expected ** ELEMENT NODES "
+            "in *USER ELEMENT"
         )
     changes = {1: lines[0], **{row[0]: row[1:] for row in lines[1:]}}
     freedoms: list[Freedom] = []
@@ -246,8 +246,8 @@ def _user_element(path: Path, text: str, which: str) -> tuple[csr_array, list[Fr
     if len(given) != n * (n + 1) // 2:
         raise BadInput(
             f"{path}: {which}: found {len(given)} numbers, expected "
-            f"{n * (n + 1) // 2}: "
-            f"the lower half of {n} freedoms at {len(set(nodes))} nodes"
+            f"{n * (n + 1) // 2}: the lower triangle for {n} degrees of freedom of "
+            f"{len(set(nodes))} nodes"
         )
     K = np.zeros((n, n))
     K[np.tril_indices(n)] = given
@@ -302,8 +302,8 @@ def _named_by(path: Path, n: int) -> list[Freedom]:
         freedoms.append((whole(path, node), whole(path, direction)))
     if len(set(freedoms)) != n:
         raise BadInput(
-            f"{path}: found {len(set(freedoms))} freedoms, expected {n}, as many as "
-            "the matrix has rows"
+            f"{path}: found {len(set(freedoms))} degrees of freedom, expected {n}, the "
+            "number of rows of the matrix"
         )
     return freedoms
 
@@ -314,7 +314,7 @@ def _from_entries(
     """Build a symmetric matrix from the entries of one or both triangles."""
     freedoms = sorted({freedom for pair in entries for freedom in pair})
     if not freedoms or len(freedoms) > LARGEST:
-        raise BadInput(f"{path}: found no entries of a matrix")
+        raise BadInput(f"{path}: found no matrix entries")
     row = {freedom: k for k, freedom in enumerate(freedoms)}
     return _of_rows(entries, row), freedoms
 

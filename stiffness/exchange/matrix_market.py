@@ -42,8 +42,8 @@ def matrix_market(path: Path, text: str) -> csr_array:
     words = tuple(head.lower().split()[1:])
     if len(words) != 4 or any(w not in k for w, k in zip(words, _MARKET, strict=True)):
         raise BadInput(
-            f"{path}: found {describe(head)}, expected a "
-            "matrix, coordinate or array, real or integer, general or symmetric"
+            f"{path}: found {describe(head)}, expected a header with matrix, "
+            "coordinate or array, real or integer, and general or symmetric"
         )
     numbers = _numbers(path, [line for line in lines if not line.startswith("%")])
     sizes, rest = np.split(numbers, [3 if words[1] == "coordinate" else 2])
@@ -51,15 +51,15 @@ def matrix_market(path: Path, text: str) -> csr_array:
     if words[1] == "coordinate":
         if len(sizes) < 3 or len(rest) != 3 * sizes[2]:
             raise BadInput(
-                f"{path}: found {len(rest)} numbers after the line of sizes, expected "
-                "row, column and value of each entry that this line states; the file "
-                "may be cut"
+                f"{path}: the number of entries differs from that in the line of "
+                f"matrix sizes: found {len(rest)} numbers, expected row, column and "
+                "value for each entry; the file may be truncated"
             )
         places = rest.reshape(-1, 3)[:, :2]
         if np.any((places != places.round()) | (places < 1) | (places > n)):
             raise BadInput(
-                f"{path}: found a row or column outside 1 to {n}, expected "
-                f"whole numbers from 1 to {n}"
+                f"{path}: found an invalid row or column number, expected whole "
+                f"numbers from 1 to {n}"
             )
         i, j = places.astype(int).T - 1
         matrix = csr_array(coo_array((rest[2::3], (i, j)), shape=(n, n)))

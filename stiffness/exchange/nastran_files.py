@@ -115,8 +115,8 @@ def _terms(
         if len(waiting) < 3:
             found = describe(" ".join(waiting).strip())
             raise BadInput(
-                f"{path}: found {found} at a line's end, expected node, direction, "
-                "value"
+                f"{path}: found {found} at the end of a line, expected a complete term "
+                "of node, direction and value"
             )
         node, direction, value = waiting[:3]
         row = whole(path, node), max(1, whole(path, direction or "0"))
@@ -124,8 +124,8 @@ def _terms(
         imaginary = "" if packed else "".join(waiting[3:4])
         if imaginary and imaginary[0] not in "+*" and real(path, imaginary):
             raise BadInput(
-                f"{path}: row {row[0]} {row[1]}: found {describe(value)} and an "
-                f"imaginary part {describe(imaginary)}, expected a real matrix"
+                f"{path}: row {row[0]} {row[1]}: found the real part {describe(value)} "
+                f"and the imaginary part {describe(imaginary)}, expected a real matrix"
             )
         del waiting[: 3 if packed else 4]
     return terms
@@ -145,11 +145,14 @@ def _chosen(
         listed = [f"{n} ({k})" if (k := _kind(n)) else n for n in sorted(names)]
         raise BadInput(
             f"{path}: found the matrices {', '.join(listed) or 'none'}, expected one "
-            f"of {which}, or one whose name begins with {initial}"
+            f"{which} matrix, or one matrix whose name begins with {initial}"
         )
     form = forms.get(found[0], "")
     if form not in {"1", "6", ""}:
-        raise BadInput(f"{path}: form {describe(form)}, expected 6 or 1, real")
+        raise BadInput(
+            f"{path}: found the form {describe(form)}, expected a real matrix of form "
+            "6 or 1"
+        )
     return found[0]
 
 

@@ -73,9 +73,9 @@ def link_of_both_ends(
         offset = np.asarray(base, dtype=float) - np.asarray(tip, dtype=float)
     if not (np.abs(offset) < _FARTHEST).all():
         raise BadInput(
-            f"{who}: the matrix implies a base {np.abs(offset).max():.3g} m "
-            "from its tip; check whether the body is held elsewhere, and the "
-            "order and units of the degrees of freedom"
+            f"{who}: the matrix implies a distance of {np.abs(offset).max():.3g} m "
+            "between base and tip; check whether the body is clamped elsewhere, and "
+            "the order and units of the degrees of freedom"
         )
     ideal = both_ends(K, offset)
     size = np.sqrt(np.abs(np.diag(ideal)))
@@ -84,9 +84,9 @@ def link_of_both_ends(
         i, j = np.unravel_index(int(np.argmax(gap)), gap.shape)
         raise BadInput(
             f"{who}: the wrenches of the two interfaces do not balance: found "
-            f"[{i + 1}, {j + 1}] = {K12[i, j]:.6e}, expected {ideal[i, j]:.6e} "
-            f"for a free body whose base is {offset[0]:.6g}, {offset[1]:.6g}, "
-            f"{offset[2]:.6g} m from its tip; check whether the body is held "
+            f"[{i + 1}, {j + 1}] = {K12[i, j]:.6e}, expected {ideal[i, j]:.6e} for a "
+            f"free body whose base is {offset[0]:.6g}, {offset[1]:.6g}, "
+            f"{offset[2]:.6g} m from its tip; check whether the body is clamped "
             "elsewhere, and the order and units of the degrees of freedom"
         )
     at = np.zeros(3) if tip is None else np.asarray(tip, dtype=float)

@@ -425,10 +425,11 @@ def _refuse_cost(
     seconds *= pace
     if unknowns > budget.unknowns or spent + seconds > budget.seconds:
         raise MeshFailed(
-            f"the coarsest mesh that follows the part has {unknowns} unknowns, about "
-            f"{seconds:.0f} s and {memory / 1e9:.1f} GB after {spent:.0f} s for the "
-            f"mesh; expected at most {budget.unknowns} and {budget.seconds:g} s: "
-            "allow more time, or leave out small details"
+            f"the coarsest mesh of the part has {unknowns} unknowns. The solution "
+            f"needs about {seconds:.0f} s and {memory / 1e9:.1f} GB after {spent:.0f} "
+            f"s of meshing, expected at most {budget.unknowns} unknowns and "
+            f"{budget.seconds:g} s; increase the time limit, or remove small details "
+            "of the part"
         )
 
 

@@ -60,14 +60,17 @@ def material_of_elements(
         (t, 3) lambda [Pa], mu [Pa] and density [kg/m^3] of each element.
 
     Raises:
-        BadInput: no material is given, or the first has a region.
+        BadInput: no material is given, or the first has a smaller region.
     """
     check_materials(materials)
     centers = mesh.nodes[mesh.cells[:, :4]].mean(axis=1)
     first = materials[0].where
     number = region_of_places(centers, regions_of(materials), cut_region)
     if first is not None and not first(centers[number == 0]).all():
-        raise BadInput("materials: the first must fill the whole link")
+        raise BadInput(
+            "materials: the first material has a region, expected a material of the "
+            "whole link"
+        )
     return _constants(materials)[number]
 
 

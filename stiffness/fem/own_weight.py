@@ -30,11 +30,11 @@ def with_own_weight(solved: MeshedLink) -> MeshedLink:
     mesh, held = level.mesh, level.solution
     lam, mu, density = level.material.T
     if not density.any():
-        raise BadInput("gravity: the link has no density, expected one [kg/m^3]")
+        raise BadInput("gravity: the link has no density; expected a density [kg/m^3]")
     if held.kind == "distributing-both":
         raise BadInput(
-            "gravity: found distributing-both interfaces, whose base is not "
-            "clamped; expected rigid or distributing"
+            "gravity: found the interface kind distributing-both, for which the base "
+            "is not clamped; expected rigid or distributing"
         )
     masses = _nodal_masses(mesh, density)
     loads = masses[:, None, None] * np.eye(3)

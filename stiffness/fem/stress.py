@@ -278,8 +278,8 @@ def stress_influence(solved: MeshedLink, away: float | None = None) -> StressInf
     far = gap >= distance * (1 - 1e-9)  # a node at exactly this distance is included
     if not far.any():
         raise BadInput(
-            f"stress: found no node {distance:.4g} m away from the interfaces; "
-            f"the furthest node is {gap.max():.4g} m away: use a smaller "
+            f"stress: found no node at a distance of {distance:.4g} m from the "
+            f"interfaces; the largest distance is {gap.max():.4g} m; use a smaller "
             "--away"
         )
     off = off_shapes(level)[node]

@@ -47,17 +47,19 @@ def fit_to_patches(
     volume = float(solid.volumes().sum())
     if abs(volume / surface.volume - 1) > 0.02:
         raise MeshFailed(
-            f"{surface.name}: the mesh has {volume:.6g} m^3, the surface encloses "
-            f"{surface.volume:.6g}"
+            f"{surface.name}: the volume of the mesh is {volume:.6g} m^3, expected "
+            f"{surface.volume:.6g} m^3 inside the surface"
         )
     if (least := float(element_quality(solid).min())) <= 0:
-        raise MeshFailed(f"{surface.name}: an element is inverted, quality {least:.2g}")
+        raise MeshFailed(
+            f"{surface.name}: an element is inverted, and its quality is {least:.2g}"
+        )
     # a missing hole in a thin wall changes the stiffness but hardly the volume
     holes, expected = (euler_characteristic(f) for f in (faces, surface.triangles))
     if holes != expected:
         raise MeshFailed(
-            f"{surface.name}: the mesh has Euler characteristic {holes}, "
-            f"expected {expected}, that of the surface: details were lost"
+            f"{surface.name}: the mesh has Euler characteristic {holes}, expected "
+            f"{expected} as for the surface; holes or other details are missing"
         )
     for number, name in enumerate(("base", "tip")):
         if not (solid.patch == number).any():

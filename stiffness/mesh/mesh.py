@@ -132,8 +132,8 @@ def _tetrahedralize(
             )
         except subprocess.TimeoutExpired:
             raise MeshFailed(
-                f"{surface.name}: found no mesh within {time_limit:g} s; use a "
-                "coarser surface or a longer time limit"
+                f"{surface.name}: the mesh was not finished within {time_limit:g} s; "
+                "use a coarser surface or a longer time limit"
             ) from None
         mesh = _from_cache(made)
     if mesh is None or len(mesh[1]) == 0:

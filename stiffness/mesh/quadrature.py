@@ -120,7 +120,7 @@ def quadrature(degree: int, corners: int = 4) -> tuple[NDArray, NDArray]:
     rules = _TETRAHEDRON if corners == 4 else _TRIANGLE
     rule = next((r for r in rules if r.degree >= degree), None)
     if rule is None:
-        raise ValueError(f"degree is {degree}, expected one up to {rules[-1].degree}")
+        raise ValueError(f"degree: found {degree}, expected at most {rules[-1].degree}")
     words = rule.points.split()
     letters = np.array([[ord(c) - ord("a") for c in word] for word in words])
     L = np.array(rule.coordinates)[letters]

@@ -87,12 +87,12 @@ class LinkComparison:
         angle, remaining = self.better_turn
         if angle:
             worst = 100 * np.abs(self.difference).max()
-            swap = "" if angle == 180 else ", or exchanged width and height"
+            swap = "" if angle == 180 else ", or exchange width and height"
             return (
-                f"The beam's axes seem to be exchanged: rotated by {angle} degrees "
-                "about base "
-                f"to tip it would differ by {100 * remaining:.3g} % at most, not "
-                f"{worst:.3g} %.  Expected another up{swap}."
+                "The axes of the beam seem to be exchanged. After a rotation by "
+                f"{angle} degrees about the line from base to tip, the largest "
+                f"difference would be {100 * remaining:.3g} % in place of {worst:.3g} "
+                f"%.  Change up{swap}."
             )
         c = self.end_effect
         noise = self.fea.relative_error_estimate * self.slenderness
@@ -103,10 +103,10 @@ class LinkComparison:
             "so c includes more than the end effect."
         )
         return (
-            f"L / r = {self.slenderness:.3g}.  Held faces cannot warp or shrink: "
-            f"K / K_beam = 1 + c r / L with c = {turns} (rotations), {shifts} "
-            f"(translations); the mesh error changes c by up to {noise:.2f}."
-            f"{bent if self.length > 1.001 * chord else ''}"
+            f"L / r = {self.slenderness:.3g}.  Rigid faces cannot warp or contract: K "
+            f"/ K_beam = 1 + c r / L with c = {turns} (rotations), {shifts} "
+            "(translations); the mesh error changes c by up to "
+            f"{noise:.2f}.{bent if self.length > 1.001 * chord else ''}"
         )
 
 
@@ -144,9 +144,9 @@ def compare_link(
     if gap > 1e-6 + 1e-3 * length:
         ends = [", ".join(f"{v:.6g}" for v in link.tip) for link in (beam, fea)]
         raise BadInput(
-            f"compare: the beam ends at ({ends[0]}) m, the tip of the surface "
-            f"is at ({ends[1]}) m; expected the same point: change the beam or "
-            "--base and --tip"
+            f"compare: the tip of the beam is at ({ends[0]}) m, but the tip of the "
+            f"surface is at ({ends[1]}) m; expected the same point; change the beam, "
+            "or --base and --tip"
         )
     difference = scaled(fea.stiffness - beam.stiffness, beam.stiffness)
     return LinkComparison(beam, fea, difference, length, size)

@@ -76,7 +76,8 @@ def _entry(file: Path) -> Entry:
         about = json.loads(read_text(file))
         if about.get("format") != FORMAT:
             raise BadInput(
-                f'{file}: found no entry of a library; expected format "{FORMAT}"'
+                f"{file}: the file is not an entry of a library; expected the format "
+                f'"{FORMAT}"'
             )
         if about["screw"] != list(SCREW) or about["wrench"] != list(WRENCH):
             raise BadInput(
@@ -178,9 +179,9 @@ def look_up(
         if entry.parameters.keys() != entries[0].parameters.keys():
             raise BadInput(
                 f"look-up: {entry.key} has the parameters "
-                f"{', '.join(entry.parameters) or 'none'}, {entries[0].key} "
-                f"{', '.join(names) or 'none'}; expected the same parameters in "
-                "all entries of a grid"
+                f"{', '.join(entry.parameters) or 'none'}, but {entries[0].key} has "
+                f"the parameters {', '.join(names) or 'none'}; expected the same "
+                "parameters in all entries of a grid"
             )
     axes = [sorted({e.parameters[name] for e in entries}) for name in names]
     single = {n: a[0] for n, a in zip(names, axes, strict=True) if len(a) == 1}
@@ -198,7 +199,10 @@ def look_up(
                 "extrapolated"
             )
     if len(entries) != np.prod([len(axis) for axis in axes]):
-        raise BadInput("look-up: the entries do not fill a grid of their parameters")
+        raise BadInput(
+            "look-up: the grid of parameters is incomplete; expected an entry for "
+            "each combination of values"
+        )
     place = {tuple(e.parameters[n] for n in names): e for e in entries}
     most = [4] * len(names)
     best = _interpolated(place, axes, [wanted[n] for n in names], most)
@@ -221,14 +225,16 @@ def _grid_of(entries: Sequence[Entry], family: str) -> list[Entry]:
     if family and family not in families:
         raise BadInput(f'look-up: no family "{family}"{nearest(family, families)}')
     if not family and not grid and len(families) > 1:
-        raise BadInput(f"look-up: found families {', '.join(families)}, expected one")
+        raise BadInput(
+            f"look-up: found the families {', '.join(families)}, expected the name of "
+            "one"
+        )
     if family or (not grid and families):
         wanted = family or families[0]
         return [entry for entry in entries if entry.about.get("family") == wanted]
     if not grid:
         raise BadInput(
-            "look-up: found only entries of single surfaces, expected entries "
-            "on a grid of parameters"
+            "look-up: found only single parts, expected entries on a grid of parameters"
         )
     return grid
 

@@ -202,19 +202,20 @@ def family_of(common: SurfaceLink, file: Path) -> list[SurfaceLink]:
     if "surface" not in head or not names or len(set(head)) != len(head):
         raise BadInput(
             f"{file}: line 1: found {describe(','.join(head))}, expected surface and "
-            "the name of each size, once"
+            "different names of sizes"
         )
     links = []
     for number, row in enumerate(rows[1:], 2):
         place = f"{file}: line {number}"
         if len(row) != len(head):
             raise BadInput(
-                f"{place}: found {len(row)} cells, expected {len(head)}, as the header"
+                f"{place}: found {len(row)} cells, expected {len(head)} as in the "
+                "header"
             )
         cells = dict(zip(head, (cell.strip() for cell in row), strict=True))
         surface = file.parent / cells["surface"]
         if not os.path.isfile(named_solid(surface)[0]):
-            raise BadInput(f"{place}: found no file {surface}, expected a surface")
+            raise BadInput(f"{place}: found no file {surface}, expected a surface file")
         sizes = {name: _size(place, name, cells[name]) for name in names}
         ends = {}
         for key in ("base", "tip"):

@@ -16,8 +16,9 @@ from forcefit.stiffness.screws import SCREW, WRENCH
 
 _ASSUMED = (
     "Small strains of a linear elastic, isotropic material.",
-    "The base interface is held; the wrench acts on the tip interface.",
-    "The error is estimated from the sequence of meshes; it is no certified bound.",
+    "The base interface is clamped, and the wrench acts on the tip interface.",
+    "The error is estimated from the sequence of meshes. The estimate is not a strict "
+    "bound.",
 )
 _MESH = (
     "elements", "unknowns", "meshes", "volume", "surface_volume", "area",
@@ -116,10 +117,11 @@ def _tiles(link: LinkStiffness) -> list[Tile]:
         Tile("Estimated error", [f"{100 * link.relative_error_estimate:.2g} %"],
              [f"required: {100 * link.mesh['accuracy']:g} %."]),
         Tile(f"Least rotational stiffness, {SCREW[turn]}",
-             [Value(K[turn], stiffness_unit(turn, turn))], ["The other motions held."]),
+             [Value(K[turn], stiffness_unit(turn, turn))],
+             ["The other motions are prevented."]),
         Tile(f"Least translational stiffness, {SCREW[shift]}",
              [Value(K[shift], stiffness_unit(shift, shift))],
-             ["The other motions held."]),
+             ["The other motions are prevented."]),
         Tile("Mesh", [f"{link.mesh['elements']} elements"],
              [f"{link.mesh['unknowns']} unknowns."]),
     ]  # fmt: skip

@@ -143,8 +143,8 @@ def link_text(link: LinkStiffness) -> str:
         f"{mesh['meshes']} mesh{'es' if mesh['meshes'] > 1 else ''}, "
         f"{mesh['solver']}, {mesh['seconds']:.1f} s",
         f"elements: quality {mesh['worst_quality']:.2f} at worst, "
-        f"{mesh['mean_quality']:.2f} on average (1 is a regular one); angles between "
-        f"faces {math.degrees(mesh['smallest_angle']):.0f} to "
+        f"{mesh['mean_quality']:.2f} on average (1 for a regular tetrahedron); angles "
+        f"between faces {math.degrees(mesh['smallest_angle']):.0f} to "
         f"{math.degrees(mesh['largest_angle']):.0f} degrees; boundary "
         f"{mesh['area']:.6g} m^2 (surface {mesh['surface_area']:.6g})",
     ]
@@ -235,7 +235,10 @@ def stress_text(peak: "PeakStress") -> str:
 def _stress_error(peak: "PeakStress") -> str:
     """Format the estimated error of a stress."""
     if not math.isfinite(peak.error):
-        return "none, the peak lies on an inner edge where stress has no finite value"
+        return (
+            "none, because the peak is on an inner edge, where the elastic stress is "
+            "infinite"
+        )
     share = peak.error / peak.von_mises if peak.von_mises else 0.0
     return f"{in_unit(peak.error, 'MPa', 2)} ({100 * share:.2g} %)"
 

@@ -67,10 +67,10 @@ class SlendernessSweep:
         left = 100 * np.abs(self.residual).max()
         mesh = 100 * max(k.fea.relative_error_estimate for k in self.comparisons)
         return (
-            f"Held faces cannot warp or shrink: K / K_beam = 1 + c r / L + d (r / L)^2 "
-            f"with c = {turns} (rotations), {shifts} (translations), +- "
-            f"{error.max():.2g} by the meshes.  The residual is at most {left:.2g} %, "
-            f"the estimated mesh error {mesh:.2g} %."
+            "Rigid faces cannot warp or contract: K / K_beam = 1 + c r / L + d (r / "
+            f"L)^2 with c = {turns} (rotations), {shifts} (translations), +- "
+            f"{error.max():.2g} due to the mesh errors.  The largest residual is "
+            f"{left:.2g} %, and the estimated mesh error is {mesh:.2g} %."
         )
 
 
@@ -111,7 +111,8 @@ def sweep_slenderness(
     if frozenset(section) not in _SHAPES:
         raise BadInput(
             f"slenderness: found a section of {', '.join(section) or 'nothing'}; "
-            "expected radius (inner_radius), or width and height (wall)"
+            "expected radius and optionally inner_radius, or width, height and "
+            "optionally wall"
         )
     if len(ratios) < 2:
         raise BadInput("slenderness: found one length, expected two or more")

@@ -43,11 +43,15 @@ def check_shape(shape: str, lengths: Mapping[str, float]) -> None:
             given = f"found {lengths[name]:g}" if name in lengths else "missing"
             raise BadInput(f"{shape}: {name}: {given}, expected a length > 0 [m]")
     if shape == "tube" and lengths["inner_radius"] >= lengths["radius"]:
-        raise BadInput("tube: found inner_radius >= radius, expected a smaller one")
+        raise BadInput(
+            "tube: found inner_radius >= radius, expected inner_radius < radius"
+        )
     if shape == "box" and 2 * lengths["wall"] >= min(
         lengths["width"], lengths["height"]
     ):
-        raise BadInput("box: found a wall that leaves no hole, expected a thinner one")
+        raise BadInput(
+            "box: the wall is so thick that there is no hole; expected a thinner wall"
+        )
 
 
 def shape_surface(shape: str, lengths: Mapping[str, float]) -> Surface:

@@ -49,7 +49,10 @@ def read_obj(path: Path) -> tuple[NDArray, list[list[int]]]:
                 f"points 1 to {len(points)}"
             )
         if len(face) < 3:
-            raise BadInput(f"{path}:{number}: found a face of {len(face)} points")
+            raise BadInput(
+                f"{path}:{number}: found a face of {len(face)} points, expected at "
+                "least 3"
+            )
     return np.array(points, dtype=float).reshape(-1, 3), faces
 
 

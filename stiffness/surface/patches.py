@@ -121,9 +121,9 @@ def refuse_common_edges(surface: Surface, base: Interface, tip: Interface) -> No
         ends = np.array(divmod(int(common[0]), len(surface.points)))
         where = ", ".join(f"{v:.4g}" for v in surface.points[ends].mean(axis=0))
         raise BadInput(
-            f"{surface.name}: base {base} and tip {tip} share an edge near ({where}) "
-            "m; between rigid faces that touch the stiffness has no finite value: "
-            "leave a gap, or choose --interface distributing"
+            f"{surface.name}: base {base} and tip {tip} have a common edge near "
+            f"({where}) m; the stiffness between rigid faces with a common edge is "
+            "infinite; change an interface, or use --interface distributing"
         )
 
 
@@ -163,9 +163,9 @@ def triangles_on(surface: Surface, interface: Interface, name: str) -> NDArray:
         cut = on & (out < 0.99).any(axis=1) & (out > 1.01).any(axis=1)
         if cut.any():
             raise BadInput(
-                f"{surface.name}: the {name} interface {interface} [m] cuts "
-                f"{cut.sum()} triangles; a disc must be an outline of the surface's "
-                "own triangles"
+                f"{surface.name}: the {name} interface {interface} [m] crosses "
+                f"{cut.sum()} triangles; the outline of a disc must consist of edges "
+                "of triangles"
             )
         on &= (out < 1.002).all(axis=1)
     if not on.any():
@@ -174,10 +174,10 @@ def triangles_on(surface: Surface, interface: Interface, name: str) -> NDArray:
             f"{k} = {a:.5g} .. {b:.5g}"
             for k, a, b in zip("xyz", low, high, strict=True)
         )
-        hint = "; a disc must be an outline of the surface's own triangles"
+        hint = "; the outline of a disc must consist of edges of triangles"
         raise BadInput(
             f"{surface.name}: no face of the surface lies on the {name} interface "
-            f"{interface} [m]; the part spans {box} m"
-            f"{hint if interface.kind == 'disc' else ''}"
+            f"{interface} [m]; the extent of the part is {box} "
+            f"m{hint if interface.kind == 'disc' else ''}"
         )
     return np.flatnonzero(on)

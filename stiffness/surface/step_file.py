@@ -54,7 +54,8 @@ def _gmsh_model(path: Path) -> Generator[Any, None, None]:
         raise
     except Exception as error:  # the library of gmsh may be missing
         raise BadInput(
-            f"{path}: STEP needs the package gmsh, which does not start: {error}"
+            f"{path}: STEP files require the package gmsh, which cannot be loaded: "
+            f"{error}"
         ) from None
     try:
         gmsh.option.setNumber("General.Terminal", 0)
@@ -166,9 +167,10 @@ def chosen_solids(model: Any, path: Path, solid: str) -> dict[str, int]:
     if not solid and len(solids) > 1:
         names = ", ".join(list(solids)[:20])
         raise BadInput(
-            f"{path}: found {len(solids)} solids ({names}), expected the name of one, "
-            f"as in {path.name}#{next(iter(solids))}, or {path.name}#{_ALL} for all of "
-            f"them as one; forcefit stiffness fea {path.name} --part list lists them"
+            f"{path}: found {len(solids)} solids ({names}), expected the name of one "
+            f"solid, as in {path.name}#{next(iter(solids))}, or {path.name}#{_ALL} for "
+            f"all solids as one part; the command forcefit stiffness fea {path.name} "
+            "--part list lists the solids"
         )
     if not solid:
         return solids
@@ -217,8 +219,8 @@ def _fragments(
     bodies = _bodies(model, list(owners))
     if bodies != 1:
         raise BadInput(
-            f"{path}: {len(chosen)} solids unite to {bodies} bodies, expected one: "
-            "solids of one link must touch"
+            f"{path}: {len(chosen)} solids form {bodies} separate bodies, expected one "
+            "body; the solids of a link must touch"
         )
     return owners, tuple(overlaps)
 

@@ -36,7 +36,7 @@ def read_stl(path: Path) -> tuple[NDArray, NDArray]:
     content = path.read_bytes()
     corners = _text(path, content) if _is_text(content) else _binary(path, content)
     if len(corners) == 0:
-        raise BadInput(f"{path}: contains no triangles, or is not STL")
+        raise BadInput(f"{path}: the file contains no triangles, or is not an STL file")
     return corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3)
 
 
@@ -64,8 +64,8 @@ def _binary(path: Path, content: bytes) -> NDArray:
         stated = len(body) // size
     if len(body) < size * stated - 2:  # the last two bytes are not used
         raise BadInput(
-            f"{path}: found {len(body) // size} whole triangles, expected {stated}, "
-            "the number in the file's head; the file is cut, or is not STL"
+            f"{path}: found {len(body) // size} complete triangles, expected {stated} "
+            "as in the header; the file is truncated, or is not an STL file"
         )
     body = body[: size * stated].ljust(size * stated, b"\0")
     return np.frombuffer(body, dtype=_TRIANGLE)["corners"].astype(float)
@@ -84,10 +84,10 @@ def _text(path: Path, content: bytes) -> NDArray:
         place = f"facet {wrong[0] + 1}" if len(wrong) else "before the first facet"
         many = corners[wrong[0] + 1] if len(wrong) else corners[0]
         ends = len(wrong) and wrong[0] + 1 == len(facets)
-        end = "; the file is cut there" if ends and many < 3 else ""
+        end = "; the file is truncated there" if ends and many < 3 else ""
         raise BadInput(f"{path}: {place}: found {many} vertices, expected 3{end}")
     if len(vertices) and vertices[-1] + 3 >= len(found):
-        raise BadInput(f"{path}: facet {len(facets)}: the file is cut there")
+        raise BadInput(f"{path}: facet {len(facets)}: the file is truncated there")
     numbers = found[vertices[:, None] + [1, 2, 3]]
     points = np.empty(numbers.shape)
     for row, three in enumerate(numbers):

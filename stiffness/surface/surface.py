@@ -182,8 +182,8 @@ def check_surface(
     points, triangles, repairs = _merge(points, triangles, name)
     if len(triangles) < 4:
         raise BadInput(
-            f"{name}: found {len(triangles)} triangles with an area, expected "
-            "at least 4 to bound a solid"
+            f"{name}: found {len(triangles)} triangles with an area, expected at least "
+            "4 for a closed surface"
         )
     _check_closed(points, triangles, name)
     triangles, turned = _orient(points, triangles, name)
@@ -194,7 +194,7 @@ def check_surface(
         where = points[triangles[crossing[0]]].reshape(-1, 3).mean(axis=0)
         raise BadInput(
             f"{name}: the surface intersects itself at {len(crossing)} pairs of "
-            f"triangles, first near {_place(where)}; unite the parts before meshing"
+            f"triangles, the first near {_place(where)}; unite the parts before meshing"
         )
     return Surface(points, triangles, name, (*repairs, *turned))
 
@@ -211,13 +211,15 @@ def _check_coordinates(
     used = points[np.unique(triangles)]
     wrong = ~np.isfinite(used).all(axis=1)
     if wrong.any():
-        raise BadInput(f"{name}: {wrong.sum()} vertices are not finite numbers")
+        raise BadInput(
+            f"{name}: the coordinates of {wrong.sum()} vertices are not finite"
+        )
     size = math.hypot(*np.ptp(used, axis=0))
     if not _SMALLEST_LINK <= size <= _LARGEST_LINK:
         hint = "mm" if size > _LARGEST_LINK and unit in {"m", _STATED} else "m"
         raise BadInput(
-            f'{name}: the part is {size:.4g} m across with unit = "{unit}"; '
-            f'is the file in "{hint}"?'
+            f'{name}: the size of the part is {size:.4g} m with unit = "{unit}"; is '
+            f'the unit of the file "{hint}"?'
         )
 
 
@@ -266,14 +268,15 @@ def _check_closed(points: NDArray, triangles: NDArray, name: str) -> None:
     if (count == 1).any():
         where = points[edges[count == 1][0]].mean(axis=0)
         raise BadInput(
-            f"{name}: the surface is open: {(count == 1).sum()} edges have a triangle "
-            f"on one side only, first near {_place(where)}; close it before meshing"
+            f"{name}: the surface is open: {(count == 1).sum()} edges belong to only "
+            f"one triangle, the first near {_place(where)}; close the surface before "
+            "meshing"
         )
     if (count > 2).any():
         where = points[edges[count > 2][0]].mean(axis=0)
         raise BadInput(
             f"{name}: {(count > 2).sum()} edges are shared by more than two triangles, "
-            f"first near {_place(where)}; a solid's surface has two at each"
+            f"the first near {_place(where)}; expected two triangles at each edge"
         )
 
 
@@ -304,8 +307,7 @@ def _orient(
         if cavity and not _encloses(points, shells[main], part):
             raise BadInput(
                 f"{name}: found {len(shells)} separate bodies, the second near "
-                f"{_place(points[part].reshape(-1, 3).mean(axis=0))}; expected "
-                "one body for one link"
+                f"{_place(points[part].reshape(-1, 3).mean(axis=0))}; expected one body"
             )
         if (volumes[k] < 0) != cavity:
             shells[k] = part[:, ::-1]

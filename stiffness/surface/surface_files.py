@@ -65,7 +65,7 @@ def read_triangles(
     points, faces, solids = read["points"], read["faces"], None
     if faces.ndim != 2 or faces.shape[1] != 3 or len(faces) == 0:
         kind = path.suffix[1:].upper()
-        raise BadInput(f"{path}: contains no triangles, or is not {kind}")
+        raise BadInput(f"{path}: the file contains no triangles, or is not {kind}")
     faces = faces.astype(np.int64)
     if len(read.get("names", ())) > 1:
         names, overlaps = (
@@ -137,7 +137,7 @@ def _in_own_process(wanted: str, path: Path, solid: str = "") -> dict[str, NDArr
             )
         except subprocess.TimeoutExpired:
             raise BadInput(
-                f"{path}: not read after {_TIME_LIMIT:g} s as {kind}"
+                f"{path}: the file was not read as {kind} within {_TIME_LIMIT:g} s"
             ) from None
         try:
             with np.load(io.BytesIO(made.read_bytes()), allow_pickle=False) as stored:

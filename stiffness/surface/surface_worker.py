@@ -163,7 +163,7 @@ def _msh(path: Path) -> tuple[NDArray, NDArray]:
         b for b in mesh.cells if b.dim == 3
     ]
     if not blocks:
-        raise BadInput(f"{path}: contains neither triangles nor tetrahedra")
+        raise BadInput(f"{path}: the file contains neither triangles nor tetrahedra")
     cells = [(b.type, b.data) for b in blocks]
     return _boundary(path, pyvista.from_meshio(meshio.Mesh(mesh.points, cells)))
 

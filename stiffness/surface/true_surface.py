@@ -76,8 +76,7 @@ class TrueSurface:
         return away
 
     def _volumes_between(self) -> NDArray:
-        """Compute the volume between the facets and the shape of each patch, (p,)
-        [m^3]."""
+        """Compute the volume between facets and shape of each patch, (p,) [m^3]."""
         surface, patches = self._surface, self._patches
         areas = surface.normals()
         volumes = np.zeros(len(patches.shapes))

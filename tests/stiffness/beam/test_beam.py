@@ -1,4 +1,4 @@
-"""Compliance and stiffness of beams against tables, textbooks and hand calculation."""
+"""Tests of the compliance and the stiffness of beams."""
 
 import math
 import re
@@ -15,8 +15,8 @@ from forcefit.stiffness.screws import rotation_matrix, screw_map
 E, NU = 60e9, 0.3
 SECTION = Section(1.2e-3, 4e-8, 9e-8, 7e-8, 0.8, 0.6)
 
-# Reference table for the paper's link: L = 0.452 m, r = 0.04 m, E = 60 GPa, nu = 0.3;
-# diagonal RX RY RZ TX TY TZ and the coupling K[1, 5].
+# Stiffness of the IRSBot-2 link with L = 0.452 m, r = 0.04 m, E = 60 GPa, nu = 0.3:
+# diagonal RX RY RZ TX TY TZ and the entry K[1, 5].
 PAPER = {
     "euler": (
         [205304.89771587483, 1067585.4681225496, 1067585.4681225496]
@@ -32,12 +32,12 @@ PAPER = {
 
 
 def assert_same(matrix, expected, tol):
-    """Compare entries scaled by sqrt(ii jj), so that rad and m have equal weight."""
+    """Compare two matrices whose entries are divided by sqrt(K_ii K_jj)."""
     np.testing.assert_allclose(scaled(matrix - expected, expected), 0, atol=tol)
 
 
 @pytest.mark.parametrize("theory", PAPER)
-def test_stiffness_of_the_papers_link_equals_its_published_table(theory):
+def test_stiffness_of_the_irsbot2_link_equals_reference_values(theory):
     diagonal, coupling = PAPER[theory]
     expected = np.diag(diagonal)
     expected[1, 5] = expected[5, 1] = coupling
@@ -49,26 +49,27 @@ def test_stiffness_of_the_papers_link_equals_its_published_table(theory):
 
 @pytest.mark.parametrize("cut", [0.1, 0.5, 0.9])
 def test_two_beams_in_series_have_the_compliance_of_one_beam(cut, rng):
-    """C = A C1 A^T + C2 is exact, so results agree to machine precision."""
+    """The sum C = A C1 A^T + C2 is exact, so results agree to machine precision."""
     axis, up = rng.normal(size=3), rng.normal(size=3)
     axis /= np.linalg.norm(axis)
 
     def beam(length):
         return beam_compliance(length, SECTION, E, NU, axis=axis, up=up)
 
-    # the near piece's tip is (1 - cut) * 0.7 behind the whole tip
+    # the distance between the tips of the first segment and of the whole beam is (1 -
+    # cut) * 0.7
     A = screw_map(-(1 - cut) * 0.7 * axis)
     assert_same(A @ beam(cut * 0.7) @ A.T + beam((1 - cut) * 0.7), beam(0.7), 1e-13)
 
 
 def test_compliance_entries_equal_textbook_values():
-    """Gere: F L^3/3EI + F L/GA', F L^2/2EI, M L/EI, T L/GJ, F L/EA."""
+    """Formulas of Gere: F L^3/3EI + F L/GA', F L^2/2EI, M L/EI, T L/GJ, F L/EA."""
     L, G = 0.5, E / (2 * (1 + NU))
     C = beam_compliance(L, SECTION, E, NU)
     s = SECTION
     assert C[0, 0] == pytest.approx(L / (G * s.J), rel=1e-14)
     assert C[3, 3] == pytest.approx(L / (E * s.area), rel=1e-14)
-    # the default up is y, so the section's z (fz bends about its y) is the beam's y
+    # the default of up is y, so the section's z axis is the y axis of the result
     about_z = L**3 / (3 * E * s.I_y) + L / (G * s.area * s.shear_z)
     about_y = L**3 / (3 * E * s.I_z) + L / (G * s.area * s.shear_y)
     assert C[4, 4] == pytest.approx(about_z, rel=1e-14)
@@ -86,7 +87,7 @@ def test_rotating_the_beam_rotates_its_compliance(rng):
 
 
 def test_section_height_is_along_the_up_direction():
-    """A plate on edge is stiff under a force along its height."""
+    """A plate is stiffer under a force along its larger side."""
     plate = rectangular_section(width=0.01, height=0.1, nu=NU)
     C = beam_compliance(1.0, plate, E, NU, axis=[1, 0, 0], up=[0, 0, 1], theory="euler")
     assert C[5, 5] == pytest.approx(1 / (3 * E * 0.01 * 0.1**3 / 12), rel=1e-13)
@@ -101,7 +102,7 @@ def test_round_section_constants_equal_hand_calculation():
     assert bar.shear_y == pytest.approx(6 * 1.25 / (7 + 1.5))
     assert tube.area == pytest.approx(3 * math.pi)
     assert tube.I_z == pytest.approx(math.pi / 4 * 15)
-    # m = 1/2: 6 * 1.25 * 1.5625 / (8.5 * 1.5625 + 23 * 0.25)
+    # Cowper's formula for m = 1/2: 6 * 1.25 * 1.5625 / (8.5 * 1.5625 + 23 * 0.25)
     assert tube.shear_z == pytest.approx(11.71875 / 19.03125)
 
 
@@ -156,7 +157,7 @@ PARALLEL[[0, 1], [1, 0]] = np.nextafter(1.0, 0.0)
     (np.eye(6) + np.eye(6, k=1), "not symmetric: [0, 1] = 1.000000e+00 but"),
     (-np.eye(6), "not positive definite"),
     (np.ones((6, 6)), "not positive definite"),
-    # least eigenvalue 1.1e-16: rounding alone keeps it above zero
+    # the smallest eigenvalue is 1.1e-16, which is round-off
     (1e-9 * PARALLEL, "not positive definite"),
     (np.full((6, 6), math.nan), "expected (6, 6) of finite numbers"),
 ])  # fmt: skip
@@ -174,8 +175,10 @@ def test_invalid_compliance_is_rejected(C, message):
         ({"width": 0.03, "height": 0.05}, 0.03 * 0.05**3 / 12),
     ],
 )
-def test_section_given_by_its_lengths_bends_as_in_the_textbook(section, moment):
-    """L^3 / (3 E I) along y, which is up by default."""
+def test_bending_of_a_section_given_by_dimensions_equals_textbook_value(
+    section, moment
+):
+    """The deflection is F L^3 / (3 E I) along y, which is the default of ``up``."""
     C = beam_compliance(0.5, section, E=7e10, nu=0.33, theory="euler")
     assert C[4, 4] == pytest.approx(0.5**3 / (3 * 7e10 * moment), rel=1e-12)
 

@@ -1,4 +1,4 @@
-"""Peak stress of beams against textbooks, a membrane solution and symmetries."""
+"""Tests of the peak stress of beams."""
 
 import numpy as np
 import pytest
@@ -21,7 +21,7 @@ def constants(section):
 
 
 @pytest.mark.parametrize("section", SECTIONS)
-def test_stress_of_a_beam_in_tension_is_force_over_area(section):
+def test_tensile_stress_equals_force_over_area(section):
     stress, _ = peak_beam_stress(section, 0.4, [0, 0, 0, -500.0, 0, 0])
     assert stress == pytest.approx(500 / constants(section).area, rel=1e-14)
 
@@ -36,10 +36,10 @@ def test_stress_of_a_beam_in_tension_is_force_over_area(section):
         (0.04 * 0.06**3 - 0.032 * 0.052**3) / (6 * 0.06),
     ),
 ])  # fmt: skip
-def test_stress_of_a_bent_beam_is_moment_over_section_modulus(
+def test_bending_stress_equals_moment_over_section_modulus(
     section, modulus_y, modulus_z
 ):
-    """Section moduli from handbooks; in a long beam, shear adds less than 3e-4."""
+    """In a long beam, shear increases the stress by a factor of less than 1 + 3e-4."""
     for moment, modulus in ([7.0, 0.0], modulus_y), ([0.0, 7.0], modulus_z):
         stress, _ = peak_beam_stress(section, 0.0, [0, *moment, 0, 0, 0])
         assert stress == pytest.approx(7 / modulus, rel=1e-12)
@@ -56,7 +56,7 @@ def test_stress_of_a_bent_beam_is_moment_over_section_modulus(
     (PLATE, 1.5),  # 3 V / 2 A
 ])  # fmt: skip
 def test_peak_stress_under_shear_alone_equals_textbook_values(section, shape):
-    """Along both section axes, at the neutral fibre; to 2.5e-4 for a thin tube."""
+    """The tolerance of 2.5e-4 is the error of the formula for a thin tube."""
     thin = 3e-4 if shape == 2.0 else 1e-12
     for axis in (4, 5):
         wrench = np.zeros(6)
@@ -67,8 +67,9 @@ def test_peak_stress_under_shear_alone_equals_textbook_values(section, shape):
         assert where[axis - 3] == pytest.approx(0, abs=1e-12)
 
 
-def test_shear_stress_of_a_box_equals_the_web_formula():
-    """Gere's formula: V (b h^2 - b1 h1^2) / 8 I t over both webs, t = 2 walls."""
+def test_shear_stress_of_a_box_equals_textbook_formula():
+    """Gere's formula is V (b h^2 - b1 h1^2) / 8 I t, where t is twice the wall
+    thickness."""
     b, h, b1, h1 = 0.06, 0.04, 0.052, 0.032
     second = (b * h**3 - b1 * h1**3) / 12
     expected = np.sqrt(3) * (b * h**2 - b1 * h1**2) / (8 * second * 0.008)
@@ -78,7 +79,7 @@ def test_shear_stress_of_a_box_equals_the_web_formula():
 
 
 @pytest.mark.parametrize("section", [BAR, TUBE])
-def test_peak_stress_of_a_twisted_round_beam_equals_torque_times_radius_over_j(section):
+def test_torsional_stress_of_a_round_beam_equals_textbook_formula(section):
     second = np.pi / 2 * (0.04**4 - section.get("inner_radius", 0) ** 4)
     stress, _ = peak_beam_stress(section, 0.3, [-3.0, 0, 0, 0, 0, 0])
     assert stress == pytest.approx(np.sqrt(3) * 3 * 0.04 / second, rel=1e-12)
@@ -88,8 +89,9 @@ def test_peak_stress_of_a_twisted_round_beam_equals_torque_times_radius_over_j(s
     ("ratio", "k"),
     [(1.0, 0.208), (1.5, 0.231), (2.0, 0.246), (3.0, 0.267), (5.0, 0.291), (10, 0.312)],
 )
-def test_peak_stress_of_a_twisted_rectangle_equals_timoshenkos_table(ratio, k):
-    """T / (k b a^2) at the middle of the long side; the table has three digits."""
+def test_torsional_stress_of_a_rectangle_equals_textbook_values(ratio, k):
+    """The stress in the middle of the long side is T / (k b a^2). Tabulated values of k
+    have three digits."""
     for sides in ((0.02, 0.02 * ratio), (0.02 * ratio, 0.02)):
         section = dict(zip(("width", "height"), sides, strict=True))
         stress, where = peak_beam_stress(section, 0.3, [1.0, 0, 0, 0, 0, 0])
@@ -100,9 +102,8 @@ def test_peak_stress_of_a_twisted_rectangle_equals_timoshenkos_table(ratio, k):
 
 @pytest.mark.parametrize("section", [PLATE, {"width": 0.05, "height": 0.02}])
 def test_stresses_of_a_rectangle_integrate_to_the_forces(section):
-    """Integrals over the section by Simpson's rule. The tolerance for torsion is 5e-4,
-    because its stress has a kink at the short sides. Outer faces have no shear normal
-    to them.
+    """The stresses are integrated by Simpson's rule. The tolerance for torsion is 5e-4,
+    because the shear stress is not smooth at the short sides.
     """
     fibres, influence = section_stress(section)
     y, z = fibres.reshape(33, 33, 2).transpose(2, 0, 1)
@@ -121,7 +122,7 @@ def test_stresses_of_a_rectangle_integrate_to_the_forces(section):
         total = (stress * cell).sum(axis=(1, 2))
         np.testing.assert_allclose(total, forces, atol=5e-4)
     most = np.abs(tau_z[0]).max()
-    # the series ends at 1 / n^2 on the short sides
+    # the truncated terms of the series are largest on the short sides
     np.testing.assert_allclose(
         tau_y[0][np.abs(y) == np.abs(y).max()], 0, atol=5e-3 * most
     )
@@ -131,8 +132,9 @@ def test_stresses_of_a_rectangle_integrate_to_the_forces(section):
 
 
 def membrane(section, cells):
-    """Torsion constant [m^4] and shear [1/m^3] at the middles of the right and upper
-    side of a hollow rectangle: Prandtl's membrane by finite volumes, the hole a plate.
+    """Return the torsion constant [m^4] of a hollow rectangle, and the shear stresses
+    in the middle of the right and the upper side for unit torque [1/m^3]. Prandtl's
+    membrane analogy is solved by finite volumes.
     """
     size = section["wall"] / cells
     count = [round(section[k] / size) for k in ("width", "height")]
@@ -161,7 +163,8 @@ def membrane(section, cells):
     ))
     phi = spsolve(matrix.tocsc(), np.full(hole.size, 2 * size**2)).reshape(count)
     J = 2 * phi.sum() * size**2
-    # the parabola through the wall's face and two cells: (9 f1 - f2) / 3 size
+    # slope at the face of a parabola through zero at the face and two cells: (9 f1 -
+    # f2) / 3 size
     middle = [n // 2 for n in count]
     right = (9 * phi[-1, middle[1]] - phi[-2, middle[1]]) / (3 * size)
     upper = (9 * phi[middle[0], -1] - phi[middle[0], -2]) / (3 * size)
@@ -170,8 +173,8 @@ def membrane(section, cells):
 
 @pytest.mark.parametrize("wall", [0.004, 0.002])
 def test_torsion_of_a_box_agrees_with_the_membrane_analogy(wall):
-    """Walls 1/10 and 1/20 of the shorter side.  Bredt's theory with the wall's own
-    twist neglects the corners, 2 to 4 % of J; its stress is accurate to 4 and 2 %."""
+    """Bredt's theory neglects the corners, which contribute 2 to 4 % of the torsion
+    constant."""
     section = BOX | {"wall": wall}
     J, right, upper = membrane(section, 8)
     stress, _ = peak_beam_stress(section, 0.2, [1.0, 0, 0, 0, 0, 0])
@@ -181,15 +184,15 @@ def test_torsion_of_a_box_agrees_with_the_membrane_analogy(wall):
 
 
 def test_peak_stress_of_a_crank_combines_bending_and_torsion():
-    """Gere, combined loads: sigma = 32 M / pi d^3, tau = 16 T / pi d^3 at the base."""
+    """At the base, sigma is 32 M / pi d^3 and tau is 16 T / pi d^3 (Gere)."""
     stress, where = peak_beam_stress({"radius": 0.02}, 0.3, [30.0, 0, 0, 0, 0, 400.0])
     sigma, tau = 32 * 120 / (np.pi * 0.04**3), 16 * 30 / (np.pi * 0.04**3)
     assert stress == pytest.approx(np.sqrt(sigma**2 + 3 * tau**2), rel=1e-3)
     assert where == pytest.approx([0, 0, 0.02], abs=2e-3)
 
 
-def test_peak_stress_is_at_the_tip_when_a_force_cancels_the_base_moment():
-    """The moment of the tip force cancels my at the base, where only shear remains."""
+def test_peak_stress_is_at_the_tip_if_the_base_moment_is_zero():
+    """The moment of the tip force and the tip moment cancel at the base."""
     stress, where = peak_beam_stress(BAR, 0.5, [0, 50.0, 0, 0, 0, 100.0])
     assert where[0] == 0.5
     assert stress == pytest.approx(50 / (np.pi * 0.04**3 / 4), rel=1e-3)
@@ -212,7 +215,7 @@ def test_invalid_stress_input_is_rejected(section, length, wrench, message):
         peak_beam_stress(section, length, wrench)
 
 
-# [N] weight along -z; wrench at the tip; largest moment; its place from the base
+# [N] weight along -z
 W, LENGTH = 30.0, 0.8
 SUPPORTS = {
     "free": ([0.0] * 6, W * LENGTH / 2, 0.0),
@@ -226,20 +229,20 @@ SUPPORTS = {
 
 @pytest.mark.parametrize("name", SUPPORTS)
 def test_peak_stress_of_a_heavy_beam_equals_textbook_values(name):
-    """Timoshenko, Strength of Materials I:
-    largest moments q L^2 / 2, / 8, / 8 and / 12."""
+    """The largest moments are q L^2 divided by 2, 8, 8 and 12 (Timoshenko, Strength of
+    Materials I)."""
     wrench, moment, place = SUPPORTS[name]
     stress, where = peak_beam_stress(PLATE, LENGTH, wrench, [0, 0, -W])
     sigma = 6 * moment / (0.02 * 0.05**2)
-    # shear adds up to (0.02 / 0.8)^2 between the ends, nothing at the outer fibres
+    # shear stresses are zero at the outer fibres, where the bending stress is largest
     assert stress == pytest.approx(sigma, rel=1e-12)
     if place is not None:
         assert where[0] == pytest.approx(place, abs=1e-12)
 
 
 @pytest.mark.parametrize("section", SECTIONS)
-def test_peak_stress_of_a_heavy_beam_equals_the_largest_of_its_two_parts(section, rng):
-    """At any cut, the wrench of the outer part loads the tip of the inner part."""
+def test_peak_stress_of_a_heavy_beam_is_that_of_one_of_its_parts(section, rng):
+    """The outer part exerts a wrench on the tip of the inner part."""
     for _ in range(20):
         wrench, weight = rng.normal(size=6) * [1, 1, 1, 20, 20, 20], rng.normal(size=3)
         weight *= 30
@@ -252,7 +255,7 @@ def test_peak_stress_of_a_heavy_beam_equals_the_largest_of_its_two_parts(section
         outer, _ = peak_beam_stress(section, LENGTH - cut, wrench, share * weight)
         inner, _ = peak_beam_stress(section, cut, at_cut, (1 - share) * weight)
         whole, _ = peak_beam_stress(section, LENGTH, wrench, weight)
-        # sections in between: a parabola loses 1e-3 at most
+        # the evaluated sections limit the error to 1e-3
         assert whole == pytest.approx(max(outer, inner), rel=1e-3)
 
 
@@ -262,10 +265,8 @@ def test_peak_stress_of_a_heavy_beam_equals_the_largest_of_its_two_parts(section
     {"width": 0.05, "height": 0.03, "wall": 0.002},
 ])  # fmt: skip
 @pytest.mark.parametrize("length", [0.0, 0.02, 1.0])
-def test_quarter_turn_of_section_and_wrench_rotates_the_position_of_the_peak(
-    section, length
-):
-    """y becomes z, and z becomes -y; also for short beams, with shear and torsion."""
+def test_rotating_section_and_wrench_rotates_the_peak_position(section, length):
+    """Axes y and z become z and -y. The beams are short, so that shear matters."""
     rng = np.random.default_rng(9)
     turned = section | {"width": section["height"], "height": section["width"]}
     quarter = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
@@ -274,7 +275,7 @@ def test_quarter_turn_of_section_and_wrench_rotates_the_position_of_the_peak(
     moved = wrenches @ np.kron(np.eye(2), quarter).T
     same, there = peak_beam_stress(turned, length, moved)
     np.testing.assert_allclose(same, stress, rtol=1e-9)
-    # two fibres may have equal stresses; then either of them may be returned
+    # if two fibres have equal stresses, either of them can be the peak
     alike = np.linalg.norm(there - where @ quarter.T, axis=1) < 1e-9
     assert alike.mean() > 0.9
     sides = {tuple(np.sign(np.round(place[1:], 9))) for place in where}

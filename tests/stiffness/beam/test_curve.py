@@ -1,4 +1,4 @@
-"""Curved and tapered beams and thin-walled sections against closed forms."""
+"""Tests of curved and tapered beams."""
 
 import math
 
@@ -38,7 +38,7 @@ def assert_same(matrix, expected, tol):
     np.testing.assert_allclose(scaled(matrix - expected, expected), 0, atol=tol)
 
 
-def test_compliance_of_a_straight_piece_equals_that_of_a_beam(rng):
+def test_compliance_of_a_straight_segment_equals_that_of_a_beam(rng):
     axis, up = rng.normal(size=3), rng.normal(size=3)
     C = curve_compliance([straight_piece([0, 0, 0], axis, CROOKED, up)], E, NU)
     length = np.linalg.norm(axis)
@@ -58,7 +58,7 @@ def test_compliance_of_an_l_shape_equals_that_of_two_beams_in_series():
 
 
 def test_compliance_of_a_quarter_circle_equals_castiglianos_solution():
-    """Clamped at (R, 0), loaded at (0, R), in the plane and normal to it.
+    """The arc is clamped at (R, 0) and loaded at (0, R). The compliances are
 
     x: (3 pi/4 - 2) R^3/EI + pi R/4EA;  y: pi R^3/4EI + pi R/4EA;
     z: pi R^3/4EI + (3 pi/4 - 2) R^3/GJ.
@@ -73,8 +73,8 @@ def test_compliance_of_a_quarter_circle_equals_castiglianos_solution():
 
 
 def test_compliance_of_a_cone_equals_closed_forms():
-    """Axial L / (E pi r0 r1);
-    torsion 2 L (r0^2 + r0 r1 + r1^2) / (3 pi G r0^3 r1^3)."""
+    """The axial compliance is L / (E pi r0 r1), and the torsional compliance is 2 L
+    (r0^2 + r0 r1 + r1^2) / (3 pi G r0^3 r1^3)."""
     L, r0, r1 = 0.35, 0.045, 0.025
     cone = straight_piece(
         [0, 0, 0], [0, 0, L], lambda t: round_section(r0 + (r1 - r0) * t, NU)
@@ -92,24 +92,24 @@ def test_compliance_of_a_cone_equals_closed_forms():
 
 
 def line(start=0.0, section=BAR):
-    """A straight piece of 1 m along x."""
+    """Return a straight segment of 1 m along x."""
     return straight_piece([start, 0, 0], [start + 1, 0, 0], section)
 
 
 def stepped(t):
-    """A section that changes abruptly at a third of the length."""
+    """Return a section that changes abruptly at a third of the length."""
     return BAR if t < 1 / 3 else CROOKED
 
 
 @pytest.mark.parametrize(("call", "message"), [
     (lambda: curve_compliance([], E, NU), "no pieces"),
-    (lambda: curve_compliance([line(), line(1.1)], E, NU), "begins 0.1 m away"),
+    (lambda: curve_compliance([line(), line(1.1)], E, NU), "starts 0.1 m from the"),
     (lambda: straight_piece([0, 0, 0], [0, 0, 0], BAR), "is zero"),
     (lambda: arc_piece([1, 0, 0], [0, 0, 0], [1, 0, 0], BAR), "not normal to the"),
     (lambda: curve_compliance([line()], E, NU, theory="eulr"), '"euler"?'),
     (
         lambda: curve_compliance([line(section=stepped)], E, NU),
-        "split pieces where the section changes abruptly",
+        "divide the pieces at points where the section changes abruptly",
     ),
     (lambda: box_section(0.1, 0.1, 0.05, NU), "expected less than half"),
     (lambda: i_section(0.1, 0.1, 0.2, 0.01, NU), "expected web < width"),
@@ -122,9 +122,9 @@ def test_invalid_curve_or_section_is_rejected(call, message):
 
 
 def measured_section(solid, center=(0, 0), lengths=(0.15, 0.25)):
-    """Torsion constant and shear area from the difference of finite element results at
-    two lengths. The effect of the distributing ends is equal for both lengths and
-    cancels.
+    """Return the torsion constant and the shear area of a bar by finite elements. They
+    follow from the difference of the compliances at two lengths, in which the end
+    effects cancel.
     """
     C = []
     for length in lengths:
@@ -139,11 +139,10 @@ def measured_section(solid, center=(0, 0), lengths=(0.15, 0.25)):
     return step / (G * grown[2]), step / (G * (grown[4] - bending))
 
 
-def test_shear_energy_of_a_round_bar_agrees_with_hutchinsons_factor():
-    """Hutchinson (2001): 6 (1 + nu)^2 / (7 + 12 nu + 4 nu^2) = 0.9252 at nu = 0.3.
+def test_shear_factor_of_a_round_bar_agrees_with_hutchinson():
+    """Hutchinson's factor (2001) is 6 (1 + nu)^2 / (7 + 12 nu + 4 nu^2).
 
-    Cowper's 0.8864, which the public format prescribes for beams, is 4 % lower: a known
-    difference between theories, which amounts to 0.2 % for the paper's link.
+    It is 0.9252 at nu = 0.3, and Cowper's factor is 0.8864.
     """
     J, shear_area = measured_section(lambda L: bar_solid(2, round(40 * L), 0.04, L))
     factor = 6 * (1 + NU) ** 2 / (7 + 12 * NU + 4 * NU**2)
@@ -154,7 +153,7 @@ def test_shear_energy_of_a_round_bar_agrees_with_hutchinsons_factor():
 
 
 def test_torsion_constant_of_a_square_agrees_with_finite_elements():
-    """The series of Saint-Venant and elements of a quarter of the width."""
+    """The size of the elements is a quarter of the width."""
     J, _ = measured_section(
         lambda L: box_solid((4, 4, round(40 * L)), (0.04, 0.04, L)), (0.02, 0.02)
     )
@@ -162,7 +161,7 @@ def test_torsion_constant_of_a_square_agrees_with_finite_elements():
 
 
 def test_torsion_constant_of_a_thin_box_agrees_with_finite_elements():
-    """Bredt's formula neglects the corners: 3.5 % of J at wall / width = 1 / 12."""
+    """Bredt's formula neglects the corners, which contribute 3.5 % of J here."""
     wall = 0.06 / 12
 
     def solid(length):
@@ -188,10 +187,8 @@ def test_rotation_of_a_curve_rotates_its_compliance(rng):
 
 @pytest.mark.parametrize("away", [(0.0, 0.0, 0.0), (0.7, -0.3, 0.5)])
 @pytest.mark.parametrize("size", [1e-3, 1.0, 1e2])
-def test_cutting_a_curve_in_two_at_any_point_does_not_change_compliance_and_length(
-    away, size
-):
-    """An arc cut into two arcs and a bar cut into two bars; their lengths add up."""
+def test_dividing_a_curve_does_not_change_compliance_and_length(away, size):
+    """An arc is divided into two arcs, and a bar into two bars."""
     o, turn = np.array(away) * size, np.array([0.0, 0.6, 0.0])
     centre, corner = o + [0, 0, 0.2 * size], o + [-0.3 * size, 0, 0]
     half = arc_piece(o, centre, turn / 2, CROOKED)
@@ -214,7 +211,7 @@ def test_cutting_a_curve_in_two_at_any_point_does_not_change_compliance_and_leng
 
 
 def test_curve_length_of_a_parabola_equals_its_closed_form():
-    """y = x^2 from 0 to 1: sqrt(5) / 2 + asinh(2) / 4; the speed changes with t."""
+    """The length of y = x^2 from 0 to 1 is sqrt(5) / 2 + asinh(2) / 4."""
     parabola = Piece(
         place=lambda t: np.array([t, t**2, 0.0]),
         tangent=lambda t: np.array([1.0, 2 * t, 0.0]),

@@ -1,4 +1,4 @@
-"""Section constants against sums of rectangles, torsion constants against series."""
+"""Tests of the constants of beam sections."""
 
 import math
 
@@ -18,7 +18,8 @@ NU = 0.3
 
 
 def composed(*parts):
-    """Area, I_y, I_z of rectangles: width (y), height (z), centre y and z; Steiner."""
+    """Return area, I_y and I_z of a section that consists of rectangles. A rectangle is
+    given by width, height, and y and z of its centre."""
     area = sum(b * h for b, h, _, _ in parts)
     I_y = sum(b * h**3 / 12 + b * h * z**2 for b, h, _, z in parts)
     I_z = sum(h * b**3 / 12 + b * h * y**2 for b, h, y, _ in parts)
@@ -36,7 +37,7 @@ def test_constants_of_an_i_section_equal_sums_over_web_and_flanges():
     assert section.area == pytest.approx(area, rel=1e-12)
     assert section.I_y == pytest.approx(I_y, rel=1e-12)
     assert section.I_z == pytest.approx(I_z, rel=1e-12)
-    # an open thin wall: a third of length times thickness cubed
+    # an open thin wall has J = length times thickness^3 / 3
     assert section.J == pytest.approx(
         (2 * 0.06 * 0.008**3 + 0.092 * 0.006**3) / 3, rel=1e-12
     )
@@ -51,7 +52,7 @@ def test_constants_of_a_box_section_equal_sums_over_its_four_walls():
     assert box.area == pytest.approx(area, rel=1e-12)
     assert box.I_y == pytest.approx(I_y, rel=1e-12)
     assert box.I_z == pytest.approx(I_z, rel=1e-12)
-    # Bredt: 4 A^2 t / length of the wall's middle line, and the open wall's share
+    # Bredt's formula 4 A^2 t / length, plus the torsion constant of an open wall
     b, h, t = 0.056, 0.096, 0.004
     bredt = 4 * (b * h) ** 2 * t / (2 * (b + h))
     assert box.J == pytest.approx(bredt + 2 * (b + h) * t**3 / 3, rel=1e-12)
@@ -59,7 +60,8 @@ def test_constants_of_a_box_section_equal_sums_over_its_four_walls():
 
 @pytest.mark.parametrize(("width", "height"), [(0.02, 0.02), (0.02, 0.05), (0.1, 0.01)])
 def test_torsion_constant_of_a_rectangle_equals_saint_venants_series(width, height):
-    """16 a b^3 (1/3 - 64 b / (pi^5 a) sum tanh(n pi a / 2 b) / n^5), n odd; halves."""
+    """The series is 16 a b^3 (1/3 - 64 b / (pi^5 a) sum tanh(n pi a / 2 b) / n^5) over
+    odd n, where 2 a and 2 b are the sides."""
     rectangle = declared_section({"width": width, "height": height}, NU)
     a, b = max(width, height) / 2, min(width, height) / 2
     tail = sum(math.tanh(n * math.pi * a / (2 * b)) / n**5 for n in range(1, 2001, 2))
@@ -71,7 +73,7 @@ def test_torsion_constant_of_a_rectangle_equals_saint_venants_series(width, heig
     )
 
 
-def test_section_check_accepts_inner_radius_zero_and_rejects_absurd_sizes():
+def test_section_check_rejects_implausible_sizes():
     check_section("link", {"radius": 1.0, "inner_radius": 0.0})
     for size in (1e-41, 1e41, math.nan):
         with pytest.raises(BadInput, match="expected 0 or a size from"):
@@ -81,33 +83,35 @@ def test_section_check_accepts_inner_radius_zero_and_rejects_absurd_sizes():
 @pytest.mark.parametrize(
     ("nu", "factor"), [(0.0, 5 / 6), (0.3, 130 / 153), (-0.5, 10 / 13)]
 )
-def test_shear_factor_of_a_rectangle_equals_cowpers(nu, factor):
-    """10 (1 + nu) / (12 + 11 nu) for any sides; 5 / 6 at nu = 0."""
+def test_shear_factor_of_a_rectangle_equals_cowpers_formula(nu, factor):
+    """Cowper's factor is 10 (1 + nu) / (12 + 11 nu), and does not depend on the
+    sides."""
     for sides in ((0.1, 0.3), (0.3, 0.1), (1.0, 1.0)):
         section = rectangular_section(*sides, nu)
         assert (section.shear_y, section.shear_z) == pytest.approx((factor, factor))
 
 
 def thin_shear_factor(h, b, web, flange, webs, nu):
-    """Cowper's integral over thin walls: webs along x at y = b / 2, or one at y = 0.
+    """Return the shear factor of thin walls by Cowper's integral.
 
-    2 (1 + nu) I / (nu / 2 (I_y - I) - A / I times the integral of x (chi + x y^2)),
-    chi by the shear flow: its slope along a wall is -2 (1 + nu) I tau - n_x (nu x^2 / 2
-    + (1 - nu / 2) y^2) - n_y (2 + nu) x y; zero at x = 0.
+    The factor is 2 (1 + nu) I / (nu / 2 (I_y - I) - A / I times the integral of x (chi
+    + x y^2)). The function chi is zero at x = 0, and its derivative along a wall is -2
+    (1 + nu) I tau - n_x (nu x^2 / 2 + (1 - nu / 2) y^2) - n_y (2 + nu) x y. Webs are
+    along x: two at y = b / 2 and y = -b / 2, or one at y = 0.
     """
     s, up = Polynomial([0.0, 1.0]), h / 2
     y = b / 2 if webs == 2 else 0.0
     area = webs * web * h + 2 * flange * b
     second = webs * web * h**3 / 12 + 2 * flange * b * up**2
     other = webs * web * h * y**2 + 2 * flange * b**3 / 12
-    # each web takes what half of a flange gathers, or both halves
+    # shear flow that enters each web from one or both halves of a flange
     gathered = up * flange * b / webs
     tau = gathered / web + (up**2 - s**2) / 2
     slope = -2 * (1 + nu) * tau - nu * s**2 / 2 - (1 - nu / 2) * y**2
     chi = slope.integ()
     corner = chi(up)
     total = webs * 2 * web * (s * (chi + s * y**2)).integ()(up)
-    # in the flange from the web on: outward to its end, or inward to the middle
+    # shear stress in the flange as a function of the distance from the web
     tau = up * (b / 2 - s) if webs == 1 else -up * s
     chi = (-2 * (1 + nu) * tau - (2 + nu) * up * s).integ()
     chi = chi + (corner - chi(y))
@@ -118,8 +122,7 @@ def thin_shear_factor(h, b, web, flange, webs, nu):
 @pytest.mark.parametrize("nu", [0.0, 0.3, -0.4])
 @pytest.mark.parametrize(("b", "h"), [(0.06, 0.1), (0.2, 0.05), (0.1, 0.1)])
 def test_shear_factors_of_thin_sections_equal_cowpers_integral(b, h, nu):
-    """A box in both directions;
-    an I along its web, and across it from its two flanges, which are rectangles."""
+    """For a force normal to its web, an I-section consists of two rectangles."""
     wall, web, flange = 0.002, 0.003, 0.005
     box = box_section(b + wall, h + wall, wall, nu)
     across, along = (

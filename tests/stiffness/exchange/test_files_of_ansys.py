@@ -1,4 +1,4 @@
-"""Import of Ansys matrices: stored halves, row orders and mapping files."""
+"""Tests of the import of matrices from Ansys."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ HEAD = "%%MatrixMarket matrix coordinate real {}\n%===\n% Creator: ANSYS Inc\n%=
 
 
 def matrix_market(K, symmetry="symmetric"):
-    """``*EXPORT,K,MMF``: the lower half, numbered from 1."""
+    """Return a Matrix Market file as written by ``*EXPORT,K,MMF``."""
     half = tril(K).tocoo()
     entries = zip(half.row + 1, half.col + 1, half.data.tolist(), strict=True)
     lines = [f"{i} {j} {v:.16e}" for i, j, v in entries]
@@ -24,7 +24,7 @@ def matrix_market(K, symmetry="symmetric"):
 
 
 def harwell_boeing(K, kind="RSA", right_side=True):
-    """``HBMAT``: pointers, rows and values, one per line."""
+    """Return a Harwell-Boeing file as written by ``HBMAT``."""
     half = csc_array(tril(K)) if kind == "RSA" else csc_array(K)
     half.sort_indices()
     n, entries = half.shape[0], half.nnz
@@ -43,13 +43,13 @@ def harwell_boeing(K, kind="RSA", right_side=True):
 
 
 def node_vector(numbers):
-    """``*EXPORT`` of the nodes in row order."""
+    """Return the nodes in the order of the rows as written by ``*EXPORT``."""
     head = "%%MatrixMarket matrix array integer general\n% Creator: ANSYS Inc\n"
     return head + "\n".join(map(str, [f"{len(numbers)} 1", *numbers, ""]))
 
 
 def mapping(freedoms):
-    """``HBMAT,..,YES``: row, node, label."""
+    """Return a mapping file as written by ``HBMAT,..,YES``."""
     labels = ("UX", "UY", "UZ", "ROTX", "ROTY", "ROTZ")
     lines = [
         f"{row:12d}{node:12d}   {labels[direction - 1]}"
@@ -60,7 +60,8 @@ def mapping(freedoms):
 
 @pytest.fixture
 def solid(tmp_path):
-    """A folder with a solid in a known format, its matrix, shuffled, and the order."""
+    """Return a folder with the files of a solid, its matrix in random row order, and
+    this order."""
     nodes, K = full_matrix((1, 1, 2))
     write_solid(tmp_path, nodes, K)
     order = np.random.default_rng(2).permutation(len(nodes))
@@ -69,9 +70,9 @@ def solid(tmp_path):
 
 
 @pytest.mark.parametrize("symmetry", ["symmetric", "general"])
-def test_matrix_market_rows_follow_the_vector_of_nodes(solid, symmetry):
-    """Only one half is stored, whatever the header states, and rows are grouped by node
-    in the order of the vector.
+def test_matrix_market_rows_have_the_order_of_the_node_vector(solid, symmetry):
+    """The file contains only one triangle of the matrix, although its header declares a
+    general matrix.
     """
     folder, K, order = solid
     expected = import_link(folder / "k.mtx", nodes=folder / "nodes.csv", **ENDS)
@@ -82,7 +83,7 @@ def test_matrix_market_rows_follow_the_vector_of_nodes(solid, symmetry):
 
 
 @pytest.mark.parametrize("kind", ["RSA", "RUA"])
-def test_harwell_boeing_rows_follow_the_mapping_file(solid, kind):
+def test_harwell_boeing_rows_have_the_order_of_the_mapping_file(solid, kind):
     folder, K, order = solid
     expected = import_link(folder / "k.mtx", nodes=folder / "nodes.csv", **ENDS)
     freedoms = [(node + 1, d) for node in order.tolist() for d in (1, 2, 3)]
@@ -100,7 +101,7 @@ def test_harwell_boeing_rows_follow_the_mapping_file(solid, kind):
     assert link.mass == pytest.approx(0.324)
 
 
-def test_node_table_with_decimal_commas_is_read_and_a_second_unit_is_rejected(solid):
+def test_node_file_with_decimal_commas_is_read(solid):
     folder, K, order = solid
     expected = import_link(folder / "k.mtx", nodes=folder / "nodes.csv", **ENDS)
     places = [line.split(",") for line in (folder / "nodes.csv").read_text().split()]
@@ -111,12 +112,14 @@ def test_node_table_with_decimal_commas_is_read_and_a_second_unit_is_rejected(so
     (folder / "full.mapping").write_text(node_vector((order + 1).tolist()))
     link = import_link(folder / "full.mtx", nodes=folder / "nodes.txt", **ENDS)
     assert_same(link.stiffness, expected.stiffness)
-    with pytest.raises(BadInput, match="found lengths in m, but a different --unit"):
+    with pytest.raises(
+        BadInput, match="lengths in the file are in m, but --unit is different"
+    ):
         import_link(folder / "full.mtx", nodes=folder / "nodes.txt", unit="mm", **ENDS)
 
 
 def test_mapping_of_six_degrees_of_freedom_per_node_is_read(tmp_path):
-    """A superelement of two nodes, with the second node first."""
+    """The matrix has two nodes, and the rows of the second node come first."""
     B = np.random.default_rng(0).normal(size=(12, 12))
     K = B @ B.T
     rows = np.r_[6:12, 0:6]
@@ -131,13 +134,13 @@ def test_mapping_of_six_degrees_of_freedom_per_node_is_read(tmp_path):
 
 @pytest.mark.parametrize(("text", "message"), [
     (node_vector([1, 1, 2]), "found 2 different nodes, expected one column with 3"),
-    (node_vector([1, 2, 3, 4, 5]), "expected those of a matrix with 12 rows"),
+    (node_vector([1, 2, 3, 4, 5]), "but the matrix has 12 rows"),
     ("1 1 UX\n2 1 UQ\n", "found the label 'UQ'"),
     ("1 1 UX\n3 1 UY\n", "expected rows numbered from 1"),
-    ("1 1\n", "expected the number of a row, the number of a node and a label"),
+    ("1 1\n", "expected a row number, a node number and a label"),
     ("Matrix Eqn\n", "expected rows numbered from 1"),
 ])  # fmt: skip
-def test_wrong_mapping_is_rejected_in_one_line(text, message, tmp_path):
+def test_wrong_mapping_is_rejected(text, message, tmp_path):
     (tmp_path / "k.mtx").write_text(matrix_market(csc_array(np.eye(12))))
     (tmp_path / "k.mapping").write_text(text)
     with pytest.raises(BadInput) as caught:
@@ -167,7 +170,8 @@ def test_wrong_harwell_boeing_file_is_rejected(change, message, tmp_path):
     ("array real symmetric", "3 3\n2\n1\n0\n3\n0\n4\n"),
 ])  # fmt: skip
 def test_matrix_market_file_of_every_kind_is_read(head, numbers, tmp_path):
-    """Arrays are stored by column; of symmetric matrices, the lower half is stored."""
+    """Arrays are stored by columns. The lower triangle of a symmetric matrix is
+    stored."""
     matrix = np.array([[2.0, 1, 0], [1, 3, 0], [0, 0, 4]])
     path = tmp_path / "k.mtx"
     path.write_text(f"%%MatrixMarket matrix {head}\n% a comment\n{numbers}")
@@ -175,20 +179,20 @@ def test_matrix_market_file_of_every_kind_is_read(head, numbers, tmp_path):
 
 
 @pytest.mark.parametrize(("text", "message"), [
-    ("coordinate pattern general\n2 2 1\n1 1\n", "expected a matrix, coordinate"),
+    ("coordinate pattern general\n2 2 1\n1 1\n", "expected a header with matrix"),
     ("coordinate real general\n2 2 3\n1 1 1\n2 2 1\n",
-     "expected row, column and value of each entry"),
-    ("coordinate real general\n2 2 2\n1 1 1\n3 2 1\n", "row or column outside 1 to 2"),
-    ("coordinate real general\n2 2 2\n1 1 1\n2 1.5 1\n", "a row or column outside"),
+     "expected row, column and value for each entry"),
+    ("coordinate real general\n2 2 2\n1 1 1\n3 2 1\n", "row or column number"),
+    ("coordinate real general\n2 2 2\n1 1 1\n2 1.5 1\n", "an invalid row or column"),
     ("coordinate real general\n", "expected a square"),
-    ("coordinate real general\n2 2\n", "expected row, column and value of each entry"),
+    ("coordinate real general\n2 2\n", "expected row, column and value for each entry"),
     ("coordinate real general\n1e9 1e9 0\n", "expected a square"),
     ("array real general\n1000000 1000000\n1\n", "expected 1000000000000"),
     ("array real general\n2 3\n1 1 1 1 1 1\n", "found 2 by 3 numbers"),
     ("array real general\n2 2\n1 1 x 1\n", "expected a number"),
 ])  # fmt: skip
 def test_damaged_matrix_market_file_is_rejected(text, message, tmp_path):
-    """SciPy's reader accepts some of these, or allocates their stated size."""
+    """SciPy's reader accepts some of these files."""
     (tmp_path / "k.mtx").write_text(f"%%MatrixMarket matrix {text}")
     with pytest.raises(BadInput, match=message):
         read_matrix(tmp_path / "k.mtx")

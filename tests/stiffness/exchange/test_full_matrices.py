@@ -1,4 +1,4 @@
-"""Import of a solid's full matrix from several programs, condensed to its two ends."""
+"""Tests of the condensation of imported matrices."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ from tests.stiffness.exchange.test_links_of_others import assert_same, three_col
 
 
 def full_matrix(counts=(2, 2, 5)):
-    """Nodes and sparse matrix of a bar of cubic elements, 0.02 by 0.03 by 0.2 m."""
+    """Return the nodes and the stiffness matrix of a bar, 0.02 by 0.03 by 0.2 m."""
     solid = box_solid(counts, np.array([0.02, 0.03, 0.2]))
     mesh = isoparametric(solid, 3)
     lam, mu = (np.full(len(mesh.cells), c) for c in lame(7e10, 0.33))
@@ -23,7 +23,7 @@ def full_matrix(counts=(2, 2, 5)):
 
 
 def write_solid(folder, nodes, K):
-    """The two files of a solid: its nodes, and its matrix in five columns."""
+    """Write two files: the nodes, and the matrix in five columns."""
     lines = [f"{i},{x!r},{y!r},{z!r}" for i, (x, y, z) in enumerate(nodes.tolist(), 1)]
     (folder / "nodes.csv").write_text("\n".join(lines))
     upper = csr_matrix(np.triu(K.toarray())).tocoo()
@@ -34,7 +34,7 @@ def write_solid(folder, nodes, K):
 
 
 def deck(nodes, order):
-    """An input deck of Abaqus or CalculiX: nodes and other lines."""
+    """Return an input file of Abaqus or CalculiX."""
     lines = [f"{i + 1:7}, {x!r}, {y!r}, {z!r}" for i, (x, y, z) in order(nodes)]
     return "\n".join([
         "*Heading", "** made for a test", "*Part, name=bar", "*Node, nset=all", *lines,
@@ -52,8 +52,8 @@ def backwards(nodes):
 
 
 @pytest.mark.parametrize("order", [in_order, backwards])
-def test_three_column_matrix_takes_its_nodes_from_the_input_deck(order, tmp_path):
-    """Unnamed rows are three per node, in the order of the deck."""
+def test_three_column_matrix_has_the_nodes_of_the_input_file(order, tmp_path):
+    """The file does not name its rows. There are three rows for each node."""
     nodes, K = full_matrix((1, 1, 2))
     write_solid(tmp_path, nodes, K)
     ends = {"base": "z=0", "tip": "z=0.2"}
@@ -67,8 +67,8 @@ def test_three_column_matrix_takes_its_nodes_from_the_input_deck(order, tmp_path
 
 @pytest.mark.slow
 def test_calculix_stiffness_mass_and_dof_files_are_read(tmp_path):
-    """``.sti`` and ``.mas`` contain upper halves by column; ``.dof`` names
-    their rows.
+    """The ``.sti`` and ``.mas`` files contain upper triangles, and the ``.dof`` file
+    names their rows.
     """
     nodes, K = full_matrix((1, 1, 2))
     write_solid(tmp_path, nodes, K)
@@ -98,7 +98,7 @@ def test_calculix_stiffness_mass_and_dof_files_are_read(tmp_path):
 @pytest.mark.slow
 @pytest.mark.exudyn
 def test_condensed_solid_agrees_with_exudyn(tmp_path):
-    """Rigid faces at both ends (RBE2), static modes of Hurty-Craig-Bampton, to 1e-8."""
+    """The reference is the stiffness of the static modes with rigid faces (RBE2)."""
     fem = pytest.importorskip("exudyn.FEM")
     nodes, K = full_matrix()
     write_solid(tmp_path, nodes, K)
@@ -129,7 +129,7 @@ def test_condensed_solid_agrees_with_exudyn(tmp_path):
 
 
 def test_nastran_grids_in_narrow_wide_and_free_fields_are_read(tmp_path):
-    """A wide-field entry occupies two lines; exponents may lack their letter."""
+    """An entry with wide fields occupies two lines. Exponents have no letter."""
     path = tmp_path / "bar.bdf"
     path.write_text(
         "$ a comment\nCEND\nBEGIN BULK\n"
@@ -150,17 +150,14 @@ def test_nastran_grids_in_narrow_wide_and_free_fields_are_read(tmp_path):
 
 
 def test_nastran_grid_in_another_coordinate_system_is_rejected(tmp_path):
-    """The line refers to a coordinate system that it does not define."""
     path = tmp_path / "bar.bdf"
     path.write_text("GRID,9,4,1.,2.,3.\n")
     with pytest.raises(BadInput, match="line 1: found 'GRID,9,4"):
         read_nodes(path, 1.0)
 
 
-def test_stiffness_and_mass_are_selected_among_the_matrices_of_a_punch_file(tmp_path):
-    """Both are square; the file also contains a rectangular matrix whose name begins
-    with M.
-    """
+def test_stiffness_and_mass_are_found_in_a_punch_file(tmp_path):
+    """The file also contains a rectangular matrix whose name begins with M."""
     path = tmp_path / "part.pch"
     path.write_text(
         "DMIG    KAAX           0       6       2       0\n"

@@ -1,4 +1,4 @@
-"""Import of links from other programs: a textbook beam, invalid input, round trips."""
+"""Tests of the import and export of links."""
 
 import json
 
@@ -17,14 +17,14 @@ from forcefit.stiffness.exchange.import_link import import_link
 from forcefit.stiffness.exchange.two_interfaces import both_ends
 from forcefit.stiffness.link import scaled
 
-# a steel bar of 0.5 m along x in mm, N, tonnes
+# steel bar along x in mm, N and tonnes
 E, NU, RADIUS, LENGTH, RHO = 2.1e5, 0.3, 10.0, 500.0, 7.85e-9
 
 
 def textbook_beam(length=LENGTH):
-    """(12, 12) Euler-Bernoulli beam along x, X Y Z RX RY RZ of node 1, then node 2.
-    Przemieniecki (1968), Theory of Matrix Structural Analysis, eq. (5.116), no
-    shear."""
+    """Return the stiffness matrix of an Euler-Bernoulli beam along x, (12, 12). The
+    order is X Y Z RX RY RZ of node 1, then of node 2. Source: Przemieniecki (1968),
+    Theory of Matrix Structural Analysis, eq. (5.116)."""
     A, I = np.pi * RADIUS**2, np.pi * RADIUS**4 / 4
     J, G, L = 2 * I, E / (2 + 2 * NU), length
     K = np.zeros((12, 12))
@@ -39,13 +39,18 @@ def textbook_beam(length=LENGTH):
         [-12, -6 * L, 12, -6 * L], [6 * L, 2 * L**2, -6 * L, 4 * L**2],
     ])  # fmt: skip
     for rows, sign in (([1, 5, 7, 11], 1), ([2, 4, 8, 10], -1)):
-        turn = np.diag([1, sign, 1, sign])  # a turn about y lowers z
+        turn = np.diag([
+            1,
+            sign,
+            1,
+            sign,
+        ])  # a positive rotation about y moves points on the x axis along -z
         K[np.ix_(rows, rows)] += turn @ bend @ turn
     return K
 
 
 def beam_mass():
-    """(12, 12) lumped mass matrix, with half of the beam's mass at each node."""
+    """Return the lumped mass matrix of the beam, (12, 12)."""
     half = RHO * np.pi * RADIUS**2 * LENGTH / 2
     M = np.zeros((12, 12))
     for k in (0, 1, 2, 6, 7, 8):
@@ -54,7 +59,7 @@ def beam_mass():
 
 
 def expected_stiffness():
-    """(6, 6) stiffness of the same beam in SI units, from the library's closed form."""
+    """Return the stiffness of the beam in SI units, (6, 6)."""
     section = round_section(RADIUS * 1e-3, NU)
     C = beam_compliance(LENGTH * 1e-3, section, E * 1e6, NU, theory="euler")
     return np.linalg.inv(C)
@@ -65,7 +70,7 @@ def assert_same(K, expected, tolerance=1e-9):
 
 
 def user_element(K, M=None, head="** 1, 2\n1, 2, 3, 4, 5, 6\n"):
-    """Abaqus text of a symmetric matrix, four numbers per line."""
+    """Return a symmetric matrix as a user element of Abaqus."""
     text = f"**\n*USER ELEMENT, NODES= 2, LINEAR\n** ELEMENT NODES\n{head}"
     for kind, matrix in (("STIFFNESS", K), ("MASS", M)):
         if matrix is not None:
@@ -78,7 +83,7 @@ def user_element(K, M=None, head="** 1, 2\n1, 2, 3, 4, 5, 6\n"):
 
 
 def calculix_element(K):
-    """CalculiX text, in which every degree of freedom is a separate node."""
+    """Return a symmetric matrix as a user element of CalculiX."""
     order = [(1, d) for d in range(1, 7)] + [(2, d) for d in range(1, 7)]
     head = "**" + ",".join(f"{n:10}" for n, _ in order[:10]) + ",\n"
     head += "**" + ",".join(f"{n:10}" for n, _ in order[10:]) + ",\n"
@@ -88,7 +93,8 @@ def calculix_element(K):
 
 
 def five_columns(K):
-    """Node, direction, node, direction, value: the upper half."""
+    """Return the upper triangle as lines of node, direction, node, direction and
+    value."""
     return "".join(
         f"{i // 6 + 1},{i % 6 + 1}, {j // 6 + 1},{j % 6 + 1}, {K[i, j].item()!r}\n"
         for i in range(12) for j in range(i, 12) if K[i, j]
@@ -96,7 +102,7 @@ def five_columns(K):
 
 
 def three_columns(K):
-    """Row, column, value: both halves, a row of the diagonal first."""
+    """Return a matrix as lines of row, column and value."""
     entries = [(i, j) for i in range(len(K)) for j in range(i, len(K)) if K[i, j]]
     both = [pair for i, j in entries for pair in dict.fromkeys([(i, j), (j, i)])]
     return "".join(f"{i + 1} {j + 1}  {K[i, j]:.15e}\n" for i, j in both)
@@ -113,14 +119,13 @@ def three_columns(K):
     ("k.npz", lambda p, K: save_npz(p, csr_matrix(K))),
     ("six.npy", lambda p, K: np.save(p, K[6:, 6:])),
 ])  # fmt: skip
-def test_textbook_beam_from_every_program_has_its_stiffness(name, write, tmp_path):
-    """The file is in millimetres, the link in SI units;
-    the base is 0.5 m behind the tip."""
+def test_imported_beam_has_its_textbook_stiffness(name, write, tmp_path):
+    """The unit of length in the files is 1 mm."""
     path = tmp_path / name
     write(path, textbook_beam())
     link = import_link(path, unit="mm")
     assert_same(link.stiffness, expected_stiffness())
-    if name != "six.npy":  # six rows do not contain the base
+    if name != "six.npy":  # a matrix with six rows does not contain the base
         assert link.base - link.tip == pytest.approx([-0.5, 0, 0], abs=1e-9)
 
 
@@ -129,9 +134,7 @@ def test_textbook_beam_from_every_program_has_its_stiffness(name, write, tmp_pat
 )
 @pytest.mark.parametrize("unit", ["m", "mm"])
 def test_exported_link_is_imported_with_the_same_stiffness(to, unit, tmp_path, rng):
-    """For any stiffness and offset, to ten digits in Nastran's fields and otherwise to
-    machine precision.
-    """
+    """Values have ten digits in Nastran files. Other formats are exact."""
     L = rng.normal(size=(6, 6))
     size = np.array([3, 2, 1, 1e4, 2e4, 3e4])
     K = (L @ L.T + np.eye(6)) * np.outer(size, size)
@@ -153,14 +156,14 @@ def test_exported_matrix_market_file_is_read_by_scipy(tmp_path):
     assert mmread(path, spmatrix=False).toarray() == pytest.approx(expected, rel=1e-15)
 
 
-def test_mass_centre_and_inertia_are_computed_from_a_mass_matrix(tmp_path):
-    """With two lumps at the ends, the centre is in the middle and the inertia about it
+def test_mass_properties_are_computed_from_a_mass_matrix(tmp_path):
+    """Half of the mass is at each end, so the centre is in the middle, and the inertia
     is m L^2 / 4.
     """
     path = tmp_path / "k.mtx"
     path.write_text(user_element(textbook_beam(), beam_mass()))
     link = import_link(path, mass=path, unit="mm")
-    mass = RHO * 1e3 * np.pi * RADIUS**2 * LENGTH  # tonnes to kg
+    mass = RHO * 1e3 * np.pi * RADIUS**2 * LENGTH  # [kg]
     assert link.mass == pytest.approx(mass, rel=1e-12)
     middle = (link.base + link.tip) / 2
     assert link.center_of_mass == pytest.approx(middle, abs=1e-12)
@@ -168,8 +171,8 @@ def test_mass_centre_and_inertia_are_computed_from_a_mass_matrix(tmp_path):
     assert link.inertia == pytest.approx(expected, abs=1e-12 * mass)
 
 
-def test_chain_of_two_half_beams_is_condensed_to_one_beam(tmp_path):
-    """Two half beams in series, whose middle node is free."""
+def test_two_half_beams_are_condensed_to_one_beam(tmp_path):
+    """The middle node is eliminated."""
     K, part = np.zeros((18, 18)), textbook_beam(LENGTH / 2)
     K[:12, :12] += part
     K[6:, 6:] += part
@@ -181,22 +184,20 @@ def test_chain_of_two_half_beams_is_condensed_to_one_beam(tmp_path):
 @pytest.mark.parametrize(("matrix", "options", "message"), [
     (lambda K: K[:, :11], [], "expected a square"),
     (lambda K: K[:11, :11], [], "found 11 rows without names"),
-    (lambda K: K + np.eye(12, k=1) * 1e4, [], "not symmetric: found"),
+    (lambda K: K + np.eye(12, k=1) * 1e4, [], "not symmetric: [1, 2]"),
     (lambda K: K + np.diag([1e3] * 12), [], "the two interfaces do not balance"),
     (lambda K: -K, [], "is not positive definite"),
     (lambda K: K * np.nan, [], "not finite"),
     (lambda K: 1e200 * np.eye(12), [], "not finite, or above 1e100"),
     (lambda K: K, ["--tip", "3"], "node 3 of"),
-    (lambda K: K, ["--tip", "1"], "freedom that base and tip share"),
-    (lambda K: K, ["--tip", "z=1"], "without positions of the nodes; add --nodes"),
+    (lambda K: K, ["--tip", "1"], "have common degrees of freedom"),
+    (lambda K: K, ["--tip", "z=1"], "but no node positions; add --nodes"),
     (lambda K: K, ["--tip", "q"], "--tip: found 'q', expected"),
     (lambda K: K, ["--unit", "ft"], '--unit: found "ft"'),
     (lambda K: K, ["--order", "x"], '--order: found "x"'),
     (lambda K: np.array(["a"]), [], "expected a square matrix of numbers"),
 ])  # fmt: skip
-def test_matrix_that_is_not_the_stiffness_of_a_link_is_rejected_in_one_line(
-    run, matrix, options, message, tmp_path
-):
+def test_invalid_stiffness_matrix_is_rejected(run, matrix, options, message, tmp_path):
     path = tmp_path / "k.npy"
     np.save(path, matrix(textbook_beam()))
     status, out, err = run("stiffness", "convert", path, *options)
@@ -205,29 +206,29 @@ def test_matrix_that_is_not_the_stiffness_of_a_link_is_rejected_in_one_line(
 
 
 @pytest.mark.parametrize(("name", "text", "message"), [
-    ("k.mtx", "%%MatrixMarket matrix nonsense\n", "expected a matrix, coordinate"),
+    ("k.mtx", "%%MatrixMarket matrix nonsense\n", "expected a header with matrix"),
     ("k.mtx", "%%matrixmarket MATRIX coordinate Real general\n2 2 2\n1 1 1\n2 2\n",
-     "found 5 numbers after the line of sizes"),
+     "found 5 numbers, expected row, column"),
     ("k.dmig", "DMIG,K,0,6,2,0\nDMIG,K,101,4,,101,4,1.0\nDMIG,K,202,4,,202,4,1.0\n",
-     "node 1 of {}/k.dmig has the degrees of freedom none, expected a node with 1 to 6 "
-     "(nodes with rotations: 101, 202)"),
+     "node 1 of {}/k.dmig has the degrees of freedom none, expected a node with the "
+     "degrees of freedom 1 to 6 (nodes with rotations: 101, 202)"),
     ("k.mtx", "1 1 1 1\n", "line 1: found 4 words"),
     ("k.mtx", "1 1 1 1 x\n", "expected a number"),
     ("k.mtx", "1 1 1 1 1\n1 1 1\n", "line 2: found 3 words, expected node,"),
     ("k.mtx", "1 1 1\n1 1 1 1 1\n", "line 2: found 5 words, expected row,"),
     ("k.mtx", "1 0 1\n", "line 1: found row 1, column 0, expected 1 to"),
     ("k.mtx", "1 1 1\n", "found 1 rows without names, expected six for each"),
-    ("k.mtx", "", "found no entries"),
-    ("k.mtx", "*USER ELEMENT,NODES=2\n", "found no ** ELEMENT NODES"),
+    ("k.mtx", "", "found no matrix entries"),
+    ("k.mtx", "*USER ELEMENT,NODES=2\n", "expected ** ELEMENT NODES"),
     ("k.mtx", user_element(np.eye(11)), "found 66 numbers, expected 78"),
     ("k.pch", "DMIG    A              0       9       1       0\n", "form '9'"),
     ("k.pch", "DMIG,A,1,1,,1,1,1.0\nDMIG,B,1,1,,1,1,1.0\n", "the matrices A, B"),
     ("k.pch", "DMIG,A,1,x,,1,1,1.0\n", "expected a whole number"),
-    ("k.npy", "not numpy", "not a matrix of NumPy"),
-    ("k.npz", "not numpy", "not a matrix of NumPy"),
+    ("k.npy", "not numpy", "not a NumPy or SciPy matrix"),
+    ("k.npz", "not numpy", "not a NumPy or SciPy matrix"),
     ("k.odb", "", "found the ending .odb, expected one of"),
 ])  # fmt: skip
-def test_wrong_matrix_file_is_rejected_in_one_line(run, name, text, message, tmp_path):
+def test_wrong_matrix_file_is_rejected(run, name, text, message, tmp_path):
     (tmp_path / name).write_text(text)
     status, out, err = run("stiffness", "convert", tmp_path / name)
     assert (status, out) == (2, "")
@@ -236,7 +237,7 @@ def test_wrong_matrix_file_is_rejected_in_one_line(run, name, text, message, tmp
 
 @pytest.fixture
 def rod(run, tmp_path):
-    """The results of a round rod, as the command writes them."""
+    """Write the results of a round rod to a file."""
     path = tmp_path / "rod.json"
     assert run("stiffness", "beam", "--length", 0.5, "--radius", 0.01, "--young", 2e11,
                "--poisson", 0.3, "--json", path)[0] == 0  # fmt: skip
@@ -244,7 +245,7 @@ def rod(run, tmp_path):
 
 
 def test_rod_stiffness_is_preserved_by_export_to_nastran_and_import(run, rod):
-    """The commands' files are used: beam --json, export, import --json."""
+    """The files are written by ``beam --json`` and ``convert``."""
     punch = rod.with_name("rod.pch")
     assert run("stiffness", "convert", rod, "--to", "nastran", "-o", punch)[0] == 0
     status, out, _ = run("stiffness", "convert", punch, "--json", "-")
@@ -253,8 +254,8 @@ def test_rod_stiffness_is_preserved_by_export_to_nastran_and_import(run, rod):
     assert_same(np.array(json.loads(out)["stiffness"]), K, 1e-8)
 
 
-def test_matrix_is_converted_from_one_program_to_another_in_one_step(run, tmp_path):
-    """A free beam is the same body after passing through both files."""
+def test_matrix_is_converted_between_two_programs(run, tmp_path):
+    """The stiffness does not change."""
     first, second = tmp_path / "k.pch", tmp_path / "k.mtx"
     K, offset = expected_stiffness(), np.array([-0.5, 0, 0])
     first.write_bytes(link_file(K, offset, "nastran", "mm"))
@@ -290,7 +291,7 @@ def test_options_not_applicable_to_a_conversion_are_rejected(run, words, message
     ("nastra", "rod.pch", 'did you mean "nastran"?'),
     ("nastran", "rod.mtx", "found a file that is not a matrix for nastran"),
 ])  # fmt: skip
-def test_export_replaces_only_a_matrix_of_the_same_format(run, rod, to, name, message):
+def test_export_overwrites_only_a_file_of_the_same_format(run, rod, to, name, message):
     matrix, words = rod.with_name("rod.mtx"), ["stiffness", "convert", rod, "--to"]
     for more in ([], ["--unit", "mm"]):
         assert run(*words, "matrix-market", *more, "-o", matrix)[0] == 0

@@ -1,4 +1,4 @@
-"""DMIG files in every layout, and selection among the matrices of a file."""
+"""Tests of the import of DMIG matrices from Nastran."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ from tests.stiffness.exchange.test_links_of_others import (
 
 
 def columns(K, first=1):
-    """Return node and direction of each column, with the rows of its lower half."""
+    """Return node and direction of each column, with the rows of the lower triangle."""
     for j in range(len(K)):
         rows = [i for i in range(j, len(K)) if K[i, j]]
         terms = [(i // 6 + first, i % 6 + 1, K[i, j]) for i in rows]
@@ -28,7 +28,7 @@ def columns(K, first=1):
 
 
 def between_commas(K, name):
-    """Free fields, with all terms of a column in one line."""
+    """Return fields separated by commas, with a column in each line."""
     text = f"DMIG,{name},0,6,2,0\n"
     for node, direction, terms in columns(K):
         text += f"DMIG,{name},{node},{direction}," + "".join(
@@ -39,7 +39,7 @@ def between_commas(K, name):
 
 
 def cards_between_commas(K, name):
-    """Free fields, eight per card, continued on lines that begin with a comma."""
+    """Return fields separated by commas, with eight fields in each line."""
     text = f"DMIG,{name},0,6,2,0\n"
     for node, direction, terms in columns(K):
         words = [f"{n},{d},{v:.12E}," for n, d, v in terms]
@@ -50,7 +50,7 @@ def cards_between_commas(K, name):
 
 
 def between_blanks(K, name, first=1):
-    """Free fields separated by blanks, of which none can be empty."""
+    """Return fields separated by blanks."""
     text = f"DMIG {name} 0 6 2 0\n"
     for node, direction, terms in columns(K, first):
         text += f"DMIG {name} {node} {direction}"
@@ -59,7 +59,7 @@ def between_blanks(K, name, first=1):
 
 
 def large_fields(K, name):
-    """Sixteen characters per field, one term per line."""
+    """Return fields of sixteen characters."""
     text = f"DMIG    {name:8}       0       6       2       0\n"
     for node, direction, terms in columns(K):
         text += f"DMIG*   {name:16}{node:16}{direction:16}\n"
@@ -72,8 +72,8 @@ LAYOUTS = [between_commas, cards_between_commas, between_blanks, large_fields]
 
 
 @pytest.mark.parametrize("write", LAYOUTS)
-def test_dmig_of_every_layout_has_the_textbook_stiffness_and_mass(write, tmp_path):
-    """In mm and tonnes; stiffness of the beam's closed forms, and mass rho A L."""
+def test_dmig_in_every_layout_has_textbook_stiffness_and_mass(write, tmp_path):
+    """The units are mm and tonnes. The mass is rho A L."""
     path = tmp_path / "beam.dmig"
     path.write_text(
         write(textbook_beam(), "KAAX")
@@ -107,7 +107,7 @@ DIAGONAL = "DMIG,KAAX,0,6,2,0\n" + "".join(
 
 @pytest.mark.parametrize(("text", "message"), [
     ("DMIG,KAAX,0,6,2,0\nDMIG,KAAX,1,1,,1,1,2.0,,1,2\n",
-     "'1 2' at a line's end, expected node"),
+     "'1 2' at the end of a line, expected"),
     (DIAGONAL + DIAGONAL.replace("7,2,,7,2,1.0", "7,2,,7,2,9.0"),
      r"KAAX: row 7 2, .* found 1e\+06 and 9e\+06"),
     (DIAGONAL.replace("7,3,1.0E+06", "7,3,1.0E+06,5.0E+04"),
@@ -122,12 +122,12 @@ def test_wrong_dmig_is_rejected(text, message, tmp_path):
         read_matrix(path)
 
 
-def test_mass_matrix_is_read_under_an_unknown_name_but_not_under_a_stiffness_name(
+def test_mass_matrix_with_an_unknown_name_is_read(
     tmp_path,
 ):
     path = tmp_path / "k.pch"
     path.write_text(large_fields(textbook_beam(), "KAAX"))
-    with pytest.raises(BadInput, match=r"KAAX \(stiffness\), expected one of mass"):
+    with pytest.raises(BadInput, match=r"KAAX \(stiffness\), expected one mass"):
         read_matrix(path, "mass")
     path.write_text(large_fields(textbook_beam(), "MINE"))
     assert read_matrix(path, "mass").matrix.shape == (12, 12)

@@ -1,4 +1,4 @@
-"""Condensation to the interfaces: rigid motions, energies, number of unknowns."""
+"""Tests of the condensation onto two interfaces."""
 
 import numpy as np
 import pytest
@@ -18,8 +18,8 @@ CENTERS = np.array([[0.02, 0.05, 0.01], [0.03, 0.02, 0.23]])
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_condensed_stiffness_equals_twice_the_energy_of_its_fields(kind):
-    """K follows from the entire assembled matrix; the base is at rest, the tip's mean
-    motion is the screw, and forces act only at the interfaces.
+    """The energy is computed with the complete stiffness matrix. The mean motion of the
+    tip is the screw, and forces act only on the interfaces.
     """
     mesh = isoparametric(box_solid((1, 2, 2), SIZE), 2)
     solution = condense(mesh, *constants(mesh), CENTERS, kind)
@@ -39,7 +39,7 @@ def test_condensed_stiffness_equals_twice_the_energy_of_its_fields(kind):
         for k in (0, 1)
     ]
     if kind == "distributing-both":
-        # relative to the base, whose mean motion carries the tip along
+        # motion of the tip relative to the mean motion of the base
         carried = np.eye(6)
         x, y, z = CENTERS[1] - CENTERS[0]
         carried[3:, :3] = [[0, z, -y], [-z, 0, x], [y, -x, 0]]

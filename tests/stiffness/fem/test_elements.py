@@ -1,4 +1,4 @@
-"""Finite elements: symmetries, closed forms and convergence rates."""
+"""Tests of finite elements."""
 
 import numpy as np
 import pytest
@@ -24,20 +24,20 @@ from tests.solids_for_tests import bar_solid, box_solid, constants
 
 E, NU = 60e9, 0.3
 LAM, MU = lame(E, NU)
-MESHES = [  # order, and whether edges are cut into layers
+MESHES = [  # order of the elements, and whether there are layers along edges
     (2, False), (3, False), (2, True),
     pytest.param(3, True, marks=pytest.mark.slow),
 ]  # fmt: skip
 
 
 def full(upper):
-    """Complete a matrix from its upper triangle."""
+    """Return a symmetric matrix from its upper triangle."""
     dense = upper.toarray()
     return dense + dense.T - np.diag(np.diag(dense))
 
 
 def crooked(rng):
-    """A box whose inner corners are shifted and whose side is bent."""
+    """Return a mesh of a box with a curved side and irregular elements."""
     solid = box_solid((2, 2, 3), (0.1, 0.12, 0.2))
     inside = np.all((solid.points > 1e-9) & (solid.points < [0.1, 0.12, 0.2]), axis=1)
     points = solid.points + 0.01 * inside[:, None] * rng.uniform(
@@ -66,17 +66,16 @@ both_orders = pytest.mark.parametrize("order", [2, 3])
 
 
 @pytest.mark.parametrize(("order", "layers"), MESHES)
-def test_only_the_six_rigid_motions_store_no_energy(rng, order, layers):
-    """This includes curved and cut elements, which represent linear fields exactly."""
+def test_only_rigid_motions_have_zero_strain_energy(rng, order, layers):
+    """This includes curved elements and elements in layers."""
     mesh = curved_mesh(order, layers)
     K = full(assemble(mesh, *constants(mesh)))
     motions = rigid_motions(mesh.nodes, np.array([0.3, 0.2, 0.1])).reshape(-1, 6)
-    # forces of a rigid motion against those of a strain of the same size
+    # forces of a rigid motion, relative to those of a strain
     strained = mesh.nodes * [1, -1, 0]
     scale = np.abs(K @ strained.ravel()).max()
     assert np.abs(K @ motions).max() < 1e-11 * scale
-    # nothing else does: above a small shift the matrix is definite (Cholesky's method
-    # fails otherwise), and the seven values nearest to it are six noughts and one more
+    # the matrix has exactly six zero eigenvalues, and the others are positive
     shift = 1e-6 * np.diag(K).max()
     np.linalg.cholesky(K + shift * np.eye(len(K)))
     values = np.sort(eigsh(
@@ -87,8 +86,8 @@ def test_only_the_six_rigid_motions_store_no_energy(rng, order, layers):
 
 
 @pytest.mark.parametrize(("order", "layers"), MESHES)
-def test_linear_field_is_exact_on_any_mesh(rng, order, layers):
-    """Patch test: inner nodes follow the linear field prescribed on the boundary."""
+def test_linear_displacement_field_is_exact_on_any_mesh(rng, order, layers):
+    """In this patch test, a linear field is prescribed on the boundary."""
     solid = split_joining_edges(crooked(rng), (0, 1))
     parts = layered(solid, (0, 1)) if layers else None
     mesh = isoparametric(solid, order, parts)
@@ -107,7 +106,7 @@ def test_linear_field_is_exact_on_any_mesh(rng, order, layers):
 
 @pytest.mark.parametrize("curved", [False, True])
 def test_stiffness_matrix_equals_that_of_scikit_fem(curved):
-    """scikit-fem shares only the quadrature rule with this program."""
+    """Only the quadrature rule is the same in both programs."""
     import skfem
     from scipy.spatial import cKDTree
     from skfem.models.elasticity import linear_elasticity
@@ -134,8 +133,8 @@ def test_stiffness_matrix_equals_that_of_scikit_fem(curved):
 
 @both_orders
 def test_strain_energy_of_a_polynomial_field_equals_its_integral(rng, order):
-    """The reference is the strain energy of u = A m, where m are all monomials of the
-    degree, from differentiated monomials and a tensor-product rule on the whole box.
+    """The components of the field are polynomials with random coefficients. Their exact
+    energy is integrated over the whole box.
     """
     size = np.array([0.5, 0.6, 0.8])
     mesh = isoparametric(box_solid((1, 2, 2), size), order)
@@ -178,8 +177,8 @@ def test_rotating_the_mesh_rotates_the_stiffness(rng, kind, order):
 
 
 @both_orders
-def test_stiffness_in_millimetres_is_the_stiffness_in_metres_converted(order):
-    """Lengths times 1000 and Pa as N/mm^2 give K in N mm/rad and N/mm."""
+def test_stiffness_in_millimetres_equals_that_in_metres(order):
+    """The unit of the modulus is then N/mm^2, and K is in N mm/rad and N/mm."""
     mesh = isoparametric(box_solid((2, 2, 3), (0.05, 0.08, 0.2)), order)
     large = isoparametric(box_solid((2, 2, 3), (50.0, 80.0, 200.0)), order)
     tip = np.array([[0, 0, 0], [0.025, 0.04, 0.2]])
@@ -192,7 +191,7 @@ def test_stiffness_in_millimetres_is_the_stiffness_in_metres_converted(order):
 
 @both_orders
 def test_stiffness_at_another_tip_follows_from_a_screw_map(order):
-    """For the same mesh K' = A^T K A, with A from the first tip to the second."""
+    """On the same mesh, the stiffness at the second tip is A^T K A."""
     solid = box_solid((2, 2, 3), (0.05, 0.08, 0.2))
     near, there = np.array([0.02, 0.04, 0.2]), np.array([0.1, -0.2, 0.3])
     _, one = solved(solid, order, tip=near)
@@ -208,10 +207,9 @@ def test_stiffness_at_another_tip_follows_from_a_screw_map(order):
 def test_distributing_interfaces_reproduce_the_compliance_of_a_round_beam(
     order, rings, layers, rel
 ):
-    """Tractions are linear over the face, so for moments, tension and torsion of a
-    round bar the exact solution is that of the beam, without an end effect. The
-    remaining error is that of the circle: h^4 for quadratic elements and h^6 for cubic
-    ones.
+    """The tractions on the interface are linear, so there is no end effect in bending,
+    tension and torsion. The error is due to the approximate circle and is proportional
+    to h^4 for quadratic elements and to h^6 for cubic elements.
     """
     solid = bar_solid(rings, layers, 0.04, 0.2)
     _, solution = solved(solid, order, "distributing-both")
@@ -230,16 +228,16 @@ def test_each_distributing_interface_lowers_the_stiffness(order):
     assert np.linalg.eigvalsh(scaled(one - two, rigid))[0] > -1e-9
 
 
-def test_papers_bar_with_a_distributing_tip_agrees_with_its_converged_stiffness():
-    """The converged value is 1 020 060 N m/rad, approached from above;
-    this mesh is 5e-4 off."""
+def test_stiffness_with_a_distributing_tip_agrees_with_converged_value():
+    """The converged bending stiffness of the IRSBot-2 link is 1 020 060 N m/rad. The
+    error on this mesh is 5e-4."""
     _, solution = solved(bar_solid(2, 16, 0.04, 0.452), 3, "distributing")
     assert 0 < solution.stiffness[0, 0] / 1020060 - 1 < 1e-3
 
 
 @pytest.mark.slow
-def test_excess_over_the_timoshenko_beam_is_inversely_proportional_to_length():
-    """The end effect c r / L halves when the length doubles (slope -1 within 0.05)."""
+def test_end_effect_is_inversely_proportional_to_length():
+    """The slope of the end effect c r / L on a log-log scale is -1."""
     excess = []
     lengths = np.array([0.4, 0.8, 1.6])
     for length in lengths:
@@ -255,14 +253,14 @@ def test_excess_over_the_timoshenko_beam_is_inversely_proportional_to_length():
 
 @both_orders
 def test_tension_and_bending_of_a_bar_are_exact_at_zero_poissons_ratio(order):
-    """Without lateral contraction, rigid ends have no end effect; K_TZ = E A / L."""
+    """Without lateral contraction, there is no end effect, and K_TZ is E A / L."""
     mesh = isoparametric(box_solid((2, 2, 4), (0.03, 0.05, 0.2)), order)
     lam, mu = lame(E, 0.0)
     ones = np.ones(len(mesh.cells))
     centers = np.array([[0.015, 0.025, 0], [0.015, 0.025, 0.2]])
     K = condense(mesh, lam * ones, mu * ones, centers).stiffness
     assert K[5, 5] == pytest.approx(E * 0.03 * 0.05 / 0.2, rel=1e-11)
-    # pure bending is quadratic and nothing shrinks across: exact too
+    # quadratic elements are exact in pure bending without lateral contraction
     C = inverted(K)
     beam = beam_compliance(
         0.2, rectangular_section(0.03, 0.05, 0.0), E, 0.0, axis=[0, 0, 1], up=[0, 1, 0]
@@ -272,7 +270,8 @@ def test_tension_and_bending_of_a_bar_are_exact_at_zero_poissons_ratio(order):
 
 
 def harmonic_slope(x):
-    """Second derivatives of exp(5 z) cos(3 x) cos(4 y), which is harmonic."""
+    """Return the second derivatives of the harmonic function exp(5 z) cos(3 x) cos(4
+    y)."""
     ex, cx, cy = np.exp(5 * x[..., 2]), np.cos(3 * x[..., 0]), np.cos(4 * x[..., 1])
     sx, sy = np.sin(3 * x[..., 0]), np.sin(4 * x[..., 1])
     xy, xz, yz = 12 * ex * sx * sy, -15 * ex * sx * cy, -20 * ex * cx * sy
@@ -285,9 +284,9 @@ def harmonic_slope(x):
     ("order", "counts"), [(2, (6, 12)), pytest.param(3, (4, 8), marks=pytest.mark.slow)]
 )
 def test_strain_energy_error_converges_with_the_order_of_the_elements(order, counts):
-    """The gradient of a harmonic function is in equilibrium without body force. It is
-    prescribed on the surface of a cube; quadratic elements leave an error of h^2 in the
-    energy norm, h^4 in the energy: slope 2 within 0.1; cubic ones h^3."""
+    """The exact displacement field is the gradient of a harmonic function, which is
+    prescribed on the surface of a cube. In the energy norm, the error is proportional
+    to h^2 for quadratic elements and to h^3 for cubic elements."""
     errors = []
     for n in counts:
         mesh = isoparametric(box_solid((n, n, n), (0.5, 0.5, 0.5)), order)

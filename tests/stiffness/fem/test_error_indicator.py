@@ -1,4 +1,4 @@
-"""Error estimates: exact fields, known errors and coverage."""
+"""Tests of the error indicator of the stiffness."""
 
 from functools import cache
 
@@ -24,13 +24,13 @@ from tests.solids_for_tests import Z, bar_solid, box_solid, constants, with_plan
 
 E, NU = 60e9, 0.3
 R, L = 0.04, 0.452
-BENDING = 1032277.0  # N m/rad, the paper's bar, converged
+BENDING = 1032277.0  # [N m/rad] converged bending stiffness of the IRSBot-2 link
 TORSION = E / (2 + 2 * NU) * np.pi / 2 * R**4 / L
 
 
 @cache
 def bar(rings, layers):
-    """The paper's bar on a uniform mesh."""
+    """Return the IRSBot-2 link on a uniform mesh."""
     centers = np.array([[0, 0, 0], [0, 0, L]])
     solid = bar_solid(rings, layers, R, L)
     return solve_level(solid, [Material(E, NU)], centers, "rigid")
@@ -41,7 +41,7 @@ def volume(mesh):
 
 
 def test_estimated_error_is_zero_for_rigid_motions_and_constant_strains():
-    """This holds even on curved elements, which represent linear fields exactly."""
+    """This includes curved elements."""
     mesh, K = bar(1, 6).mesh, bar(1, 6).solution.stiffness
     lam, mu = constants(mesh)
     singular = np.ones(len(mesh.cells), dtype=bool)
@@ -56,7 +56,8 @@ def test_estimated_error_is_zero_for_rigid_motions_and_constant_strains():
 
 
 def shifted(excess, kind="distributing-both"):
-    """Compliance of a bar, and geometry errors for a slightly larger radius."""
+    """Return the compliance of a bar, and the geometry errors for a slightly larger
+    radius."""
     solid = bar_solid(2, 5, R, 0.25)
     mesh = isoparametric(solid)
     lam, mu = constants(mesh)
@@ -68,10 +69,10 @@ def shifted(excess, kind="distributing-both"):
 
 
 @pytest.mark.parametrize("excess", [1e-3, -1e-3])
-def test_geometry_error_of_a_bar_follows_the_powers_of_its_radius(excess):
-    """With free ends, A grows with R^2, and I and J with R^4; K_h - K = -4 x the excess
-    of K in bending and torsion, -2 x in tension, to first order (1 %: the circle's and
-    the square's error).
+def test_geometry_error_of_a_bar_equals_derivative_by_radius(excess):
+    """The area is proportional to R^2, and I and J are proportional to R^4. The
+    relative error of K is therefore 4 times the relative error of R in bending and
+    torsion, and twice this error in tension.
     """
     C, each = shifted(excess)
     softer = C @ each.sum(axis=0) @ C
@@ -90,29 +91,28 @@ def test_geometry_error_of_a_bar_follows_the_powers_of_its_radius(excess):
 @pytest.mark.parametrize(
     "mesh", [(1, 6), (1, 12), (2, 12), pytest.param((2, 24), marks=pytest.mark.slow)]
 )
-def test_estimate_from_one_mesh_covers_the_true_error(mesh):
-    """In bending K approaches 1 032 277 N m/rad from above,
-    and the estimate is at most five times the error; torsion has G J / L."""
+def test_estimated_error_on_one_mesh_covers_the_true_error(mesh):
+    """The converged bending stiffness is 1 032 277 N m/rad. The estimate is at most
+    five times the true error."""
     K, indicated, shape = bar(*mesh).totals()
     error, _ = estimated_error([(K, indicated, shape)])
     true = K[0, 0] / BENDING - 1
     told = np.diag(error + np.abs(shape)) / np.diag(K)
-    # a mesh that lacks volume is softer by that: told apart from what stiffens it
+    # subtract the error due to the smaller volume of the mesh
     without = true - shape[0, 0] / BENDING
     assert without > 0
     assert without < told[0] < 5 * without
     assert abs(K[2, 2] / TORSION - 1) < told[2]
 
 
-PLATE = (0.060, 0.002, 0.100)  # m, width, thickness, length
-# its K by bricks of order 5 that shrink toward the edges (NGSolve, to 5e-4):
-# benchmarks/evidence/stiffness_random_references.py; the largest error of K is that of
-# RZ
+PLATE = (0.060, 0.002, 0.100)  # [m] width, thickness and length
+# stiffness in torsion by another program, see
+# benchmarks/evidence/stiffness_random_references.py
 PLATE_RZ = 50.96  # N m/rad
 
 
 def plate(*counts):
-    """The plate on a uniform mesh, one element through its thickness."""
+    """Return the plate on a uniform mesh with one element across the thickness."""
     width, thickness, length = PLATE
     solid = with_plane_sides(box_solid(counts, np.array(PLATE)))
     middle = np.array([width / 2, thickness / 2, 0])
@@ -121,8 +121,7 @@ def plate(*counts):
 
 
 def test_estimated_error_of_a_twisted_thin_plate_covers_the_true_error():
-    """Elements 7 to 15 mm wide on a 2 mm plate, whose layer is 0.6 mm deep at its free
-    edges: the true error of twisting is 1.4 and 0.7 %."""
+    """The elements are much wider than the boundary layer at the free edges."""
     history = [plate(4, 1, 8), plate(8, 1, 16)]
     for count in (1, 2):
         for meshes in (history[:count], history[count - 1 : count]):

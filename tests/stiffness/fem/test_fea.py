@@ -1,4 +1,4 @@
-"""Finite elements of whole links from their surfaces: requested accuracy and budget."""
+"""Tests of the stiffness of links from their surfaces."""
 
 from pathlib import Path
 
@@ -39,10 +39,9 @@ PLANES = (parse_interface("z=0"), parse_interface("z=0.452"))
 
 
 @pytest.mark.slow
-def test_papers_bar_from_its_surface_agrees_within_its_estimated_error(cache):
-    """The converged bending stiffness is 1 032 277 N m/rad, and the torsional one G J /
-    L. The requested accuracy is 0.5 %, and the estimate must cover the true error. The
-    mesh's own stiffness is above the true one, by no more than twice the estimate.
+def test_stiffness_of_the_irsbot2_link_agrees_within_its_estimated_error(cache):
+    """The converged bending stiffness is 1 032 277 N m/rad, and the torsional stiffness
+    is G J / L. The stiffness on the mesh is an upper bound.
     """
     solution = solve_link(
         bar_surface(),
@@ -59,8 +58,8 @@ def test_papers_bar_from_its_surface_agrees_within_its_estimated_error(cache):
     assert 0 < own < 2 * link.relative_error_estimate < 10 * own
     assert link.stiffness[2, 2] == pytest.approx(205304.8977, rel=1e-6)
     np.testing.assert_allclose(link.tip, [0, 0, 0.452], atol=1e-12)
-    # mass of the true cylinder, not of the polygon (0.3 % less), and a kilogram: what
-    # cubics leave of an arc falls with its sixth power, 2.5e-7 here
+    # mass of the exact cylinder and a point mass of 1 kg; the error of cubic elements
+    # is 2.5e-7
     body = 2700 * np.pi * 0.04**2 * 0.452
     assert link.mass - 1 == pytest.approx(body, rel=1e-6)
     center = (body * 0.226 + 0.452) / (body + 1)
@@ -73,8 +72,8 @@ def test_papers_bar_from_its_surface_agrees_within_its_estimated_error(cache):
 
 
 @pytest.mark.slow
-def test_bar_of_two_materials_stretches_like_two_springs_in_series(cache):
-    """This applies to tension; the end effect of both bars is within 2 %."""
+def test_bar_of_two_materials_has_the_stiffness_of_springs_in_series(cache):
+    """The end effect is less than 2 %."""
     middle = CutFace(Plane(np.array([0, 0, 0.226]), np.array([0, 0, 1.0])))
     half = Material(2 * E, NU, where=lambda p: p[:, 2] > 0.226, faces=(middle,))
     options = FemOptions(cache=cache, budget=Budget(levels=2))
@@ -99,7 +98,7 @@ def test_wrong_options_are_rejected(change, message, cache):
 
 
 def test_mesh_is_refined_up_to_the_budget_of_unknowns():
-    """The requested accuracy exceeds the budget, which the results report."""
+    """The requested accuracy cannot be reached within the budget."""
     section, material = {"width": 0.3, "height": 0.3}, Material(E, NU)
     first = solve_bar(section, material, FemOptions(1e-3, budget=Budget(levels=1))).link
     budget = Budget(unknowns=2 * first.mesh["unknowns"])
@@ -107,7 +106,7 @@ def test_mesh_is_refined_up_to_the_budget_of_unknowns():
     assert first.mesh["unknowns"] < finer.mesh["unknowns"] <= budget.unknowns
     assert finer.mesh["meshes"] > 1
     assert not finer.mesh["reached"]
-    # the coarser mesh's answer differs by no more than both said
+    # the difference between two meshes is at most the sum of both estimated errors
     gap = np.abs(scaled(first.stiffness - finer.stiffness, finer.stiffness)).max()
     both = first.relative_error_estimate + finer.relative_error_estimate
     assert 0 < gap <= 1.01 * both
@@ -115,8 +114,10 @@ def test_mesh_is_refined_up_to_the_budget_of_unknowns():
 
 @pytest.mark.parametrize("budget", [Budget(unknowns=99), Budget(seconds=1e-9)])
 def test_first_mesh_that_exceeds_the_budget_is_rejected(budget):
-    words = r"the coarsest mesh that follows the part has \d+ unknowns, about .* s and"
-    with pytest.raises(MeshFailed, match=f"{words}.*allow more time"):
+    words = (
+        r"the coarsest mesh of the part has \d+ unknowns\. The solution needs about "
+    )
+    with pytest.raises(MeshFailed, match=f"{words}.* s and .*increase the time limit"):
         solve_bar({"radius": 0.1}, Material(E, NU), FemOptions(budget=budget))
 
 

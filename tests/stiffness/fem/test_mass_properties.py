@@ -1,4 +1,4 @@
-"""Mass properties of solids with point masses, by Steiner's rule."""
+"""Tests of the mass properties of links."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ def box():
 
 
 def inertia_of_points(masses, places):
-    """Inertia about the centre of mass: sum m (x.x I - x x^T)."""
+    """Return the inertia of points, the sum of m (x.x I - x x^T)."""
     centre = masses @ places / masses.sum()
     x = places - centre
     squares = np.einsum("i,ij,ij->", masses, x, x)

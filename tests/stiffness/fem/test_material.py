@@ -1,4 +1,4 @@
-"""Isotropic materials: accepted and rejected values."""
+"""Tests of the materials of links."""
 
 import numpy as np
 import pytest
@@ -16,9 +16,8 @@ def test_wrong_density_is_rejected(density):
         Material(2.1e11, 0.3, density)
 
 
-def test_material_of_an_element_is_the_last_one_whose_region_contains_its_centre():
-    """Lame's constants at the mean of the four corners,
-    for curved and straight elements."""
+def test_element_has_the_last_material_at_its_centre():
+    """The centre of an element is the mean of its four corners."""
     solid = box_solid((2, 1, 3), np.array([0.1, 0.1, 0.1]))
     mesh = isoparametric(solid, 3, layered(solid, (0, 1)))
     asked = []
@@ -33,10 +32,10 @@ def test_material_of_an_element_is_the_last_one_whose_region_contains_its_centre
     np.testing.assert_allclose(asked[0], corners.sum(axis=1) / 4, atol=1e-15)
     high = corners[..., 2].sum(axis=1) > 0.2
     assert 0 < high.sum() < len(high)
-    # lambda = E nu / ((1 + nu) (1 - 2 nu)), mu = E / (2 (1 + nu))
+    # Lame's constants are E nu / ((1 + nu) (1 - 2 nu)) and E / (2 (1 + nu))
     np.testing.assert_allclose(table[~high], [[4e8, 4e8, 1000]] * (~high).sum())
     np.testing.assert_allclose(table[high], [[0, 1e11, 7800]] * high.sum(), atol=1e-3)
-    with pytest.raises(BadInput, match="the first must fill the whole link"):
+    with pytest.raises(BadInput, match="expected a material of the whole link"):
         material_of_elements(mesh, [stiff, soft][:1])
     with pytest.raises(BadInput, match="at least one"):
         material_of_elements(mesh, [])

@@ -1,4 +1,4 @@
-"""Materials assigned to solids in a STEP file, against closed forms."""
+"""Tests of the materials of solids in a STEP file."""
 
 from dataclasses import replace
 
@@ -29,7 +29,7 @@ def solved(surface, length, materials, accuracy=0.01):
 
 @pytest.fixture(scope="module")
 def bar():
-    """Two prisms in series, whose sections do not change at zero Poisson's ratio."""
+    """Return two prisms in series with zero Poisson's ratio."""
     surface = bar_of_two_boxes(WIDTH, HEIGHT, NEAR, FAR)
     materials = [Material(ALUMINIUM, 0, 2700, solid="near"),
                  Material(STEEL, 0, 7800, solid="far")]  # fmt: skip
@@ -38,13 +38,13 @@ def bar():
 
 @pytest.fixture(scope="module")
 def rod():
-    """A steel rod glued into a tube with a third of its modulus."""
+    """Return a steel rod in a tube with a third of its modulus."""
     materials = [Material(ALUMINIUM, 0, 1600), Material(STEEL, 0, 7800, solid="rod")]
     return solved(rod_in_tube(INNER, OUTER, LENGTH), LENGTH, materials)
 
 
-def test_compliance_of_prisms_in_series_equals_the_unit_load_integrals(bar):
-    """L / E A and L / E I add up; a tip force adds shear, 6 / 5 of L / G A."""
+def test_compliance_of_prisms_in_series_agrees_with_unit_load_method(bar):
+    """The compliances L / E A, L / E I and 6 / 5 L / G A of both prisms add up."""
     A = WIDTH * HEIGHT
     C = inverted(bar.level.solution.stiffness)
     flexible = lambda I: (FAR / STEEL + NEAR / ALUMINIUM) / I  # noqa: E731
@@ -69,8 +69,8 @@ def test_mass_and_centre_include_both_solids(bar):
 
 
 @pytest.mark.slow
-def test_stiffness_of_a_rod_in_a_tube_is_the_sum_of_both(rod):
-    """G J and E A add up exactly, because circles rotate as a whole."""
+def test_stiffness_of_a_rod_in_a_tube_is_the_sum_of_both_stiffnesses(rod):
+    """This applies to torsion and tension."""
     K = rod.level.solution.stiffness
     areas = np.pi * np.array([INNER**2, OUTER**2 - INNER**2])
     J = np.pi / 2 * np.array([INNER**4, OUTER**4 - INNER**4])
@@ -81,15 +81,15 @@ def test_stiffness_of_a_rod_in_a_tube_is_the_sum_of_both(rod):
 
 @pytest.mark.slow
 def test_mesh_follows_the_curved_face_between_two_solids(rod):
-    """Each modulus fills its own cylinder; facets would miss 0.3 % of it."""
+    """The volumes of both cylinders are exact."""
     stiff = rod.level.material[:, 2] == 7800
     volume = sum(w[stiff[part]].sum() for part, *_, w in integration(rod.level.mesh))
     assert volume == pytest.approx(np.pi * INNER**2 * LENGTH, rel=2e-5)
 
 
 @pytest.mark.slow
-def test_stress_at_the_face_between_two_solids_is_that_of_each_material(rod):
-    """The strain is the same everywhere, so stresses are in the ratio of the moduli."""
+def test_stress_at_the_face_between_two_solids_is_proportional_to_modulus(rod):
+    """The strain is the same in both materials."""
     area = np.pi * np.array([INNER**2, OUTER**2 - INNER**2])
     strain = 1000 / (np.array([STEEL, ALUMINIUM]) @ area)
     stresses = von_mises(stress_influence(rod, 0.02).stresses([0, 0, 0, 0, 0, 1000]))
@@ -125,7 +125,7 @@ def test_a_surface_without_solids_is_rejected():
         placed_materials(surface, [Material(STEEL, 0.3, solid="rod")])
 
 
-def test_part_option_of_several_solids_is_parsed_and_its_modulus_scaled():
+def test_part_option_with_several_solids_is_parsed():
     part = parse_part("--part", "solid=end/a+end b/young=2e11,poisson=0.3,density=7800")
     assert (part.solid, part.E, part.density) == ("end/a+end b", 2e11, 7800)
     twice = parse_part("--part", scaled_part("solid=a/young=2e11,poisson=0.3", 2.0))

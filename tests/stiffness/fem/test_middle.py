@@ -1,4 +1,4 @@
-"""Midpoint of the interval that contains a stiffness: closed forms and properties."""
+"""Tests of the midpoint between the bounds on the stiffness."""
 
 from dataclasses import replace
 
@@ -18,16 +18,15 @@ NONE = np.zeros((6, 6))
 
 
 def random_definite(seed, size=1.0):
-    """(6, 6) with units of rotations and translations, definite."""
+    """Return a random positive definite matrix with mixed units, (6, 6)."""
     rng = np.random.default_rng(seed)
     root = rng.normal(size=(6, 9)) * np.repeat([30.0, 4000.0], 3)[:, None]
     return size * root @ root.T
 
 
 @given(st.integers(0, 10**6), st.floats(1e-6, 30.0))
-def test_estimated_error_covers_the_whole_interval(seed, size):
-    """From K_h down to K_h - c E for any c in 0 to 1,
-    also where E is larger than K_h."""
+def test_estimated_error_covers_the_interval_of_the_stiffness(seed, size):
+    """The interval is from K_h - E to K_h, also if E is larger than K_h."""
     K_h, E = random_definite(seed), random_definite(seed + 1, size)
     middle, told = middle_stiffness(K_h, E, NONE)
     for share in (0.0, 0.3, 1.0):
@@ -35,10 +34,8 @@ def test_estimated_error_covers_the_whole_interval(seed, size):
         assert (gap <= np.abs(told) * (1 + 1e-9) + 1e-12 * np.abs(K_h).max()).all()
 
 
-def test_middle_stiffness_does_not_depend_on_units():
-    """Millimetres replace metres, including cases where less than half of the error is
-    subtracted.
-    """
+def test_midpoint_stiffness_does_not_depend_on_units():
+    """Lengths in metres and in millimetres are compared."""
     units = np.outer(np.repeat([1.0, 1e3], 3), np.repeat([1.0, 1e3], 3))
     for size in (1e-3, 10.0):
         K, E, g = random_definite(6), random_definite(7, size), random_definite(8, 0.1)
@@ -52,27 +49,27 @@ def test_middle_stiffness_does_not_depend_on_units():
 
 @pytest.fixture(scope="module")
 def bar():
-    """A square bar on its first mesh alone."""
+    """Return a square bar on its first mesh."""
     options = FemOptions(1e-3, budget=Budget(levels=1))
     return solve_bar({"width": 0.25, "height": 0.25}, Material(2.0, 0.3), options)
 
 
-def test_stiffness_of_a_link_is_below_that_of_its_mesh_by_the_estimated_error(bar):
-    """K_h is the upper end of the interval, the link's stiffness its middle."""
+def test_link_stiffness_is_mesh_stiffness_minus_estimated_error(bar):
+    """The stiffness of the mesh is the upper bound."""
     K_h, K = bar.level.solution.stiffness, bar.link.stiffness
     above = np.diag(scaled(K_h - K, K))
     assert (above > 0).all()
     told = np.diag(bar.link.relative_errors)
-    # told has the geometry's besides, which a bar of plane sides has not
+    # a bar with plane sides has no geometry error
     np.testing.assert_allclose(above, told, rtol=1e-6)
 
 
 def test_stresses_and_condensed_ends_use_the_stiffness_of_the_mesh(bar):
-    """They balance the wrench of the mesh's own stiffness, not of the corrected one."""
+    """Stresses must balance the wrench on the mesh."""
     held = two_ends(bar).stiffness[6:, 6:]
     np.testing.assert_allclose(held, bar.level.solution.stiffness, rtol=1e-9)
     softer = replace(bar, link=replace(bar.link, compliance=2 * bar.link.compliance))
     one, other = (stress_influence(b).influence for b in (bar, softer))
     np.testing.assert_array_equal(one, other)
-    # stretched: the wrench over the section but for the nodes' own scatter
+    # the mean stress is the force divided by the area, apart from nodal errors
     assert one[:, 5, 2].mean() * 0.25**2 == pytest.approx(1.0, abs=5e-3)

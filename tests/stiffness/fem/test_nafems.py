@@ -1,7 +1,8 @@
-"""NAFEMS standard tests LE1, LE10 and LE11 with cubic elements on structured meshes.
+"""Tests with the NAFEMS benchmarks LE1, LE10 and LE11.
 
-The Standard NAFEMS Benchmarks (1990).  LE1 and LE10 are quarters of an elliptic ring:
-inner (x / 2)^2 + y^2 = 1, outer (x / 3.25)^2 + (y / 2.75)^2 = 1; E = 210 GPa, nu = 0.3.
+Source: The Standard NAFEMS Benchmarks (1990). The body of LE1 and LE10 is a quarter of
+the ring between the ellipses (x / 2)^2 + y^2 = 1 and (x / 3.25)^2 + (y / 2.75)^2 = 1. E
+is 210 GPa, and nu is 0.3.
 """
 
 from dataclasses import replace
@@ -24,10 +25,10 @@ LAM, MU = lame(210e9, 0.3)
 
 
 def ring(counts, thickness):
-    """Cubic tetrahedra of the ring, together with their nodes in the unit box."""
+    """Return cubic elements of the ring, and their nodes in a unit box."""
     flat = isoparametric(box_solid(counts, (1.0, 1.0, 1.0)))
     s, t, height = flat.nodes.T
-    # finer toward the inner edge and toward the x axis, where D is
+    # the mesh is finer near the point (2, 0)
     s, t = (np.expm1(1.5 * v) / np.expm1(1.5) for v in (s, t))
     angle = np.pi / 2 * t
     a, b = 2 + 1.25 * s, 1 + 1.75 * s
@@ -37,16 +38,17 @@ def ring(counts, thickness):
 
 
 def sphere_cone_cylinder(counts):
-    """Cubic tetrahedra of a quarter of LE11's body, as :func:`ring`. Inside a sphere of
-    radius 1 m up to 45 degrees, then a cylinder; outside a sphere of 1.4 m up to z =
-    0.7, a cone to r = 1 at z = 1.39, a cylinder to the top, 1.79."""
+    """Return cubic elements of a quarter of the body of LE11, and their nodes in a unit
+    box. The inner surface is a sphere with a radius of 1 m up to 45 degrees, then a
+    cylinder. The outer surface is a sphere with a radius of 1.4 m up to z = 0.7, then a
+    cone up to r = 1 and z = 1.39, then a cylinder up to z = 1.79."""
     flat = isoparametric(box_solid(counts, (1.0, 1.0, 1.0)))
     s, t, turn = flat.nodes.T
-    # finer toward A, at s = t = 0
+    # the mesh is finer near s = t = 0
     s, low = (np.expm1(2 * v) / np.expm1(2) for v in (s, np.minimum(4 * t, 1.0)))
     t = np.where(t < 0.25, low / 4, t)
     corner, top = np.sqrt(0.5), 1.79
-    # four bands, cut where the outline has corners
+    # the borders of four zones are at the corners of the outline
     inner_angle = np.interp(t, [0, 0.5], [0, np.pi / 4])
     height = np.interp(t, [0.5, 1.0], [corner, top])
     inner = np.where(
@@ -76,7 +78,7 @@ def sphere_cone_cylinder(counts):
 
 
 def pressed(mesh, faces, pressure):
-    """(n, 3) nodal forces of a pressure [Pa] against faces."""
+    """Return the nodal forces of a pressure on faces, (n, 3)."""
     N, dN, weights = triangle_rule(mesh.order)
     J = np.einsum("qai,tax->tqix", dN, mesh.nodes[faces])
     normal = np.cross(J[:, :, 0], J[:, :, 1])
@@ -89,7 +91,7 @@ def pressed(mesh, faces, pressure):
 
 
 def stress_at(mesh, held, loads, node, direction=1):
-    """sigma_yy [Pa], or another, at a node, averaged over its elements."""
+    """Return a component of the stress at a node [Pa]."""
     ones = np.ones(len(mesh.cells))
     upper = assemble(mesh, LAM * ones, MU * ones)
     free = ~held.ravel()
@@ -107,13 +109,13 @@ def stress_at(mesh, held, loads, node, direction=1):
 
 
 def on(mesh, values, value):
-    """Boundary faces whose nodes all have a coordinate of the unit box."""
+    """Return the boundary faces on a side of the unit box."""
     return mesh.faces[np.isclose(values[mesh.faces], value, atol=1e-9).all(axis=1)]
 
 
 def test_nafems_le1_elliptic_membrane_has_the_published_stress():
-    """10 MPa outward on the outer edge; sigma_yy at D (2, 0) is 92.7 MPa. Plane stress
-    by a free sheet of 0.02 m; printed to three digits, so 0.1 % of it."""
+    """A traction of 10 MPa acts on the outer edge. The published sigma_yy at (2, 0) is
+    92.7 MPa."""
     unit, mesh = ring((10, 16, 1), 0.02)
     held = np.zeros(mesh.nodes.shape, dtype=bool)
     held[unit[:, 1] == 0, 1] = True
@@ -126,7 +128,8 @@ def test_nafems_le1_elliptic_membrane_has_the_published_stress():
 
 
 def test_nafems_le10_thick_plate_has_the_published_stress():
-    """1 MPa on the upper face; sigma_yy at D (2, 0, top) is -5.38 MPa, 0.6 %."""
+    """A pressure of 1 MPa acts on the upper face. The published sigma_yy at (2, 0) on
+    this face is -5.38 MPa."""
     unit, mesh = ring((6, 7, 4), 0.6)
     held = np.zeros(mesh.nodes.shape, dtype=bool)
     held[unit[:, 1] == 0, 1] = True
@@ -144,7 +147,7 @@ def test_nafems_le10_thick_plate_has_the_published_stress():
 
 
 def heated(mesh, temperature, coefficient):
-    """(n, 3) nodal forces equivalent to a temperature [K]."""
+    """Return the nodal forces that are equivalent to a temperature, (n, 3)."""
     loads = np.zeros_like(mesh.nodes)
     modulus = (3 * LAM + 2 * MU) * coefficient
     for part, _, _, N, G, w in integration(mesh):
@@ -155,12 +158,12 @@ def heated(mesh, temperature, coefficient):
 
 
 def warmth(x):
-    """Temperature r + z of LE11."""
+    """Return the temperature r + z."""
     return np.hypot(x[..., 0], x[..., 1]) + x[..., 2]
 
 
 def le11_stress(counts):
-    """sigma_zz [Pa] on the circle through A, (1, 0, 0), by a mesh of so many boxes."""
+    """Return sigma_zz on the circle through (1, 0, 0) [Pa]."""
     unit, mesh = sphere_cone_cylinder(counts)
     held = np.zeros(mesh.nodes.shape, dtype=bool)
     held[unit[:, 2] == 0, 1] = True
@@ -176,8 +179,8 @@ def le11_stress(counts):
 
 @pytest.mark.slow
 def test_nafems_le11_solid_cylinder_taper_sphere_has_the_published_stress():
-    """T = r + z, 2.3e-4 / K, ends held along z; sigma_zz at A is -105 MPa, 0.6 %. A is
-    a corner with a steep gradient: it takes six cubic elements across."""
+    """The temperature is r + z, and the ends are fixed along z. The published sigma_zz
+    at (1, 0, 0) is -105 MPa."""
     coarse, fine = le11_stress((4, 12, 4)), le11_stress((6, 16, 4))
     assert fine == pytest.approx(-105e6, rel=6e-3)
     assert abs(fine + 105e6) < 0.6 * abs(coarse + 105e6)

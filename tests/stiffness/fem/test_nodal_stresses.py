@@ -1,4 +1,4 @@
-"""Nodal stresses: exact for linear fields, and invariant under rotation of the axes."""
+"""Tests of nodal stresses."""
 
 from types import SimpleNamespace
 
@@ -18,14 +18,14 @@ from tests.solids_for_tests import box_solid
 
 
 def tensor(six):
-    """(..., 3, 3) of xx yy zz yz xz xy."""
+    """Return the stress tensor from xx yy zz yz xz xy, (..., 3, 3)."""
     x, y, z, yz, xz, xy = np.moveaxis(np.asarray(six), -1, 0)
     rows = [[x, xy, xz], [xy, y, yz], [xz, yz, z]]
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
-def test_von_mises_stress_equals_the_deviators_norm_in_any_axes(rng):
-    """sqrt(3/2 s : s), where s is the deviator, also of the rotated tensor."""
+def test_von_mises_stress_equals_norm_of_deviatoric_stress(rng):
+    """The stress is sqrt(3/2 s : s), where s is the deviatoric stress."""
     six = rng.normal(size=(20, 6))
     whole = tensor(six)
     mean = np.trace(whole, axis1=1, axis2=2)[:, None, None] / 3
@@ -37,14 +37,12 @@ def test_von_mises_stress_equals_the_deviators_norm_in_any_axes(rng):
     np.testing.assert_allclose(von_mises(turned), expected, rtol=1e-12)
 
 
-def test_nodal_stress_at_a_material_boundary_is_that_of_each_material():
-    """For two materials under the same strain, the stress is 3 or 7, without
-    averaging.
-    """
+def test_nodal_stresses_are_not_averaged_between_materials():
+    """Two materials have the same strain."""
     mesh = isoparametric(box_solid((1, 1, 2), (1.0, 1.0, 2.0)), 2)
     high = mesh.nodes[mesh.cells[:, :4]].mean(axis=1)[:, 2] > 1
     field = np.zeros((len(mesh.nodes), 3, 6))
-    field[:, 0, 5] = mesh.nodes[:, 1]  # a shear strain: stress mu in xy
+    field[:, 0, 5] = mesh.nodes[:, 1]  # shear strain with the stress mu in xy
     level = SimpleNamespace(
         mesh=mesh, solution=SimpleNamespace(fields=field),
         material=np.column_stack([0 * high, np.where(high, 7.0, 3.0), 0 * high]),

@@ -1,4 +1,4 @@
-"""Stress in a meshed link under its own weight, against a beam of 1 m."""
+"""Tests of the stress in a meshed link under its own weight."""
 
 import numpy as np
 import pytest
@@ -15,16 +15,15 @@ SECTION = {"width": SIDE, "height": SIDE}
 
 @pytest.fixture(scope="module", params=["rigid", "distributing"])
 def bar(request):
-    """A square bar of 20 mm, 1 m long along z."""
+    """Return a square bar of 20 x 20 x 1000 mm along z."""
     options = FemOptions(0.02, request.param)
     return solve_bar(SECTION, Material(2e11, 0.3, DENSITY), options)
 
 
-def test_bending_stress_of_a_heavy_cantilever_follows_the_weight_beyond_each_section(
+def test_bending_stress_of_a_heavy_cantilever_equals_beam_theory(
     bar,
 ):
-    """The moment is rho g A (L - z)^2 / 2, the stress linear over the section;
-    shear adds 1e-3."""
+    """The bending moment is rho g A (L - z)^2 / 2."""
     field = stress_influence(with_own_weight(bar), 0.1)
     stress = field.stresses(np.r_[np.zeros(6), 0.0, -G, 0.0])[:, 2]
     x, y, z = field.places.T
@@ -35,22 +34,20 @@ def test_bending_stress_of_a_heavy_cantilever_follows_the_weight_beyond_each_sec
 
 
 def test_peak_stress_under_own_weight_agrees_with_the_beam(bar):
-    """Evaluated from 50 mm off the wall; over the whole length 6 rho g A L^2 /
-    2 / h^3.
-    """
+    """The largest stress in the whole beam is 6 rho g A L^2 / 2 / h^3."""
     peak = peak_stress(bar, np.zeros(6), section=SECTION, up=[0, 1, 0], away=0.05,
                        gravity=[0, -G, 0])  # fmt: skip
     whole = 3 * DENSITY * G / SIDE
     assert peak.beam_whole == pytest.approx(whole, rel=1e-9)
     assert peak.beam[0] == pytest.approx(whole * 0.95**2, rel=1e-9)
-    assert 0.05 <= peak.place[2] < 0.06  # the nearest node beyond it
+    assert 0.05 <= peak.place[2] < 0.06  # nearest node beyond the excluded distance
     there = whole * (1 - peak.place[2]) ** 2
     assert peak.von_mises == pytest.approx(there, rel=3e-3)
     assert peak.error < 1e-2 * there
 
 
 def test_weight_along_the_bar_causes_a_linear_axial_stress(bar):
-    """rho g (L - z), the weight below each section."""
+    """The stress is rho g (L - z)."""
     field = stress_influence(with_own_weight(bar), 0.1)
     stress = field.stresses(np.r_[np.zeros(6), 0.0, 0.0, G])[:, 2]
     expected = DENSITY * G * (1 - field.places[:, 2])

@@ -1,4 +1,4 @@
-"""Mesh report against hand calculation."""
+"""Tests of the quality measures of meshes."""
 
 import numpy as np
 import pytest
@@ -19,8 +19,8 @@ def one(points):
 
 
 def test_angles_and_quality_of_known_tetrahedra_equal_hand_calculation():
-    """Regular tetrahedron: arccos(1/3) at every edge, quality 1. Cube corner: three
-    right angles and three angles arccos(1/sqrt(3)), edges 1 and sqrt(2), volume 1/6.
+    """In a regular tetrahedron, all angles are arccos(1/3). At the corner of a cube,
+    three angles are 90 degrees, and three are arccos(1/sqrt(3)).
     """
     np.testing.assert_allclose(dihedral_angles(one(REGULAR)), np.arccos(1 / 3))
     assert element_quality(one(REGULAR))[0] == pytest.approx(1.0)
@@ -31,9 +31,7 @@ def test_angles_and_quality_of_known_tetrahedra_equal_hand_calculation():
 
 
 def test_mesh_report_has_the_exact_volume_and_area_of_a_box_and_a_bar():
-    """The values of a box are exact; the cubic sides of a bar miss the circle
-    by 1e-7.
-    """
+    """The values of a box are exact. The relative error of a bar is 1e-7."""
     box = box_solid((2, 3, 4), (0.1, 0.2, 0.3))
     report = mesh_report(box, isoparametric(box))
     assert report["elements"] == len(box.cells)

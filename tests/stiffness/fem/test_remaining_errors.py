@@ -1,4 +1,4 @@
-"""Remaining errors against their decay formula, and tractions by hand."""
+"""Tests of the two estimates in the error indicator."""
 
 import numpy as np
 import pytest
@@ -17,8 +17,8 @@ LAM, MU = lame(E, 0.3)
 
 
 def split_energies(mesh, stress):
-    """Energies of a stress zz minus its best linear part, and of this part minus its
-    mean, by least squares in each element for a unit modulus.
+    """Return the energies of the quadratic and the linear part of a stress zz for a
+    unit modulus.
     """
     places, weights = quadrature(6)
     quadratic, linear = [], []
@@ -34,9 +34,7 @@ def split_energies(mesh, stress):
 
 
 def share_of_the_rest(ratio):
-    """e_3 / s_3, at most three, if errors decrease as p^-b from e_1 to e_3 with this
-    ratio of successive decreases.
-    """
+    """Return e_3 / s_3, at most three, for errors proportional to p^-b."""
     smallest, largest = 0.1, 40.0
 
     def fall(b):
@@ -48,13 +46,11 @@ def share_of_the_rest(ratio):
     return min(3**-b / (2**-b - 3**-b), 3.0)
 
 
-# at -3.75 the stress of some elements has its least value in their middle: no slope
+# for -3.75, the stress in some elements has no linear part
 @pytest.mark.parametrize("bend", [0.01, 0.3, 1.0, 2.0, 5.0, 100.0, -3.75, -3.5])
 @pytest.mark.parametrize("stiffness", [E, 7.0])
-def test_remaining_error_follows_from_the_decay_of_the_indicated_error(bend, stiffness):
-    """u = z^2 / 2 + c z^3 / 3 gives a stress z + c z^2. Both energies have the same
-    scale.
-    """
+def test_estimated_error_follows_from_the_ratio_of_energies(bend, stiffness):
+    """The displacement is z^2 / 2 + c z^3 / 3, so the stress is z + c z^2."""
     mesh = isoparametric(box_solid((1, 1, 3), (0.5, 0.6, 0.8)))
     field = np.zeros((len(mesh.nodes), 3, 1))
     z = mesh.nodes[:, 2]
@@ -66,7 +62,7 @@ def test_remaining_error_follows_from_the_decay_of_the_indicated_error(bend, sti
     nowhere = np.zeros(len(mesh.cells), dtype=bool)
     scale = np.array([[stiffness]])
     estimate = error_matrices(mesh, field, *constants(mesh), nowhere, scale)
-    # between the table's 400 rates the share is interpolated
+    # the tolerance accounts for interpolation between the 400 exponents of the table
     np.testing.assert_allclose(estimate[:, 0, 0], expected, rtol=5e-3, atol=1e-9 * E)
     edge = error_matrices(mesh, field, *constants(mesh), ~nowhere, scale)
     np.testing.assert_allclose(edge[:, 0, 0], 1.2 * s_3, rtol=1e-6)
@@ -76,8 +72,8 @@ SIZES = [(0.3, 0.4, 0.5), (0.3, 0.4, 0.01), (0.02, 0.4, 0.5), (30.0, 0.4, 50.0)]
 
 
 def heights(size):
-    """Heights of a face normal to x, y or z of a box of six tetrahedra: that of a right
-    triangle over its hypotenuse, or the depth of the box.
+    """Return the smallest heights of faces normal to x, y or z in a box of six
+    tetrahedra: the height of a right triangle or the depth of the box.
     """
     found = []
     for axis in range(3):
@@ -89,8 +85,8 @@ def heights(size):
 @pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize("order", [2, 3])
 def test_traction_errors_of_a_constant_stress_equal_hand_calculation(rng, size, order):
-    """The energy of a face is t^2 / (2 mu) times its area times its height over pi, for
-    every pair of fields and any choice of free faces.
+    """The energy of a face is t^2 / (2 mu) times its area times its height, divided by
+    pi.
     """
     mesh = isoparametric(box_solid((1, 1, 1), np.array(size)), order)
     A = rng.normal(size=(3, 3, 2))
@@ -100,7 +96,7 @@ def test_traction_errors_of_a_constant_stress_equal_hand_calculation(rng, size, 
     axis = np.ptp(mesh.nodes[mesh.faces[:, :3]], axis=1).argmin(axis=1)
     area = np.prod(size) / np.array(size)[axis] / 2
     depth = heights(size)[axis] / np.pi
-    t = stress[:, axis]  # (3, f, k)
+    t = stress[:, axis]  # traction, (3, f, k)
     expected = np.einsum("f,ifk,ifl->fkl", area * depth / (2 * MU), t, t)
     some = rng.permutation(len(mesh.faces))[:7]
     found = traction_errors(mesh, fields, *constants(mesh), some)

@@ -1,4 +1,4 @@
-"""Sparse systems and the choice of solver."""
+"""Tests of the sparse solver."""
 
 import sys
 
@@ -12,7 +12,7 @@ from forcefit.stiffness.fem.sparse_solver import _mkl, solve, solver_name
 
 @pytest.fixture
 def chosen():
-    """Return ``solver_name`` with an empty cache, cleared again after the test."""
+    """Yield ``solver_name`` with an empty cache."""
     solver_name.cache_clear()
     yield solver_name
     solver_name.cache_clear()
@@ -21,7 +21,7 @@ def chosen():
 @pytest.mark.parametrize("name", sorted({"SuperLU", solver_name()}))
 @pytest.mark.parametrize("columns", [1, 6])
 def test_sparse_solver_needs_only_the_upper_triangle(rng, name, columns):
-    """The matrix is A = B B^T + I; numpy's dense solution is the reference."""
+    """The reference is the dense solution by NumPy."""
     B = random_array((40, 40), density=0.1, rng=rng).toarray()
     A = B @ B.T + np.eye(40)
     loads = rng.normal(size=(40, columns))
@@ -31,10 +31,9 @@ def test_sparse_solver_needs_only_the_upper_triangle(rng, name, columns):
 
 
 @pytest.mark.parametrize("spec", [None, object()], ids=["absent", "does not load"])
-def test_superlu_is_used_if_pypardiso_is_absent_or_does_not_load(
-    spec, monkeypatch, chosen
-):
-    """It does not load, for example, if the MKL library is of another architecture."""
+def test_superlu_is_used_if_pypardiso_cannot_be_imported(spec, monkeypatch, chosen):
+    """The import fails if pypardiso is not installed or if the MKL library cannot be
+    loaded."""
     monkeypatch.setattr(sparse_solver, "find_spec", lambda _: spec)
     monkeypatch.setattr(sparse_solver, "_mkl", lambda: None)
     monkeypatch.setitem(sys.modules, "pypardiso", None)

@@ -1,4 +1,4 @@
-"""Stresses: superposition, closed forms for bars, the region without singular edges."""
+"""Tests of the stresses in meshed links."""
 
 import numpy as np
 import pytest
@@ -33,17 +33,16 @@ def solved():
     ([0, 0, 1e3, 0, 0, 0], np.sqrt(3) * 1e3 * R / (2 * SECOND)),
 ])  # fmt: skip
 def test_stress_in_the_middle_of_a_bar_equals_textbook_values(solved, wrench, expected):
-    """Four radii from both ends, the end effects have decayed (e^-4 per radius). The
-    tolerance of 0.3 % is the mesh error (averaged at nodes, elements of half the
-    radius).
+    """The end effects are negligible at a distance of four radii from both ends. The
+    tolerance of 0.3 % is the mesh error.
     """
     stress = stress_influence(solved, away=4 * R)
     assert stress.peak(wrench)[0] == pytest.approx(expected, rel=3e-3)
 
 
 def test_stress_of_a_bar_in_tension_is_axial_only(solved):
-    """Components are compared, because the von Mises stress is insensitive to pressure:
-    zz = F / A, xx = yy = 0.
+    """The components are compared, because the von Mises stress does not depend on
+    pressure.
     """
     stress = stress_influence(solved, away=4 * R).stresses([0, 0, 0, 0, 0, 1e3])
     np.testing.assert_allclose(stress[:, 2], 1e3 / AREA, rtol=3e-3)
@@ -56,14 +55,16 @@ def test_stress_region_is_reported_and_excludes_the_clamped_edges(solved):
     assert stress.places[:, 2].min() >= R * (1 - 1e-9)
     assert stress.places[:, 2].max() <= (L - R) * (1 + 1e-9)
     assert "at least 0.04 m away" in stress.region
-    words = "stress: found no node 1 m away from the interfaces; the furthest"
-    with pytest.raises(BadInput, match=f"^{words} node is 0.2 m away"):
+    words = (
+        "stress: found no node at a distance of 1 m from the interfaces; the largest"
+    )
+    with pytest.raises(BadInput, match=f"^{words} distance is 0.2 m"):
         stress_influence(solved, away=1.0)
 
 
-def test_peak_stress_is_reported_with_that_of_the_beam(solved):
-    """Under a transverse force, M = F (L - away) at the section of the region nearest
-    to the base, and M = F L for the whole beam. The mesh error is 2 %, as above.
+def test_peak_stress_by_beam_theory_is_reported(solved):
+    """The largest moment is F (L - away) in the evaluated region, and F L in the whole
+    beam. The mesh error is 2 %.
     """
     load = [0, 0, 0, 1e3, 0, 0]
     peak = peak_stress(solved, load, section={"radius": R})
@@ -76,8 +77,8 @@ def test_peak_stress_is_reported_with_that_of_the_beam(solved):
     assert np.linalg.norm(peak.place[:2]) == pytest.approx(R, rel=1e-6)
 
 
-def test_beam_stress_follows_the_axes_of_the_link(solved):
-    """Torsion about the link's z axis, and a moment that is equal at tip and base."""
+def test_beam_stress_is_computed_in_the_axes_of_the_link(solved):
+    """The loads are torsion about the z axis of the link and pure bending."""
     twist = peak_stress(solved, [0, 0, 50, 0, 0, 0], section={"radius": R})
     expected = np.sqrt(3) * 50 * R / (2 * SECOND)
     assert twist.beam[0] == pytest.approx(expected, rel=1e-9)
@@ -85,16 +86,16 @@ def test_beam_stress_follows_the_axes_of_the_link(solved):
     plate = {"width": 0.02, "height": 0.05}
     bent = [peak_stress(solved, m, section=plate, up=[0, 1, 0]) for m in
             ([50, 0, 0, 0, 0, 0], [0, 50, 0, 0, 0, 0])]  # fmt: skip
-    # up is y: a moment about x bends the height, about y the width
+    # up is y, so a moment about x bends the section about its y axis
     assert bent[0].beam[0] == pytest.approx(50 * 6 / (0.02 * 0.05**2), rel=1e-9)
     assert bent[1].beam[0] == pytest.approx(50 * 6 / (0.05 * 0.02**2), rel=1e-9)
 
 
-def test_stress_report_and_figure_state_region_and_beam_stress(solved):
+def test_stress_report_and_figure_show_region_and_beam_stress(solved):
     peak = peak_stress(solved, [0, 0, 0, 1e3, 0, 0], section={"radius": R})
     text = stress_text(peak)
     assert "at least 0.04 m away from both interfaces" in text
-    assert "beam, whole length: 7.958 MPa" in text  # 400 N m over 5.027e-5 m^3
+    assert "beam, whole length: 7.958 MPa" in text  # 400 N m / 5.027e-5 m^3
     results = stress_results(peak)
     assert results["beam"]["von_mises_whole_length"] == peak.beam_whole
     everywhere = stress_influence(solved, away=0.0)

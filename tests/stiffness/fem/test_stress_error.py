@@ -1,4 +1,4 @@
-"""Estimated errors of peak stresses cover closed forms and an independent solver."""
+"""Tests of the estimated error of peak stresses."""
 
 from dataclasses import replace
 
@@ -27,7 +27,7 @@ STEEL = [Material(2.1e11, 0.3)]
 
 
 def meshed(solid, tip):
-    """A solid solved between z = 0 and its tip."""
+    """Return the solution of a solid with the base at z = 0."""
     centers = np.array([[*tip[:2], 0.0], tip])
     level = solve_level(solid, STEEL, centers, "rigid")
     link = LinkStiffness("test", inverted(level.solution.stiffness),
@@ -46,8 +46,8 @@ def bar(request):
     ([0, 0, 1e3, 0, 0, 0], np.sqrt(3) * 1e3 * R / (2 * SECOND)),
 ])  # fmt: skip
 def test_stress_of_a_bar_agrees_within_the_estimated_error(bar, wrench, expected):
-    """F / A, M R / I and T R / J at four radii from the ends, where the end effect is
-    0.1 %.
+    """The stress is compared with F / A, M R / I and T R / J at a distance of four
+    radii from the ends.
     """
     peak = peak_stress(bar, wrench, away=4 * R)
     assert abs(peak.von_mises - expected) <= peak.error + 1e-3 * expected
@@ -58,7 +58,7 @@ def test_stress_of_a_bar_agrees_within_the_estimated_error(bar, wrench, expected
 
 
 def test_estimated_stress_error_of_a_uniform_strain_is_zero(rng):
-    """Displacements linear in position give a uniform stress to machine precision."""
+    """Linear displacements result in a uniform stress."""
 
     def everything(x):
         return np.full(len(x), True)
@@ -75,7 +75,7 @@ def test_estimated_stress_error_of_a_uniform_strain_is_zero(rng):
 
 
 def test_peak_at_a_sharp_inner_edge_has_no_error_estimate():
-    """The true stress at such an edge is infinite."""
+    """The exact stress at a re-entrant edge is infinite."""
 
     def keep(x):
         return (x[:, 0] < 0.05) | (np.abs(x[:, 2] - 0.2) > 0.1)
@@ -90,11 +90,9 @@ def test_peak_at_a_sharp_inner_edge_has_no_error_estimate():
 
 @pytest.mark.slow
 def test_peak_stress_of_a_stepped_shaft_agrees_within_the_estimated_error():
-    """D 30, d 20, r 2 mm in tension, torsion and bending, 15 mm from the ends. The
-    expected values per N and N m were computed by another program with quadratic
-    axisymmetric elements, with the first harmonic in bending, on meshes of 0.1 and 0.05
-    mm in the fillet that agree to 0.3 %. Peterson's charts have 5.94 (3 % below) in
-    tension.
+    """The diameters are 30 and 20 mm, and the fillet radius is 2 mm. The loads are
+    tension, torsion and bending. The expected values were computed by another program
+    with axisymmetric elements and are accurate to 0.3 %.
     """
     points, triangles = shouldered_shaft(0.015, 0.010, 0.002, 48, 8)
     surface = check_surface(points, triangles, "shaft")

@@ -1,4 +1,4 @@
-"""Link with two moving ends, against the condensation of its full stiffness matrix."""
+"""Test of the matrices of a link with two moving ends."""
 
 import numpy as np
 import pytest
@@ -12,9 +12,7 @@ from forcefit.stiffness.fem.two_ends import two_ends
 
 @pytest.mark.parametrize("interface", ["rigid", "distributing"])
 def test_stiffness_of_both_ends_equals_the_schur_complement(interface):
-    """Twelve motions of both ends at once, by dense elimination of all
-    remaining nodes.
-    """
+    """The reference is computed by elimination of all inner nodes."""
     options = FemOptions(0.5, interface, Budget(levels=1))
     solved = solve_bar({"width": 0.3, "height": 0.4}, Material(1.0, 0.3, 2.0), options)
     mesh, constants = solved.level.mesh, solved.level.material
@@ -35,9 +33,13 @@ def test_stiffness_of_both_ends_equals_the_schur_complement(interface):
     size = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))
     both = two_ends(solved)
     np.testing.assert_allclose(both.stiffness / size, expected / size, atol=1e-9)
-    # moved as a whole: the mass of the bar, and no stiffness
+    # a rigid motion causes no force, and its mass is that of the bar
     whole = np.vstack([np.eye(6), np.eye(6)])
-    whole[9:12, :3] = [[0, 1, 0], [-1, 0, 0], [0, 0, 0]]  # w x L
+    whole[9:12, :3] = [
+        [0, 1, 0],
+        [-1, 0, 0],
+        [0, 0, 0],
+    ]  # rotation about the base times length
     np.testing.assert_allclose(both.stiffness @ whole / size[:, :6], 0.0, atol=1e-9)
     shifts = whole[:, 3:]
     np.testing.assert_allclose(

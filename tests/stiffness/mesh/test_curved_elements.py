@@ -1,4 +1,4 @@
-"""Curved elements follow their shapes, and none is inverted."""
+"""Tests of curved elements."""
 
 import numpy as np
 import pytest
@@ -20,13 +20,13 @@ from forcefit.stiffness.mesh.solid import Solid, boundary_faces
 from forcefit.stiffness.surface.primitives import Plane, Sphere
 from tests.solids_for_tests import bar_solid, box_cells, outward
 
-HALF = 0.5  # tangent of half the angle that the shell's piece is seen under
+HALF = 0.5  # tangent of half the angle between opposite planes
 SOLID_ANGLE = 4 * np.arcsin(HALF**2 / (1 + HALF**2))
 
 
 def shell(counts, inner, outer):
-    """A piece of a spherical shell between four planes through its centre. Patch 0 is
-    the concave sphere, and patch 1 the convex one.
+    """Return the part of a spherical shell between four planes through its centre.
+    Patch 0 is the inner sphere, and patch 1 is the outer sphere.
     """
     unit, cells = box_cells(counts)
     s, t, u = unit.T
@@ -57,15 +57,13 @@ def layers_of_bar(rings, layers, order):
 
 
 def side_errors(mesh):
-    """[-] distance of side nodes from the cylinder, relative to its radius."""
+    """Return the distances of nodes from a cylinder divided by its radius."""
     nodes = mesh.nodes[np.unique(mesh.faces[mesh.patch == 2])]
     return np.abs(np.hypot(*nodes[:, :2].T) / 0.04 - 1)
 
 
-def test_nodes_of_curved_elements_lie_on_the_cylinder_to_fourth_order():
-    """The error of cubic elements decreases with the fourth power of their size, with
-    or without layers.
-    """
+def test_distance_of_curved_elements_from_a_cylinder_is_of_fourth_order():
+    """The order is the same with and without layers."""
     errors = {rings: layers_of_bar(rings, 2 * rings, 3) for rings in (2, 4)}
     for k in range(2):
         coarse, fine = (side_errors(errors[rings][k]).max() for rings in (2, 4))
@@ -82,9 +80,7 @@ def volume(mesh):
 
 
 def test_volume_of_a_round_bar_converges_with_the_sixth_power():
-    """Edges and faces deviate to both sides of an arc, so errors cancel. The error of
-    quadratic elements decreases with the fourth power.
-    """
+    """The error of quadratic elements decreases with the fourth power."""
     exact = np.pi * 0.04**2 * 0.2
     for order, power, least in ((2, 4, 1e-5), (3, 6, 1e-7)):
         error = [
@@ -96,8 +92,8 @@ def test_volume_of_a_round_bar_converges_with_the_sixth_power():
 
 
 @pytest.mark.parametrize("order", [2, 3])
-def test_cutting_layers_does_not_change_volume_and_area_of_curved_elements(order):
-    """Parts are cut in the element's own coordinates."""
+def test_layers_do_not_change_volume_and_area_of_curved_elements(order):
+    """Elements are divided in their reference coordinates."""
     whole, cut = layers_of_bar(2, 4, order)
     assert len(cut.cells) > len(whole.cells)
     assert volume(cut) == pytest.approx(volume(whole), rel=1e-12)
@@ -110,7 +106,7 @@ def shell_volume(inner, outer):
 
 
 def test_volume_of_a_sphere_converges_with_the_sixth_power():
-    """Faces are concave and convex; outline nodes lie on both shapes."""
+    """The part of a shell has a concave and a convex face."""
     error = []
     for n in (1, 2, 4):
         mesh = isoparametric(shell((n, n, n), 0.6, 1.0))
@@ -121,8 +117,8 @@ def test_volume_of_a_sphere_converges_with_the_sixth_power():
 
 @pytest.mark.parametrize(("number", "sign"), [(0, 1), (1, -1)])
 def test_geometry_error_equals_energy_density_times_missing_volume(number, sign):
-    """A constant strain: a concave radius larger by 1e-4 removes volume, a convex one
-    adds it. The energy difference is the energy density times this volume.
+    """The strain is constant. The radius of a face is increased by a factor of 1 +
+    1e-4.
     """
     solid = shell((3, 3, 2), 0.6, 1.0)
     mesh = isoparametric(solid)
@@ -139,7 +135,7 @@ def test_geometry_error_equals_energy_density_times_missing_volume(number, sign)
         errors.append(each[mesh.patch == number].sum() / density)
     taken = sign * SOLID_ANGLE * radius**3 * 1e-4
     assert errors[1] - errors[0] == pytest.approx(taken, rel=1e-5)
-    # what the mesh itself leaves is a hundredth of that
+    # the error of the mesh is smaller by a factor of 100
     assert abs(errors[0]) < 0.02 * abs(taken)
 
 
@@ -149,8 +145,8 @@ THIN = [((2, 2, 1), 0.95), ((4, 4, 1), 0.96), ((5, 5, 1), 0.965), ((8, 8, 1), 0.
 @pytest.mark.parametrize(("counts", "inner"), THIN)
 @pytest.mark.parametrize("order", [2, 3])
 def test_elements_of_thin_walls_are_not_inverted(counts, inner, order):
-    """A face that bulges by a quarter of the wall would invert its tetrahedron. Such
-    elements are straightened, and all have the orientation of their corners."""
+    """Curved faces whose height is a quarter of the wall thickness would invert
+    elements. These elements are straightened."""
     solid = shell(counts, inner, 1.0)
     bent = curved_elements(solid, order)
     assert bent.inverted.any()
@@ -159,13 +155,13 @@ def test_elements_of_thin_walls_are_not_inverted(counts, inner, order):
     _, dN = shape_functions(order, lattice(order) / order)
     J = np.einsum("qai,tax->tqix", dN, bent.nodes[bent.cells])
     assert (np.linalg.det(J) * hand[:, None] > 0).all()
-    # corners stay, and so does what two elements share
+    # corners are not moved
     np.testing.assert_array_equal(bent.nodes[: len(solid.points)], solid.points)
 
 
 @pytest.mark.parametrize(("counts", "inner"), THIN[1:3])
 def test_refining_inverted_elements_more_than_halves_the_volume_error(counts, inner):
-    """Straightened elements deviate from the shape, smaller ones by less than half."""
+    """The volume error is that of the straightened elements."""
     solid = shell(counts, inner, 1.0)
     error = [
         abs(volume(isoparametric(s)) / shell_volume(inner, 1.0) - 1)

@@ -1,4 +1,4 @@
-"""Interfaces whose outline is not a sharp edge."""
+"""Tests of interfaces without a sharp edge."""
 
 from dataclasses import replace
 
@@ -20,28 +20,28 @@ Z = np.array([0.0, 0, 1])
 
 
 def area_of(solid, patch):
-    """[m^2] area of the triangles of a patch."""
+    """Return the area of a patch [m^2]."""
     corners = solid.points[solid.faces[solid.patch == patch]]
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     return np.linalg.norm(across, axis=1).sum() / 2
 
 
 @pytest.mark.parametrize("edge", [0.37, 0.5, 0.52, 0.601])
-def test_face_that_is_cut_along_a_line_has_the_area_up_to_the_line(edge):
-    """The bottom of a unit box belongs to patch 0 up to x = edge, to patch 3 beyond."""
+def test_face_split_along_a_line_has_the_exact_area(edge):
+    """The bottom of a unit box is divided into two patches at x = edge."""
     box = box_solid((4, 3, 3), (1.0, 1.0, 1.0))
     middle = box.points[box.faces].mean(axis=1)
     beyond = (box.patch == 0) & (middle[:, 0] > edge)
     shapes = (*box.shapes, Plane(np.zeros(3), Z))
     solid = replace(box, patch=np.where(beyond, 3, box.patch), shapes=shapes)
     line = np.array([[edge, 1.0, 0], [edge, 0.0, 0]])
-    # seen from below, along the normal -z, counterclockwise
+    # counterclockwise about the normal -z
     outline = smooth_outline(line, np.array([[0, 1]]), -Z[None], (0, 3))
     wall = {outline.patches: outline.wall}
     cut = cut_along(replace(solid, walls=wall), outline)
     assert area_of(cut, 0) + area_of(cut, 3) == pytest.approx(1.0)
     moved = np.abs(cut.points[np.unique(cut.faces[cut.patch == 0])][:, 0]).max() - edge
-    # corners within 0.5 % of the size of the line are left to be moved onto it
+    # corners near the line are not moved here
     assert area_of(cut, 0) == pytest.approx(edge, abs=0.01)
     assert abs(moved) < 0.01
     assert cut.volumes().sum() == pytest.approx(1.0)
@@ -56,8 +56,9 @@ BLOCK = rounded_block((0.06, 0.03), 0.02, [(0.0, 0.0), (0.0, 0.02)], 18)
 FLAT_ENDS = parse_interface("x=-0.06"), parse_interface("x=0.06")
 
 
-def test_interface_without_a_sharp_edge_ends_where_the_rounding_begins(tmp_path):
-    """120 x 60 x 20 mm with corners of 20 mm: each end's flat face is 20 x 20 mm."""
+def test_interface_without_a_sharp_edge_has_the_exact_area(tmp_path):
+    """The block has 120 x 60 x 20 mm and corners with a radius of 20 mm. Its flat ends
+    have 20 x 20 mm."""
     solid = mesh_solid(BLOCK, *FLAT_ENDS, edge=0.014, envelope=1e-3, cache=tmp_path)
     for patch, x in ((0, -0.06), (1, 0.06)):
         corners = solid.points[np.unique(solid.faces[solid.patch == patch])]
@@ -70,8 +71,8 @@ def test_interface_without_a_sharp_edge_ends_where_the_rounding_begins(tmp_path)
 def test_stiffness_of_a_rounded_block_is_symmetric_and_below_an_upper_bound(
     tmp_path,
 ):
-    """Couplings that its mirror planes forbid vanish; 119 142 N m/rad is an upper bound
-    on K_RZ from a conforming mesh of another program.
+    """Entries of K are zero because of symmetry planes. The upper bound on K_RZ is 119
+    142 N m/rad, computed by another program.
     """
     options = FemOptions(0.02, cache=tmp_path)
     link = solve_link(BLOCK, *FLAT_ENDS, [Material(7e10, 0.3)], options=options).link

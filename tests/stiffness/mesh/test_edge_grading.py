@@ -1,4 +1,4 @@
-"""Layers along singular edges are located, conforming and volume-preserving."""
+"""Tests of layers along singular edges."""
 
 import numpy as np
 import pytest
@@ -19,18 +19,18 @@ from tests.solids_for_tests import (
 )
 
 SIZE = np.array([0.2, 0.2, 0.3])
-CLAMPED = [(0, 1), (0,), ()]  # patches: both ends, the base, none
+CLAMPED = [(0, 1), (0,), ()]  # clamped patches: both ends, the base, none
 
 
 def corner_post(counts=(2, 2, 3)):
-    """An L-shaped post, without the quarter beyond x = y = 0.1, with one inner edge."""
+    """Return an L-shaped bar with one re-entrant edge at x = y = 0.1."""
     return with_plane_sides(
         masked_solid(counts, SIZE, lambda c: (c[:, :2] < 0.1).any(axis=1))
     )
 
 
 def on_outline(x):
-    """Check whether points x are on the outline of the L, at any height."""
+    """Return whether points are on the outline of the L."""
     near = np.abs(x[..., :2] - 0.1) < 1e-9
     inner = near & (x[..., 1::-1] > 0.1 - 1e-9)
     outer = (np.abs(x[..., :2]) < 1e-9) | (np.abs(x[..., :2] - 0.2) < 1e-9)
@@ -38,8 +38,9 @@ def on_outline(x):
 
 
 @pytest.mark.parametrize("held", CLAMPED)
-def test_the_singular_edges_of_an_l_are_its_clamped_outlines_and_the_inner_edge(held):
-    """Eight edges around each end that is clamped, three along the inner edge."""
+def test_singular_edges_of_an_l_shape_are_found(held):
+    """There are eight edges around each clamped end, and three along the re-entrant
+    edge."""
     solid = corner_post()
     edges = {tuple(edge) for edge in singular_edges(solid, held)}
     ends, _ = edges_of(solid.cells, len(solid.points))
@@ -52,7 +53,7 @@ def test_the_singular_edges_of_an_l_are_its_clamped_outlines_and_the_inner_edge(
 
 
 def check_layers(solid, held):
-    """Check that parts conform, keep their patches, and fill their tetrahedra."""
+    """Check that parts are conforming and have the volume of their tetrahedra."""
     parts = layered(solid, held)
     mesh = isoparametric(solid, 2, parts)
     faces, count = np.unique(
@@ -70,7 +71,7 @@ def check_layers(solid, held):
         assert area[1] == pytest.approx(area[0], rel=1e-12)
         places = mesh.nodes[mesh.faces[mesh.patch == patch]].reshape(-1, 3)
         assert np.abs(solid.shapes[patch].signed(places)[0]).max() < 1e-12
-    # parts of a tetrahedron together are as large as it
+    # the volume of a tetrahedron is the sum of the volumes of its parts
     volume = np.zeros(len(solid.cells))
     for chunk in integration(mesh):
         np.add.at(volume, parts.parent[chunk.part], chunk.w.sum(axis=1))
@@ -83,10 +84,8 @@ def check_layers(solid, held):
     kept=st.lists(st.booleans(), min_size=12, max_size=12).filter(any),
     held=st.sampled_from(CLAMPED),
 )
-def test_layers_of_any_union_of_boxes_are_conforming_and_preserve_the_volume(
-    kept, held
-):
-    """This includes bodies that touch in an edge or a corner, holes and steps."""
+def test_layers_in_any_union_of_boxes_are_conforming(kept, held):
+    """The volume is preserved. Boxes may touch in an edge or a corner."""
     counts = np.array([3, 2, 2])
 
     def keep(centers):

@@ -1,4 +1,4 @@
-"""Meshes fitted to the patches of a surface, and rejected meshes."""
+"""Tests of the assignment of meshes to the patches of a surface."""
 
 import numpy as np
 import pytest
@@ -21,21 +21,23 @@ ENDS = parse_interface("z=0"), parse_interface("z=0.1")
 @pytest.mark.parametrize("stretch", [0.979, 1.021])
 def test_mesh_of_another_volume_is_rejected(stretch):
     made = box_solid((2, 2, 2), (0.1, 0.1, 0.1 * stretch))
-    with pytest.raises(MeshFailed, match="the mesh has 0.00.* the surface encloses"):
+    with pytest.raises(
+        MeshFailed, match="the volume of the mesh is 0.00.* inside the surface"
+    ):
         fit_to_patches(made.points, made.cells, SURFACE, find_patches(SURFACE, *ENDS))
 
 
 @pytest.mark.parametrize(("other", "missing"), [(1, "base"), (0, "tip"), (2, "base")])
 def test_a_mesh_without_a_face_on_an_interface_is_rejected(other, missing):
     made = box_solid((2, 2, 2), (0.1, 0.1, 0.1))
-    far = Plane(50 * Z, Z)  # out of every corner's reach
+    far = Plane(50 * Z, Z)  # no corner is near this plane
     patches = Patches(np.full(len(CUBE_TRIANGLES), other), (far, far, far))
     with pytest.raises(BadInput, match=f"no face of the mesh on the {missing}"):
         fit_to_patches(made.points, made.cells, SURFACE, patches)
 
 
-def test_fit_reorients_inverted_cells_and_drops_unused_points():
-    """The solid equals that of well-ordered cells; it lies far from the origin."""
+def test_fit_reorients_inverted_tetrahedra_and_removes_unused_points():
+    """The solid is far from the origin."""
     far = np.array([3.0, -2.0, 1.0])
     rng = np.random.default_rng(7)
     made = box_solid((2, 2, 2), (0.1, 0.1, 0.1))

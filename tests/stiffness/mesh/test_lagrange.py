@@ -1,4 +1,4 @@
-"""Lagrange polynomials on tetrahedra: lattice values, derivatives, shared nodes."""
+"""Tests of Lagrange polynomials on tetrahedra."""
 
 from math import prod
 
@@ -19,9 +19,7 @@ def inside(rng, corners, count=20):
 
 @pytest.mark.parametrize("corners", CORNERS)
 @pytest.mark.parametrize("degree", ORDERS)
-def test_shape_functions_are_one_at_their_own_point_and_zero_at_all_others(
-    degree, corners
-):
+def test_shape_functions_are_one_at_one_node_and_zero_at_others(degree, corners):
     N, _ = shape_functions(degree, lattice(degree, corners) / degree)
     np.testing.assert_allclose(N, np.eye(len(N)), atol=1e-15)
 
@@ -31,7 +29,7 @@ def test_shape_functions_are_one_at_their_own_point_and_zero_at_all_others(
 def test_shape_functions_represent_every_polynomial_of_their_degree(
     rng, degree, corners
 ):
-    """They sum to one, and their derivatives to zero."""
+    """The sum of the functions is one, and the sum of their derivatives is zero."""
     L = inside(rng, corners)
     N, dN = shape_functions(degree, L)
     np.testing.assert_allclose(N.sum(axis=1), 1, rtol=1e-13)
@@ -45,8 +43,8 @@ def test_shape_functions_represent_every_polynomial_of_their_degree(
 @pytest.mark.parametrize("corners", CORNERS)
 @pytest.mark.parametrize("degree", ORDERS)
 def test_derivatives_of_shape_functions_equal_central_differences(rng, degree, corners):
-    """For a cubic the error is the squared step over 6 times the third derivative,
-    which is at most 27: 1e-9 at a step of 1e-5."""
+    """The error of a central difference is at most 27 / 6 times the squared step of
+    1e-5."""
     L, step = inside(rng, corners), 1e-5
     _, dN = shape_functions(degree, L)
     for k in range(1, corners):
@@ -59,9 +57,7 @@ def test_derivatives_of_shape_functions_equal_central_differences(rng, degree, c
 
 @pytest.mark.parametrize("order", [2, 3])
 def test_shared_node_has_the_same_position_in_every_element(order):
-    """This holds for any order of the corners; a box has as many nodes as its finer
-    grid.
-    """
+    """This includes any order of the corners."""
     solid = box_solid((2, 3, 2), (0.1, 0.2, 0.3))
     mesh = isoparametric(solid, order)
     assert len(mesh.nodes) == prod(order * n + 1 for n in (2, 3, 2))

@@ -1,4 +1,4 @@
-"""Tetrahedral meshes: fitted to shapes, cached, or rejected."""
+"""Tests of tetrahedral meshes and their cache."""
 
 import io
 import subprocess
@@ -20,13 +20,13 @@ FACES = parse_interface("z=0"), parse_interface("z=0.1")
 
 
 def kuhn_cube(n):
-    """A cube of side 0.1 m, without a mesher."""
+    """Return a mesh of a cube with a side of 0.1 m."""
     return box_solid((n, n, n), (0.1, 0.1, 0.1))
 
 
 @pytest.mark.slow
 def test_meshed_bar_has_flat_ends_and_corners_on_its_cylinder(tmp_path):
-    """The bar has 24 facets; a second call reads the same mesh from the cache."""
+    """A second call returns the same mesh from the cache."""
     solid = mesh_solid(bar(facets=24), *FACES, edge=0.02, cache=tmp_path)
     assert solid.volumes().min() > 0
     for number, height in ((0, 0.0), (1, 0.1)):
@@ -34,14 +34,14 @@ def test_meshed_bar_has_flat_ends_and_corners_on_its_cylinder(tmp_path):
         np.testing.assert_allclose(corners[..., 2], height, atol=1e-12)
     side = solid.points[solid.faces[solid.patch == 2]]
     np.testing.assert_allclose(np.hypot(side[..., 0], side[..., 1]), 0.02, rtol=1e-9)
-    # a second time it comes from the cache, so it is the same to the bit
+    # the mesh from the cache is bit-identical
     again = mesh_solid(bar(facets=24), *FACES, edge=0.02, cache=tmp_path)
     np.testing.assert_array_equal(again.points, solid.points)
     assert [p.suffix for p in tmp_path.iterdir()] == [".npz"]
 
 
 def npz(**arrays):
-    """A file of arrays, as in the cache."""
+    """Return the content of a file in the cache."""
     file = io.BytesIO()
     np.savez(file, **arrays)
     return file.getvalue()
@@ -83,7 +83,7 @@ def test_damaged_mesh_in_the_cache_is_replaced(tmp_path, monkeypatch, damage):
 def test_failed_mesher_is_reported_with_its_last_output(
     tmp_path, monkeypatch, status, words, told
 ):
-    """The mesher finds no solid, or it crashes."""
+    """The mesher returns no mesh, or it crashes."""
 
     def mesher(command, **_):
         if status == 0:
@@ -98,8 +98,8 @@ def test_failed_mesher_is_reported_with_its_last_output(
 
 
 def test_mesher_is_stopped_at_its_time_limit(tmp_path):
-    """0.05 s is less than the start-up time of a Python process."""
-    with pytest.raises(MeshFailed, match=r"no mesh within 0.05 s"):
+    """The time limit is less than the start-up time of a Python process."""
+    with pytest.raises(MeshFailed, match=r"not finished within 0.05 s"):
         mesh_solid(bar(), *FACES, time_limit=0.05, cache=tmp_path)
     assert list(tmp_path.iterdir()) == []
 
@@ -109,9 +109,7 @@ def test_mesher_is_stopped_at_its_time_limit(tmp_path):
     not mesh_module._SAME_NUMBERS.exists(), reason="the C++ library is not GNU's"
 )
 def test_same_surface_has_the_same_mesh_in_every_cache(tmp_path):
-    """Two runs with different caches agree; a different edge length changes
-    the mesh.
-    """
+    """A different edge length results in a different mesh."""
     one, again, other = (
         mesh_solid(bar(), *FACES, edge=edge, cache=tmp_path / str(number))
         for number, edge in enumerate((0.03, 0.03, 0.029))
@@ -122,7 +120,7 @@ def test_same_surface_has_the_same_mesh_in_every_cache(tmp_path):
 
 
 def test_mesh_with_a_missing_column_is_rejected(tmp_path, monkeypatch):
-    """One of 64 columns of the cube is missing: a hole of 1.6 % of the volume."""
+    """The missing column has 1.6 % of the volume of the cube."""
     cube = kuhn_cube(8)
     place = np.floor(cube.points[cube.cells].mean(axis=1) / 0.0125)
     whole = ~((place[:, 0] == 3) & (place[:, 1] == 4))
@@ -136,9 +134,7 @@ def test_mesh_with_a_missing_column_is_rejected(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("name", ["distal_plain", "delta_forearm", "l_bracket"])
 def test_coarser_surface_has_fewer_triangles_and_the_same_volume(name):
-    """The coarse surface is close to the part, with as many holes and the same volume
-    within 1 %. The bracket requires all of its triangles.
-    """
+    """The numbers of holes are equal. All triangles of the bracket are necessary."""
     import pyvista as pv
 
     surface = read_surface(Path(__file__).parents[3] / "meshes" / f"{name}.stl")
@@ -152,15 +148,15 @@ def test_coarser_surface_has_fewer_triangles_and_the_same_volume(name):
     assert coarse.volume == pytest.approx(surface.volume, rel=0.01)
     ways = euler_characteristic(surface.triangles)
     assert euler_characteristic(coarse.triangles) == ways
-    # no corner is farther from the part than the tolerance, by another method
+    # the distances of the corners are computed by VTK
     mesh = pv.PolyData.from_regular_faces(surface.points, surface.triangles)
     apart = pv.PolyData(points).compute_implicit_distance(mesh)["implicit_distance"]
     assert np.abs(apart).max() < 4e-4
 
 
-def test_faces_of_a_mesh_belong_to_the_patches_that_they_lie_on():
-    """Faces at the ends point along the bar, faces of the side across it;
-    their corners lie on it."""
+def test_boundary_faces_are_assigned_to_their_patches():
+    """Normals at the ends are along the axis of the bar, and normals at the side are
+    radial."""
     surface = bar()
     made = bar_solid(5, 4, 0.02, 0.1)
     solid = fit_to_patches(

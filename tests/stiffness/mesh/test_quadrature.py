@@ -1,4 +1,4 @@
-"""Quadrature rules for triangles and tetrahedra."""
+"""Tests of quadrature rules."""
 
 from math import factorial, prod
 
@@ -14,8 +14,8 @@ CORNERS = (3, 4)
 @pytest.mark.parametrize("corners", CORNERS)
 @pytest.mark.parametrize("degree", range(1, 7))
 def test_quadrature_rules_are_positive_and_integrate_monomials_exactly(degree, corners):
-    """The integral of a product of L_c^p_c is d! product(p_c!) / (d + sum p_c)! times
-    the size, 1 / d! in d dimensions; the tables have 14 digits."""
+    """In d dimensions, the mean of the product of L_c^p_c is d! product(p_c!) / (d +
+    sum p_c)!. Tabulated values have 14 digits."""
     L, weights = quadrature(degree, corners)
     assert (weights > 0).all()
     assert (L >= 0).all()
@@ -28,5 +28,5 @@ def test_quadrature_rules_are_positive_and_integrate_monomials_exactly(degree, c
 
 @pytest.mark.parametrize("corners", CORNERS)
 def test_degree_without_a_quadrature_rule_is_rejected(corners):
-    with pytest.raises(ValueError, match="degree is 7, expected one up to 6"):
+    with pytest.raises(ValueError, match="degree: found 7, expected at most 6"):
         quadrature(7, corners)

@@ -1,4 +1,4 @@
-"""Refinement by bisection: boundary, patches and number of halvings."""
+"""Tests of the refinement by bisection."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ from tests.solids_for_tests import bar_solid, box_solid
 
 
 def crooked(rng):
-    """A box with all corners shifted, so that no two edges have equal length."""
+    """Return a mesh of a box with random shifts of all corners."""
     solid = box_solid((2, 2, 2), (1.0, 1.0, 1.0))
     points = solid.points + 0.05 * rng.uniform(-1, 1, solid.points.shape)
     return Solid(points, solid.cells, solid.faces, solid.patch, (None,) * 3)
@@ -18,10 +18,8 @@ def crooked(rng):
 
 @pytest.mark.parametrize("solid", [crooked(np.random.default_rng(1)),
                                    bar_solid(2, 4, 0.02, 0.1)])  # fmt: skip
-def test_refined_faces_stay_on_the_boundary_of_their_patch_and_point_outward(solid):
-    """The sum of face vectors is preserved on patches of unknown shape; the side of a
-    bar stays on its circle, and no end shrinks.
-    """
+def test_refined_boundary_faces_stay_on_their_patch(solid):
+    """On patches of unknown shape, the sum of area vectors does not change."""
     asked = np.random.default_rng(2).integers(1, 4, len(solid.cells))
     finer = refine(solid, asked).solid
     assert finer.volumes().min() > 0
@@ -49,8 +47,8 @@ def test_refined_faces_stay_on_the_boundary_of_their_patch_and_point_outward(sol
 
 
 @pytest.mark.parametrize("halvings", [0, 1, 2, 4])
-def test_every_part_of_a_cell_is_bisected_as_often_as_requested(rng, halvings):
-    """Requested cells are halved at least as often; other cells only for conformity."""
+def test_tetrahedra_are_bisected_as_often_as_requested(rng, halvings):
+    """Other tetrahedra are bisected only for a conforming mesh."""
     solid = crooked(rng)
     asked = np.zeros(len(solid.cells), dtype=int)
     asked[7] = halvings

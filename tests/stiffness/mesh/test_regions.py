@@ -1,4 +1,4 @@
-"""Regions of another material, along whose faces the mesh is cut."""
+"""Tests of regions of different materials."""
 
 from dataclasses import replace
 
@@ -26,7 +26,8 @@ CENTERS = np.array([[0.015, 0.015, 0.0], [0.015, 0.015, 0.05]])
 
 
 def block():
-    """30 x 30 x 50 mm in elements whose corners are not on the layer's faces."""
+    """Return a mesh of a block of 30 x 30 x 50 mm. No corners are on the faces of the
+    layer."""
     return with_plane_sides(box_solid((3, 3, 4), SIZE))
 
 
@@ -40,10 +41,8 @@ def layer(contrast):
     pytest.param("x=0.004..0.0227,y=0.009..0.0203,z=0.013..0.0371",
                  (0.0187, 0.0113, 0.0241), marks=pytest.mark.slow),
 ])  # fmt: skip
-def test_mesh_is_cut_along_the_faces_of_a_box(region, size):
-    """The elements of the region fill its volume, and all other elements are
-    unchanged.
-    """
+def test_tetrahedra_are_split_along_the_faces_of_a_box(region, size):
+    """The volume of the region is exact, and elements elsewhere do not change."""
     regions = regions_of([
         Material(E, 0.3),
         parse_part("--part", f"{region}/young=1e9,poisson=0.3"),
@@ -55,8 +54,8 @@ def test_mesh_is_cut_along_the_faces_of_a_box(region, size):
     assert volumes[inside].sum() == pytest.approx(np.prod(size), rel=1e-9)
 
 
-def test_material_edges_of_a_layer_go_around_the_block():
-    """The edges form two squares with sides of 30 mm at the layer's faces."""
+def test_boundary_edges_between_materials_are_found():
+    """The edges form two squares around the block at the faces of the layer."""
     regions = regions_of([Material(E, 0.3), layer(10)])
     cut = cut_by_regions(block(), regions)
     start, end = cut.points[material_edges(cut, regions)].swapaxes(0, 1)
@@ -65,8 +64,8 @@ def test_material_edges_of_a_layer_go_around_the_block():
 
 
 @pytest.mark.parametrize("contrast", [0.01, 10, 1e4])
-def test_material_layers_in_series_stretch_like_springs(contrast):
-    """Without Poisson's ratio the stress is uniform: L / E A of the layers add up."""
+def test_material_layers_have_the_stiffness_of_springs_in_series(contrast):
+    """With zero Poisson's ratio, the compliance is the sum of L / E A of the layers."""
     materials = [Material(E, 0.0), layer(contrast)]
     solid = cut_by_regions(block(), regions_of(materials))
     K = solve_level(solid, materials, CENTERS, "rigid").solution.stiffness
@@ -75,9 +74,8 @@ def test_material_layers_in_series_stretch_like_springs(contrast):
 
 
 @pytest.mark.parametrize("contrast", [0.1, 10, 100])
-def test_estimated_error_covers_a_material_boundary_that_cuts_elements(contrast):
-    """The layer is a function of the points alone,
-    so the mesh is not cut along its faces."""
+def test_estimated_error_covers_a_material_boundary_inside_elements(contrast):
+    """The layer is given without faces, so elements are not split."""
     jagged = replace(layer(contrast), faces=())
     materials = [Material(E, 0.0), jagged]
     level = solve_level(block(), materials, CENTERS, "rigid")

@@ -1,4 +1,4 @@
-"""Slender and thin-walled bars, meshed by extrusion."""
+"""Tests of meshes of slender and thin-walled bars."""
 
 import numpy as np
 import pytest
@@ -17,12 +17,12 @@ G = E / (2 + 2 * NU)
 
 
 def tube(outer, inner, length):
-    """A tube along z."""
+    """Return the surface of a tube along z."""
     return revolved([outer, outer, inner, inner], [0, length, length, 0], 48, True)
 
 
 def box(width, height, length):
-    """A solid bar along z."""
+    """Return the surface of a solid bar along z."""
     x, y = width / 2, height / 2
     points = np.array([
         [i, j, k] for i in (-x, x) for j in (-y, y) for k in (0, length)
@@ -47,8 +47,8 @@ def ends(length):
 def test_stiffness_of_a_rod_and_a_thin_tube_agrees_with_closed_forms(
     surface, length, J, A, tmp_path
 ):
-    """Torsion is exact between rigid ends. In tension, the ends cannot contract, so K
-    exceeds E A / L by at most the ratio of width to length.
+    """Torsion is exact. In tension, the rigid ends cannot contract, so K exceeds E A /
+    L by at most the ratio of width to length.
     """
     options = FemOptions(0.01, cache=tmp_path)
     link = solve_link(surface, *ends(length), [Material(E, NU)], options=options).link
@@ -60,8 +60,8 @@ def test_stiffness_of_a_rod_and_a_thin_tube_agrees_with_closed_forms(
     assert 1 - error < stretch < 1.01 + error
 
 
-def test_slender_bar_mesh_follows_a_turned_and_moved_surface():
-    """Checks the volume, the centre, and the ends on the interfaces."""
+def test_slender_bar_mesh_has_the_pose_of_its_surface():
+    """The volume, the centre and the positions of the ends are compared."""
     turn = rotation_matrix(np.array([0.3, -0.7, 1.1]))
     shift = np.array([0.2, -0.1, 0.4])
     for made, area in ((box(0.002, 0.005, 0.4), 1e-5), (tube(0.01, 0.0097, 0.4), None)):
@@ -80,8 +80,8 @@ def test_slender_bar_mesh_follows_a_turned_and_moved_surface():
 
 
 def twisted_tube(outer, inner, length, facets=48, levels=4):
-    """A tube whose rings are rotated by half a facet from level to level, as in STEP
-    files. No triangle edge is parallel to the axis.
+    """Return the surface of a tube with no triangle edges along the axis, as in STEP
+    files.
     """
     step = 2 * np.pi / facets
     rings = [(outer, k) for k in range(levels)]
@@ -110,7 +110,8 @@ def test_thin_tube_with_corners_between_its_ends_is_extruded():
 
 
 def test_slender_bar_mesh_is_not_used_for_other_parts():
-    """The parts are a stubby bar, a tapered bar, a short tube, and a side interface."""
+    """The parts are a short bar, a tapered bar, a short tube, and a bar with an
+    interface on its side."""
     stubby = check_surface(*cylinder(0.02, 0.1), "bar")
     assert slender_bar(stubby, *ends(0.1)) is None
     tapered = check_surface(*cylinder(1e-3, 1.0, 32, 0.8e-3), "taper")

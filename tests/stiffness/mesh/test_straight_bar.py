@@ -1,4 +1,4 @@
-"""Extruded bars are closed and filled, and have the textbook stiffness."""
+"""Tests of meshes of straight bars."""
 
 import numpy as np
 import pytest
@@ -24,7 +24,7 @@ SECTIONS = [
 
 @pytest.mark.parametrize("section", SECTIONS, ids=lambda section: "-".join(section))
 def test_straight_bar_mesh_is_closed_and_has_exact_volume_and_ends(section):
-    """Volume and ends are exact, except that chords replace circles."""
+    """The reference has chords in place of arcs."""
     solid = straight_bar(section)
     area = declared_section(section, 0.3).area
     assert (solid.volumes() > 0.0).all()
@@ -52,21 +52,19 @@ def test_no_element_of_a_round_bar_is_inverted(section):
     "section", [ROUND, {"radius": 0.3}, pytest.param(THIN, marks=pytest.mark.slow)]
 )
 def test_torsion_of_round_bars_and_tubes_equals_the_textbook_value(section):
-    """G J / L, because round sections do not warp and held ends have no effect."""
+    """The stiffness is G J / L, because round sections do not warp."""
     options = FemOptions(0.01, budget=Budget(unknowns=60_000))
     link = solve_bar(section, Material(1.0, 0.3), options).link
     J = declared_section(section, 0.3).J
     assert link.mesh["reached"]
     assert link.stiffness[2, 2] == pytest.approx(J / 2.6, rel=2e-3)
     assert link.stiffness[2, 2] / (J / 2.6) - 1 < link.relative_error_estimate
-    # held ends cannot contract: stiffer than E A / L, by no more than 10 per cent
+    # clamped ends cannot contract, so K exceeds E A / L by at most 10 %
     assert 1.0 < link.stiffness[5, 5] / declared_section(section, 0.3).area < 1.1
 
 
-def test_square_bar_bends_equally_about_both_axes_within_its_estimated_error():
-    """On a mesh for a tenth of the accuracy, K decreases by no more than the estimated
-    error.
-    """
+def test_bending_stiffness_of_a_square_bar_is_equal_about_both_axes():
+    """On a finer mesh, K is less by at most the estimated error."""
     coarse, fine = (
         solve_bar(
             {"width": 0.2, "height": 0.2}, Material(1.0, 0.3),

@@ -1,4 +1,4 @@
-"""Link libraries: building, resuming, reading, interpolation and export."""
+"""Tests of libraries of links."""
 
 import csv
 import io
@@ -85,8 +85,7 @@ def test_two_processes_build_all_library_entries(spec):
 
 
 def test_estimated_error_between_grid_points_covers_the_true_error(spec, rng):
-    """The stiffness is nearly a power of the lengths:
-    a grid of three points gives 2 %."""
+    """A grid with three points in each direction results in an error of 2 %."""
     build_library(spec)
     entries = read_library(spec.folder)
     for _ in range(20):
@@ -119,12 +118,12 @@ def test_grid_with_a_missing_entry_is_rejected(spec):
     files = build_library(spec)
     files[0].unlink()
     wanted = {"length": 0.3, "radius": 0.02, "young": 6e10, "poisson": 0.3}
-    with pytest.raises(BadInput, match="do not fill a grid"):
+    with pytest.raises(BadInput, match="grid of parameters is incomplete"):
         look_up(read_library(spec.folder), wanted)
 
 
-def test_entry_with_other_parameters_is_rejected_by_name(spec):
-    """One key was renamed by hand, or the folder contains entries of two libraries."""
+def test_entry_with_other_parameters_is_rejected(spec):
+    """A parameter was renamed, or the folder contains entries of two libraries."""
     build_library(spec)
     *others, last = read_library(spec.folder)
     renamed = {"*" if k == "young" else k: v for k, v in last.parameters.items()}
@@ -135,7 +134,7 @@ def test_entry_with_other_parameters_is_rejected_by_name(spec):
 
 
 def changed(change):
-    """Return the text of an entry with a change."""
+    """Return the changed text of an entry."""
 
     def text(whole):
         content = json.loads(whole)
@@ -152,7 +151,7 @@ FORCES_FIRST = ["FX", "FY", "FZ", "MX", "MY", "MZ"]
     (lambda _: "rubbish", "damaged entry"),
     (lambda _: "[]", "damaged entry"),
     (lambda _: "[" * 100_000, "damaged entry"),
-    (lambda _: "{}", 'found no entry of a library; expected format "forcefit link 1"'),
+    (lambda _: "{}", 'entry of a library; expected the format "forcefit link 1"'),
     (lambda _: '{"format": "forcefit link 1"}', "damaged entry (KeyError)"),
     (changed(lambda entry: entry.update(wrench=FORCES_FIRST)),
      "the components in another order, expected RX"),
@@ -220,7 +219,7 @@ def test_library_commands_build_entries_and_read_them(run, tmp_path):
         assert (status, message in err) == (2, True)
 
 
-def test_stiffness_for_other_programs_has_translations_first():
+def test_exported_stiffness_has_translations_before_rotations():
     K = exact(0.3, 0.02)
     swapped = translations_first(K)
     assert swapped[0, 0] == K[3, 3]
@@ -231,7 +230,7 @@ def test_stiffness_for_other_programs_has_translations_first():
     lines = stiffness_for("mapdl", K).splitlines()[1:]
     numbers = [float(v) for line in lines for v in line.split(",")[-6:]]
     assert len(numbers) == 78
-    # the lower triangle of [[K, -K], [-K, K]]: last row ends with K[5, 5]
+    # the last entry of the lower triangle of [[K, -K], [-K, K]] is K[5, 5]
     assert numbers[-1] == pytest.approx(swapped[5, 5])
     assert numbers[0] == pytest.approx(swapped[0, 0])
     with pytest.raises(BadInput, match='did you mean "adams"'):
@@ -252,8 +251,8 @@ def test_library_of_finite_elements_has_stiffness_and_mass_of_the_bar(tmp_path):
 
 
 SHIPPED = EXAMPLE.parent / "stiffness_library"
-# diagonal RX, RZ, TX, TZ of links between the entries that ship, by Fourier modes in
-# their half section (benchmarks/evidence/stiffness_round_references.py), good to 1e-6
+# Stiffnesses RX, RZ, TX and TZ of links between the entries of the distributed library,
+# computed with an error of 1e-6 by benchmarks/evidence/stiffness_round_references.py
 BETWEEN = {
     ("round", 0.25): (137442.8, 26455.52, 6526643.0, 355428100.0),
     ("round", 0.37): (94455.39, 17875.35, 2061490.0, 239366500.0),
@@ -265,10 +264,8 @@ BETWEEN = {
 
 
 @pytest.mark.parametrize("shape", SHAPES)
-def test_build_file_of_each_shape_is_distributed_with_its_entries(shape):
-    """The keys are those that a build would create, and the folder has an entry for
-    each.
-    """
+def test_distributed_library_contains_all_entries_of_its_build_file(shape):
+    """The keys are compared with those that a build would create."""
     spec = read_spec(SHIPPED / f"{shape}.toml")
     assert (spec.shape, spec.method) == (shape, "fea")
     entries = read_library(SHIPPED / shape)
@@ -280,9 +277,7 @@ def test_build_file_of_each_shape_is_distributed_with_its_entries(shape):
 
 
 @pytest.mark.parametrize(("shape", "length"), BETWEEN)
-def test_interpolation_error_estimate_bounds_the_error_against_another_stiffness(
-    shape, length
-):
+def test_estimated_interpolation_error_covers_the_true_error(shape, length):
     K, error = look_up(read_library(SHIPPED / shape), {"length": length})
     i = [0, 2, 3, 5]
     exact = np.array(BETWEEN[shape, length])
@@ -292,9 +287,9 @@ def test_interpolation_error_estimate_bounds_the_error_against_another_stiffness
 
 
 @pytest.mark.parametrize("shape", ["rectangle", "box"])
-def test_shipped_square_links_are_slightly_stiffer_than_their_beams(shape):
-    """Held ends add up to 0.3 b / L in bending. No entry is softer than the Timoshenko
-    beam except a box in torsion, whose corners Bredt's formula neglects.
+def test_distributed_square_links_are_slightly_stiffer_than_beams(shape):
+    """Rigid ends increase the bending stiffness by at most 0.3 b / L. Only a box in
+    torsion is more compliant than its beam.
     """
     K, _ = look_up(read_library(SHIPPED / shape), {"length": 0.37})
     lengths = read_spec(SHIPPED / f"{shape}.toml").grid

@@ -1,4 +1,4 @@
-"""Families of CAD parts: a table of files and sizes, and interpolation."""
+"""Tests of families of parts in libraries."""
 
 import numpy as np
 import pytest
@@ -25,7 +25,8 @@ LENGTHS = (0.2, 0.3, 0.4, 0.5, 0.6)
 
 @pytest.fixture
 def parts(tmp_path, monkeypatch):
-    """A folder with the files of five rods, each solved in closed form."""
+    """Return a folder with the surfaces of five rods, whose stiffness is computed by
+    beam theory."""
     asked = []
 
     def solve(link):
@@ -52,10 +53,10 @@ def test_each_row_of_a_family_table_becomes_an_entry_with_its_sizes(parts):
     entries = read_library(folder / "links")
     assert entries[2].parameters["length"] == 0.4
     build_library(read_spec(folder / "spec.toml"))
-    assert len(asked) == len(LENGTHS)  # nothing is made again
+    assert len(asked) == len(LENGTHS)  # no entry is computed again
 
 
-def test_build_recomputes_only_the_row_whose_file_changed(parts):
+def test_build_recomputes_only_the_part_whose_file_changed(parts):
     folder, asked = parts
     build_library(read_spec(folder / "spec.toml"))
     (folder / "rod1.stl").write_text("solid changed")
@@ -77,7 +78,7 @@ def test_estimated_error_covers_an_omitted_entry(parts):
     folder, _ = parts
     build_library(read_spec(folder / "spec.toml"))
     entries = read_library(folder / "links")
-    for left in entries[1:-1]:  # those between others
+    for left in entries[1:-1]:  # entries between two others
         others = [one for one in entries if one is not left]
         K, error = look_up(others, {"length": left.parameters["length"]})
         gap = np.abs(scaled(K - left.stiffness, left.stiffness))
@@ -92,7 +93,7 @@ def test_estimated_error_covers_an_omitted_entry(parts):
     ("0.3,0.02", "-0.3,0.02", "line 3, length: found '-0.3', expected a length"),
     ("0.3,0.02", "0.2,0.02", '"rod-length0.2-radius0.02" twice'),
 ])  # fmt: skip
-def test_wrong_family_table_is_rejected_in_one_line(parts, old, new, message):
+def test_wrong_family_table_is_rejected(parts, old, new, message):
     folder, _ = parts
     table = folder / "rods.csv"
     table.write_text(table.read_text().replace(old, new, 1))
@@ -114,7 +115,7 @@ def test_library_of_several_families_requires_a_family_name(parts):
     (folder / "spec.toml").write_text(SPEC + "[[family]]" + second)
     build_library(read_spec(folder / "spec.toml"))
     entries = read_library(folder / "links")
-    with pytest.raises(BadInput, match="found families bar, rod, expected one"):
+    with pytest.raises(BadInput, match="found the families bar, rod, expected"):
         look_up(entries, {"length": 0.3})
     with pytest.raises(BadInput, match='no family "rood"'):
         look_up(entries, {"length": 0.3}, "rood")

@@ -1,4 +1,4 @@
-"""Library entries for parts given by surfaces."""
+"""Tests of library entries for parts given by surfaces."""
 
 import csv
 import hashlib
@@ -48,13 +48,13 @@ density = 2700
 
 @pytest.fixture(scope="module")
 def cache(tmp_path_factory):
-    """Mesh cache, so that each mesh is created once."""
+    """Return a folder for meshes, so that each mesh is created only once."""
     return tmp_path_factory.mktemp("meshes")
 
 
 @pytest.fixture
 def bar_stl(tmp_path, monkeypatch, cache):
-    """A square bar of 20 x 20 x 80 mm, in a file of millimetres."""
+    """Write the surface of a square bar of 20 x 20 x 80 mm to a file."""
     pyvista = pytest.importorskip("pyvista")
     monkeypatch.setenv("FORCEFIT_CACHE", str(cache))
     bar = shape_surface("rectangle", {"length": 0.08, "width": 0.02, "height": 0.02})
@@ -67,7 +67,7 @@ def bar_stl(tmp_path, monkeypatch, cache):
 def test_surface_entry_has_the_digest_of_its_file_and_an_error_estimate(
     bar_stl, tmp_path
 ):
-    """Held ends make a bar of L / r = 7 stiffer than its beam by less than 10 %."""
+    """The bar with L / r = 7 is stiffer than its beam by less than 10 %."""
     spec = tmp_path / "spec.toml"
     spec.write_text(LINKS)
     command = ["library", str(spec), "--json", "-"]
@@ -87,7 +87,7 @@ def test_surface_entry_has_the_digest_of_its_file_and_an_error_estimate(
     assert np.abs(scaled(inverted(compliance) - entry.stiffness, beam)).max() < 1e-12
     row = next(csv.DictReader(io.StringIO(library_csv([entry]))))
     assert (row["key"], float(row["young"])) == ("bar", 6e10)
-    with pytest.raises(BadInput, match="only entries of single surfaces, expected"):
+    with pytest.raises(BadInput, match="only single parts, expected"):
         look_up([entry], {"young": 6e10})
 
 
@@ -151,9 +151,7 @@ def test_wrong_surface_table_of_a_build_file_is_rejected(
     assert message in str(caught.value)
 
 
-def test_surface_without_its_interface_is_rejected_and_nothing_is_written(
-    bar_stl, tmp_path
-):
+def test_surface_without_a_given_interface_is_rejected(bar_stl, tmp_path):
     spec = tmp_path / "spec.toml"
     spec.write_text(LINKS.replace("z=0.08", "z=0.09"))
     with pytest.raises(BadInput, match='link "bar": .*tip'):
@@ -162,7 +160,7 @@ def test_surface_without_its_interface_is_rejected_and_nothing_is_written(
 
 
 def test_step_file_becomes_a_library_entry(tmp_path, monkeypatch, cache):
-    """A brick from gmsh's kernel, in millimetres as stated in the file."""
+    """The part is a block in millimetres."""
     gmsh = pytest.importorskip("gmsh", exc_type=(ImportError, OSError))
     monkeypatch.setenv("FORCEFIT_CACHE", str(cache))
     gmsh.initialize(interruptible=False)

@@ -1,4 +1,4 @@
-"""HTML report on a link computed by finite elements."""
+"""Tests of the HTML report on a link."""
 
 from dataclasses import replace
 
@@ -20,7 +20,7 @@ MESH = {
 
 
 def bar(**mesh):
-    """A round bar along x, as if it had been computed by finite elements."""
+    """Return a round bar along x with the attributes of a finite element result."""
     return LinkStiffness(
         "finite elements",
         beam_compliance(LENGTH, round_section(RADIUS, 0.3), YOUNG, 0.3),
@@ -29,8 +29,8 @@ def bar(**mesh):
 
 
 def test_page_of_a_bar_shows_its_stiffness_and_compliance():
-    """Stretching: E A / L; torsion with nu = 0.3: E / 2.6 J / L; both are the only
-    entries in their rows.
+    """The tensile stiffness is E A / L. The torsional stiffness is E / 2.6 J / L for nu
+    = 0.3.
     """
     text = link_page(bar(), Provenance())
     area, polar = np.pi * RADIUS**2, np.pi * RADIUS**4 / 2
@@ -52,9 +52,7 @@ def test_page_of_a_bar_shows_its_stiffness_and_compliance():
     ({"flat_elements": 3}, "mixed"),
     ({"reached": False, "closed": False}, "bad"),
 ])  # fmt: skip
-def test_verdict_is_amber_for_a_doubtful_surface_and_red_for_a_missed_accuracy(
-    mesh, kind
-):
+def test_verdict_is_amber_for_doubts_and_red_for_insufficient_accuracy(mesh, kind):
     text = link_page(bar(**mesh), Provenance())
     assert f"<p class='verdict {kind}'>" in text
     assert ("Doubts about the surface" in text) == bool(set(mesh) - {"reached"})

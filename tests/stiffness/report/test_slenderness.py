@@ -1,4 +1,4 @@
-"""Beams against finite elements over slenderness, and beams from curve files."""
+"""Tests of the comparison of beams with finite elements."""
 
 import json
 from dataclasses import replace
@@ -21,7 +21,8 @@ MATERIAL = ["--young", "6e10", "--poisson", "0.3"]
 
 
 def made_up(ratio, c, d, error=0.0):
-    """A bar, and the same bar stiffened by 1 + c / ratio + d / ratio^2."""
+    """Return the comparison of a bar with a bar that is stiffer by 1 + c / ratio + d /
+    ratio^2."""
     length = 0.02 * ratio
     C = beam_compliance(length, round_section(0.02, 0.3), 6e10, 0.3)
     ends = {"tip": [length, 0, 0], "base": [0, 0, 0]}
@@ -34,9 +35,7 @@ def made_up(ratio, c, d, error=0.0):
 
 
 def diagonal_residual(sweep):
-    """Couplings are scaled by a diagonal that depends on shear, so they are not a plain
-    series.
-    """
+    """Return the diagonal of the residual."""
     return np.abs(np.diagonal(sweep.residual, axis1=1, axis2=2)).max()
 
 
@@ -48,10 +47,8 @@ def test_end_effect_fit_recovers_the_simulated_coefficients():
     assert "c = 0.200 0.200 0.200 (rotations)" in sweep.explanation
 
 
-def test_error_of_the_modulus_is_not_absorbed_by_the_fit_of_end_effects():
-    """A modulus 1 % too high is not an end effect, because it does not vanish with
-    length.
-    """
+def test_wrong_modulus_causes_a_large_residual_of_the_fit():
+    """A modulus that is 1 % too high has the same effect at all lengths."""
     comparisons = []
     for ratio in (5, 10, 20, 40):
         one = made_up(ratio, 0.2, 0.0)
@@ -65,14 +62,15 @@ def test_error_of_the_modulus_is_not_absorbed_by_the_fit_of_end_effects():
 
 
 def test_end_effect_error_follows_from_the_errors_of_the_meshes():
-    """0.1 % of the beam's K on both meshes; by hand, c = 2 y20 20 - y10 10."""
+    """The error of K is 0.1 % at both lengths. For two lengths, c is 2 y20 20 - y10
+    10."""
     sweep = fit_end_effect([made_up(r, 0.2, 0.7, error=1e-3) for r in (10, 20)])
     expected = 1e-3 * (40 / (1 + 0.01 + 0.7 / 400) + 10 / (1 + 0.02 + 0.7 / 100))
     assert np.diag(sweep.end_effect_error) == pytest.approx(expected, rel=1e-9)
 
 
-# K / K_beam - 1 of RX, TX and TZ, nu = 0.3, by Fourier modes in the half section, good
-# to 1e-6: benchmarks/evidence/stiffness_round_references.py on bars of these L / r
+# K / K_beam - 1 of RX, TX and TZ for each L / r and nu = 0.3, computed with an error of
+# 1e-6 by benchmarks/evidence/stiffness_round_references.py
 ENDS = {
     6: (0.025438, 0.030358, 0.017318),
     12: (0.015261, 0.018274, 0.008585),
@@ -82,8 +80,8 @@ ENDS = {
 
 @pytest.mark.slow
 def test_end_effect_of_a_round_bar_agrees_with_an_independent_solution():
-    """Each mesh is stiffer than that solution, by no more than its stated error. The
-    same fit to the exact values gives c = 0.212, 0.254, 0.102, and zero in torsion.
+    """The fit to the independent solution results in c = 0.212, 0.254, 0.102, and zero
+    in torsion.
     """
     sweep = sweep_slenderness({"radius": 0.02}, 6e10, 0.3, list(ENDS), accuracy=0.004)
     for comparison, exact in zip(sweep.comparisons, ENDS.values(), strict=True):
@@ -99,9 +97,8 @@ def test_end_effect_of_a_round_bar_agrees_with_an_independent_solution():
 
 @pytest.mark.slow
 def test_axial_stiffness_at_zero_poissons_ratio_has_no_end_effect():
-    """K_TZ = E V / L^2 with the mesh's own volume, exactly but for the tilt of curved
-    sides, squared.  Arcs as parabolas leave phi^4 / 30 of the volume, phi = pi / n with
-    n of them around: 5e-5 for the 16 of the coarsest mesh."""
+    """The exact stiffness is E V / L^2, where V is the volume of the mesh. The relative
+    volume error of 16 parabolas around a circle is 5e-5."""
     sweep = sweep_slenderness({"radius": 0.02}, 6e10, 0.0, [6, 12], accuracy=0.01)
     for comparison in sweep.comparisons:
         length, volume = comparison.length, comparison.fea.mesh["volume"]
@@ -123,7 +120,7 @@ def test_axial_stiffness_at_zero_poissons_ratio_has_no_end_effect():
     ),
     (["--section", "width=1"], "--section: found width, expected one of"),
 ])  # fmt: skip
-def test_slenderness_rejects_wrong_options_before_meshing(run, options, message):
+def test_slenderness_command_rejects_wrong_options(run, options, message):
     command = ["stiffness", "compare", "--ratios", "5,10", *MATERIAL]
     status, _, err = run(*command, *options)
     assert status == 2
@@ -160,8 +157,7 @@ def curve_file(tmp_path: Path, content: str) -> Path:
 def test_compliance_of_an_l_shape_from_a_curve_file_equals_hand_calculation(
     run, tmp_path
 ):
-    """The command prints the result of the function; the length is 0.35 m. Castigliano
-    by hand for a force along y at the tip: both legs bend, the first twists."""
+    """A force along y at the tip bends both legs and twists the first leg."""
     path = curve_file(tmp_path, L_BRACKET)
     command = ["stiffness", "beam", path, *MATERIAL, "--theory", "euler"]
     C = np.array(json.loads(run(*command, "--json", "-")[1])["compliance"])
@@ -176,9 +172,8 @@ def test_compliance_of_an_l_shape_from_a_curve_file_equals_hand_calculation(
     assert C[4, 4] == pytest.approx(expected, rel=1e-9)
 
 
-def test_compliance_of_tapers_and_arcs_from_a_curve_file_equals_closed_forms(tmp_path):
-    """The axial compliance of a cone is L / (E pi r1 r2);
-    a quarter circle ends on its axis."""
+def test_compliance_from_a_curve_file_equals_closed_forms(tmp_path):
+    """The axial compliance of a cone is L / (E pi r1 r2)."""
     cone = """
 [[piece]]
 end = [0.3, 0, 0]
@@ -210,7 +205,7 @@ section = { width = 0.01, height = 0.02, wall = 0.001 }
     (("up = [0, 1, 0]", "tip_section = { radius = 0.1 }"),
      "found different dimensions at the two ends"),
 ])  # fmt: skip
-def test_wrong_curve_file_is_rejected_by_its_path(tmp_path, change, message):
+def test_wrong_curve_file_is_rejected_with_its_path(tmp_path, change, message):
     path = curve_file(tmp_path, L_BRACKET.replace(*change, 1))
     with pytest.raises(BadInput) as caught:
         read_curve(path, 0.3)
@@ -227,7 +222,7 @@ def test_compare_rejects_a_curve_file_together_with_a_section(run, tmp_path):
 
 
 def rectangle(width, height, up, stiffer=1.0, axis=(0, 0, 1)):
-    """A 0.3 m bar by the beam formula, read at its tip."""
+    """Return a rectangular bar of 0.3 m by beam theory."""
     section = rectangular_section(width, height, 0.3)
     C = beam_compliance(0.3, section, 6e10, 0.3, axis=axis, up=up)
     tip = 0.3 * np.array(axis)
@@ -236,13 +231,11 @@ def rectangle(width, height, up, stiffer=1.0, axis=(0, 0, 1)):
 
 @pytest.mark.parametrize("axis", [(0, 0, 1), (0.6, 0, 0.8)])
 def test_comparison_reports_a_section_rotated_by_90_degrees(axis):
-    """A 20 x 60 mm bar is 2 % stiffer than its beam; I differs ninefold after
-    rotation.
-    """
+    """The second moments of area of the bar of 20 x 60 mm differ by a factor of nine."""
     solid = rectangle(0.06, 0.02, [0, 1, 0], 1.02, axis)
     right = compare_link(rectangle(0.06, 0.02, [0, 1, 0], axis=axis), solid, 0.03)
     assert right.better_turn == (0, pytest.approx(0.02))
-    assert "Held faces" in right.explanation
+    assert "Rigid faces" in right.explanation
     across = np.cross(axis, [0, 1, 0])
     for beam in (
         rectangle(0.02, 0.06, [0, 1, 0], axis=axis),
@@ -251,9 +244,9 @@ def test_comparison_reports_a_section_rotated_by_90_degrees(axis):
         turned = compare_link(beam, solid, 0.03)
         assert turned.better_turn == (90, pytest.approx(0.02))
         assert np.abs(turned.difference).max() > 5
-        words = "axes seem to be exchanged: rotated by 90 degrees about base"
+        words = "seem to be exchanged. After a rotation by 90 degrees about"
         assert words in turned.explanation
-        assert "Held faces" not in turned.explanation
+        assert "Rigid faces" not in turned.explanation
         assert comparison_results(turned)["axes_turned"] == 90
 
 
@@ -265,8 +258,8 @@ def test_comparison_reports_no_rotation_if_differences_are_within_the_mesh_error
     assert compare_link(beam, solid, 0.01).better_turn[0] == 90
 
 
-def test_comparison_names_the_corner_of_a_bent_beam_only():
-    """A straight beam has no corner; in an L shape the corner is not an end effect."""
+def test_comparison_reports_the_corner_of_a_bent_beam():
+    """The corner of an L-shaped beam is not an end effect."""
     one = made_up(20, 0.2, 0.0)
     assert "corner" not in one.explanation
     bent = compare_link(one.beam, one.fea, 0.02, length=1.5 * one.length)

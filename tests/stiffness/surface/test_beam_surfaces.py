@@ -1,4 +1,4 @@
-"""Shapes as surfaces and as beams: volumes of prisms, walls and tapers."""
+"""Tests of the surfaces and the beams of link shapes."""
 
 import math
 
@@ -13,12 +13,14 @@ from forcefit.stiffness.surface.beam_surfaces import (
 )
 
 NU = 0.3
-GON = 64 / 2 * math.sin(2 * math.pi / 64)  # area of the 64-gon in a unit circle
+GON = (
+    64 / 2 * math.sin(2 * math.pi / 64)
+)  # area of a polygon with 64 corners in a unit circle
 R, S, L = 0.03, 0.02, 0.2
 AREAS = {
     "round": ({"radius": R}, GON * R**2),
     "tube": ({"radius": R, "inner_radius": S}, GON * (R**2 - S**2)),
-    # a frustum: mean of both areas and their geometric mean
+    # volume of a frustum
     "cone": ({"radius": R, "tip_radius": S}, GON * (R**2 + R * S + S**2) / 3),
     "rectangle": ({"width": R, "height": S}, R * S),
     "box": (
@@ -30,7 +32,7 @@ AREAS = {
 
 @pytest.mark.parametrize("shape", AREAS)
 def test_surface_of_a_shape_encloses_its_volume_between_its_ends(shape):
-    """Width along x, height along y, the base at z = 0."""
+    """The width is along x, the height along y, and the base at z = 0."""
     lengths, area = AREAS[shape]
     surface = shape_surface(shape, lengths | {"length": L})
     assert surface.volume == pytest.approx(area * L, rel=1e-12)
@@ -43,7 +45,7 @@ def test_surface_of_a_shape_encloses_its_volume_between_its_ends(shape):
 
 @pytest.mark.parametrize("shape", AREAS)
 def test_beam_of_a_shape_has_the_ends_and_area_of_the_shape(shape):
-    """The beam has circles where the surface has polygons of 64 corners."""
+    """Circles are polygons with 64 corners in the surface."""
     lengths, area = AREAS[shape]
     (piece,) = shape_beam(shape, lengths | {"length": L}, NU)
     np.testing.assert_array_equal(piece.place(0.0), [0, 0, 0])
@@ -69,9 +71,9 @@ def test_beam_of_a_shape_has_the_ends_and_area_of_the_shape(shape):
     ("round", {"length": math.inf, "radius": R}, "round: length: found inf"),
     ("round", {"length": math.nan, "radius": R}, "round: length: found nan"),
     ("cone", {"length": L, "radius": R, "tip_radius": 0.0}, "tip_radius: found 0"),
-    ("tube", {"length": L, "radius": R, "inner_radius": 1.1 * R}, "a smaller one"),
-    ("box", {"length": L, "width": R, "height": S, "wall": 0.6 * S}, "leaves no hole"),
-    ("box", {"length": L, "width": S, "height": R, "wall": 0.5 * S}, "leaves no hole"),
+    ("tube", {"length": L, "radius": R, "inner_radius": 1.1 * R}, "inner_radius < "),
+    ("box", {"length": L, "width": R, "height": S, "wall": 0.6 * S}, "is no hole"),
+    ("box", {"length": L, "width": S, "height": R, "wall": 0.5 * S}, "is no hole"),
 ])  # fmt: skip
 def test_wrong_shape_is_rejected(shape, lengths, words):
     for call in (check_shape, shape_surface, lambda s, v: shape_beam(s, v, NU)):

@@ -1,4 +1,4 @@
-"""Coarser surfaces for the mesher are closed and within the tolerance."""
+"""Test of the reduction of triangles."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ from tests.solids_for_tests import box_solid
 
 
 def fine_cube(unit, bump=0.0):
-    """A cube with 10 by 10 squares per side, one of which is raised at its centre."""
+    """Return a cube with 10 x 10 squares on each side, and a bump on one of them."""
     solid = box_solid((10, 10, 10), (0.1, 0.1, 0.1))
     used, triangles = np.unique(solid.faces, return_inverse=True)
     points = solid.points[used]
@@ -19,7 +19,7 @@ def fine_cube(unit, bump=0.0):
 
 @pytest.mark.parametrize("unit", [0.02, 100.0])
 def test_decimation_preserves_a_bump_above_the_tolerance(unit):
-    """The tip of a bump of 0.8 mm is preserved to 0.1 mm."""
+    """The height of the bump is 0.8 mm, and the tolerance is 0.1 mm."""
     surface = fine_cube(unit, 8e-4)
     points, triangles = coarser_surface(surface, 1e-4 * unit)
     assert len(triangles) < len(surface.triangles)

@@ -1,4 +1,4 @@
-"""Lifted facets: corner weights, unit normals and fourth-order accuracy."""
+"""Tests of smooth surfaces through facets."""
 
 import numpy as np
 import pytest
@@ -8,15 +8,14 @@ from tests.solids_for_tests import cylinder
 
 
 def side(radius, facets):
-    """A round bar's side, without its ends."""
+    """Return the side of a round bar."""
     points, triangles = cylinder(radius, 0.2 * radius, facets)
     return Facets(points[:-2], triangles[: 2 * facets])
 
 
 @pytest.mark.parametrize("radius", [1e-3, 1.0, 1e3])
-def test_lifted_facets_deviate_by_the_fourth_power_of_the_angle(radius):
-    """A flat facet of half-angle a deviates by a^2 / 2 of the radius,
-    a lifted one by a^4."""
+def test_error_of_lifted_facets_is_of_fourth_order(radius):
+    """For a half-angle a, the error of a flat facet is a^2 / 2 times the radius."""
     facets, a = 24, np.pi / 24
     patch = side(radius, facets)
     spokes = patch.points[:, :2] / radius

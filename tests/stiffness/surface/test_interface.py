@@ -1,4 +1,4 @@
-"""Interfaces from text and tables."""
+"""Tests of interfaces."""
 
 import numpy as np
 import pytest
@@ -43,7 +43,7 @@ REFUSED = [
     ("bore=0,0,0/0,0,0/0.01", "bore direction is zero"),
     ("bore=0,0,0/0,1,0/-1", "bore: radius = -1 must be > 0"),
     ("bore=0,0/0,1,0/1", "found 'bore"),
-    # distances to these overflow
+    # distances from these interfaces would overflow
     ("bore=1e300,0,0/0,1,0/7", "found 1e+300, expected lengths of at most 1e"),
     ("disc=0,0,0/0,1,0/1e200", "found 1e+200, expected lengths of at most 1e"),
     ("z=-1e170", "found 1e+170, expected lengths of at most 1e"),
@@ -81,9 +81,7 @@ def test_written_interface_is_read_as_the_same_interface(text, written):
 
 
 def test_interface_distance_is_measured_from_the_plane_or_the_cylinder(rng):
-    """Distances are along the normal, or radial from the cylinder, inside and
-    outside.
-    """
+    """Points are inside and outside the cylinder."""
     point, d = np.array([1.0, 2.0, 3.0]), np.array([0, 0.6, 0.8])
     u, v = np.array([1.0, 0, 0]), np.array([0, 0.8, -0.6])
     a, b = rng.normal(size=(2, 4, 5))
@@ -100,9 +98,11 @@ def test_interface_distance_is_measured_from_the_plane_or_the_cylinder(rng):
 
 
 def test_rigid_faces_that_share_an_edge_are_rejected():
-    """The stiffness between two sides of a cube has no finite value."""
+    """The stiffness between two adjacent sides of a cube is infinite."""
     surface = check_surface(CUBE, CUBE_TRIANGLES, "cube")
     one, other = parse_interface("y=0"), parse_interface("z=0.1")
-    with pytest.raises(BadInput, match=r"cube: base .* and tip .* share an edge near"):
+    with pytest.raises(
+        BadInput, match=r"cube: base .* and tip .* have a common edge near"
+    ):
         refuse_common_edges(surface, one, other)
     refuse_common_edges(surface, one, parse_interface("y=0.1"))

@@ -1,4 +1,4 @@
-"""Intersecting triangles against the linear system of an edge and a triangle."""
+"""Tests of the search for intersecting triangles."""
 
 import numpy as np
 import pytest
@@ -7,11 +7,11 @@ from forcefit.stiffness.surface.intersections import crossing_triangles
 
 
 def crosses(one, other):
-    """Check whether an edge of one triangle meets the inside of the other."""
+    """Return whether an edge of one triangle passes through the other."""
     a, b, c = other
     for k in range(3):
         p, q = one[k], one[(k + 1) % 3]
-        # p + t (q - p) = a + u (b - a) + v (c - a)
+        # solve p + t (q - p) = a + u (b - a) + v (c - a)
         t, u, v = np.linalg.solve(np.column_stack([p - q, b - a, c - a]), p - a)
         if 0 < t < 1 and u > 0 and v > 0 and u + v < 1:
             return True
@@ -19,8 +19,8 @@ def crosses(one, other):
 
 
 @pytest.mark.parametrize("along", [0, 1, 2])
-def test_crossing_pairs_do_not_depend_on_order_unit_or_longest_side(along):
-    """Neighbours share a corner and do not count as crossing."""
+def test_intersecting_pairs_do_not_depend_on_order_or_unit(along):
+    """Triangles with a common corner are not included."""
     rng = np.random.default_rng(along)
     corners = 0.3 * rng.uniform(-1, 1, (40, 3, 3))
     corners[:, :, along] += 0.05 * rng.permutation(40)[:, None]
@@ -36,7 +36,11 @@ def test_crossing_pairs_do_not_depend_on_order_unit_or_longest_side(along):
     }
     assert len(expected) > 10
     some = rng.permutation(40)
-    away = np.array([5.0, -3.0, 2.0])  # where sums of corners are no differences
+    away = np.array([
+        5.0,
+        -3.0,
+        2.0,
+    ])  # offset, so that sums of coordinates differ from differences
     for scale, shift in ((1.0, 0.0), (1e3, 0.0), (1.0, away)):
         turned = triangles[some][:, [1, 2, 0]]
         pairs = some[crossing_triangles(scale * points + shift, turned)]
@@ -44,8 +48,8 @@ def test_crossing_pairs_do_not_depend_on_order_unit_or_longest_side(along):
         assert {tuple(sorted(pair)) for pair in pairs.tolist()} == expected
 
 
-def test_crossing_pairs_are_found_among_many_triangles():
-    """There are more triangles than one batch holds; the last two cross."""
+def test_intersecting_pairs_are_found_among_many_triangles():
+    """Several batches are needed, and the last two triangles intersect."""
     rng = np.random.default_rng(1)
     corners = 1e-3 * rng.normal(size=(1100, 3, 3))
     corners[:, :, 1] += 5.0 * rng.permutation(1100)[:, None]
@@ -61,8 +65,8 @@ def test_crossing_pairs_are_found_among_many_triangles():
 @pytest.mark.parametrize("unit", [1e-3, 1.0, 1e3])
 @pytest.mark.parametrize("way", [1, -1])
 def test_touching_triangles_do_not_cross(unit, way):
-    """The edge of a needle of length 2 ends in the plane of a triangle or touches its
-    side; a billionth of a length further, it crosses.
+    """A long thin triangle touches another triangle. They intersect after a
+    displacement of 1e-9.
     """
     base = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])[::way]
 

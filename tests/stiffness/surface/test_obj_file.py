@@ -1,4 +1,4 @@
-"""OBJ files as written by common programs."""
+"""Tests of the reader of OBJ files."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ POINTS = "".join(f"v {x} {y} {z}\n" for x, y, z in CORNERS)
 
 
 def cube(corner="{k}", line="f {corners}\n"):
-    """A cube of 0.1 m, each corner of a face written as stated."""
+    """Return an OBJ file of a cube, with corners of faces in the given format."""
     faces = [" ".join(corner.format(k=k, n=k - 9) for k in side) for side in SIDES]
     return POINTS + "".join(line.format(corners=corners) for corners in faces)
 
@@ -40,8 +40,9 @@ def test_obj_corners_in_every_notation_describe_the_same_cube(tmp_path, case):
     assert faces == [[k - 1 for k in side] for side in SIDES]
 
 
-def test_a_concave_polygon_is_cut_into_triangles_inside_it(tmp_path):
-    """An L shape of 0.1 m with arms 0.04 m wide, 0.02 m thick: 0.0064 m^2 x 0.02 m."""
+def test_concave_polygon_is_divided_into_triangles(tmp_path):
+    """The faces of the L-shaped part have an area of 0.0064 m^2, and its thickness is
+    0.02 m."""
     outline = [(0, 0), (0.1, 0), (0.1, 0.04), (0.04, 0.04), (0.04, 0.1), (0, 0.1)]
     lines = [f"v {x} {y} {z}" for z in (0, 0.02) for x, y in outline]
     lines += ["f 6 5 4 3 2 1", "f 7 8 9 10 11 12"]

@@ -1,4 +1,4 @@
-"""Patches of a surface and the shapes recognised in them."""
+"""Tests of the patches of a surface."""
 
 import numpy as np
 import pytest
@@ -25,7 +25,7 @@ from tests.stiffness.surface.test_recognition import prism, revolved
 
 
 def samples(shape, rng):
-    """Points on a quarter of each shape, in general position."""
+    """Return points on a part of each shape."""
     a, b = rng.uniform(0, 1.5, (2, 40))
     zero = 0 * a
     if isinstance(shape, Plane):
@@ -63,7 +63,7 @@ def test_fit_recovers_a_shape_from_points_on_it(fit, shape, rng):
 
 
 def test_slot_is_recognised_as_planes_and_half_cylinders():
-    """Its faces are tangent, without sharp edges between them."""
+    """There are no sharp edges between the tangent faces."""
     angle = np.linspace(-np.pi / 2, np.pi / 2, 17)
     half = 0.02 * np.column_stack([np.cos(angle), np.sin(angle)])
     outline = np.concatenate([half + [0.03, 0], -half - [0.03, 0]])
@@ -75,8 +75,8 @@ def test_slot_is_recognised_as_planes_and_half_cylinders():
 
 @pytest.mark.slow
 def test_mesh_of_a_barrel_has_the_volume_of_the_smooth_shape(tmp_path):
-    """The radius of 20 + 6 sin mm is not that of a cone, sphere or torus. The facets
-    lack more than 0.6 % of the volume, the curved mesh less than 0.03 %.
+    """The shape is not a cone, sphere or torus. The volume error is more than 0.6 % for
+    flat facets and less than 0.03 % for the curved mesh.
     """
 
     def radius(share):

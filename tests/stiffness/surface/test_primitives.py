@@ -1,4 +1,4 @@
-"""Planes, cones, spheres and tori: distances and fits against hand calculation."""
+"""Tests of planes, cones, spheres and tori."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ CENTER = np.array([3.0, -2.0, 5.0])
 
 
 def ring_points(radius, along, count=12):
-    """Points about the axis through the centre: (count, 3) for each radius."""
+    """Return points on circles around an axis, (count, 3) for each radius."""
     u, v = np.linalg.svd(AXIS[None])[2][1:]
     angle = 2 * np.pi * np.arange(count) / count
     spokes = np.cos(angle)[:, None] * u + np.sin(angle)[:, None] * v
@@ -43,8 +43,7 @@ CASES = {
 
 @pytest.mark.parametrize("name", CASES)
 def test_signed_distance_equals_the_offset_along_the_normal(name):
-    """On the shape the distance is zero;
-    0.1 outside it is 0.1, 0.1 inside it is -0.1."""
+    """The distance is positive outside the shape and negative inside."""
     shape, points = CASES[name]
     distances, normals = shape.signed(points)
     np.testing.assert_allclose(distances, 0, atol=1e-14)
@@ -65,17 +64,15 @@ def test_normal_of_a_fitted_plane_has_the_sign_of_its_facets(sign):
 
 
 @pytest.mark.parametrize("unit", [1e-3, 1.0, 1e3])
-def test_projection_onto_two_round_shapes_ends_on_their_common_line(unit):
-    """Newton's method converges to machine precision; after the first step, a tenth of
-    the distance remains.
-    """
+def test_projection_onto_two_shapes_is_on_their_common_line(unit):
+    """Newton's method converges to machine precision."""
     sphere = Sphere(unit * CENTER, 2.0 * unit)
     cylinder = Cone(unit * (CENTER + [0.3, 0.0, 0.0]), AXIS, 1.0 * unit)
     points = ring_points([1.3, 0.9], [1.6, -1.9])
     found = project(unit * points, (sphere, cylinder))
     for shape in (sphere, cylinder):
         np.testing.assert_allclose(shape.signed(found)[0] / unit, 0, atol=1e-12)
-    # no further than twice as far as the shapes are
+    # the displacement is at most twice the distance from the shapes
     away = [np.abs(s.signed(unit * points)[0]) for s in (sphere, cylinder)]
     moved = np.linalg.norm(found - unit * points, axis=1)
     assert (moved < 2 * np.max(away, axis=0) + 0.2 * unit).all()

@@ -1,4 +1,4 @@
-"""Shapes that meet tangentially, and flat faces."""
+"""Tests of the recognition of tangent shapes and flat faces."""
 
 import numpy as np
 import pytest
@@ -14,15 +14,16 @@ ENDS = parse_interface("x=-0.1"), parse_interface("x=0.1")
 
 
 def filleted_plate(fillet=0.006, corner=0.025, steps=6):
-    """A plate of 200 x 300 x 12 mm with a fillet around its foot that meets the rounded
-    corners.
+    """Return a plate of 200 x 300 x 12 mm with rounded corners and a fillet around its
+    base.
     """
     profile = fillet_profile(fillet, 0.012, steps)
     return rounded_block((0.1, 0.15), corner, profile, 2 * steps)
 
 
 def volume_of(fillet=0.006, corner=0.025):
-    """[m^3] volume of the plate: area of the outline integrated over the height."""
+    """Return the volume of the plate by integration of its area over the height
+    [m^3]."""
 
     def area(inset):
         a, b, r = 0.2 - 2 * inset, 0.3 - 2 * inset, corner - inset
@@ -34,8 +35,8 @@ def volume_of(fillet=0.006, corner=0.025):
 
 
 def revolved(radius, height, facets, closed=False):
-    """A surface of revolution about z through rings of these radii and heights. It ends
-    in flat faces, or its last ring is joined to the first one."""
+    """Return a surface of revolution about z from the radii and heights of rings of
+    points. It has flat ends, or the last ring is connected to the first ring."""
     angle = 2 * np.pi * np.arange(facets) / facets
     circle = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
     rings = [r * circle + [0, 0, z] for r, z in zip(radius, height, strict=True)]
@@ -54,7 +55,7 @@ def revolved(radius, height, facets, closed=False):
 
 
 def prism(outline, height):
-    """A prism along z over a convex outline."""
+    """Return a prism along z with a convex outline."""
     count = len(outline)
     points = [np.insert(outline, 2, z, axis=1) for z in (0, height)]
     points += [np.insert(outline.mean(axis=0), 2, z)[None] for z in (0, height)]
@@ -70,7 +71,7 @@ def prism(outline, height):
 @pytest.mark.parametrize("fillet", [0.002, 0.006])
 @pytest.mark.parametrize("steps", [4, 6])
 def test_fillets_of_a_rounded_plate_are_recognised_as_cylinders_and_tori(fillet, steps):
-    """Four of each, and four upright cylinders, with the radii of the plate."""
+    """There are four tori, four horizontal cylinders and four vertical cylinders."""
     patches = find_patches(filleted_plate(fillet, 0.025, steps), *ENDS)
     kinds = [type(shape) for shape in patches.shapes]
     assert (kinds.count(Plane), kinds.count(Cone), kinds.count(Torus)) == (6, 8, 4)
@@ -82,7 +83,7 @@ def test_fillets_of_a_rounded_plate_are_recognised_as_cylinders_and_tori(fillet,
 
 
 def test_volume_of_a_filleted_plate_is_that_of_its_recognised_shapes():
-    """The reference is the integral over the height; the facets lack 0.1 % of it."""
+    """The error of the volume of the facets is 0.1 %."""
     surface = filleted_plate()
     true = TrueSurface(surface, find_patches(surface, *ENDS))
     assert surface.volume < 0.9995 * volume_of()
@@ -92,7 +93,7 @@ def test_volume_of_a_filleted_plate_is_that_of_its_recognised_shapes():
 
 @pytest.mark.parametrize("flat", [0.02, 0.03, 0.036])
 def test_flat_chamfers_are_not_recognised_as_a_cylinder(flat):
-    """Chamfers of 20 degrees on both sides of a flat top: four corners on a circle."""
+    """The four corners of two chamfers and a flat top are on a circle."""
     low = 0.02 - np.tan(np.radians(20)) * (0.04 - flat) / 2
     surface = prism(np.array([
         [-0.02, -0.02], [0.02, -0.02], [0.02, low],
@@ -105,8 +106,7 @@ def test_flat_chamfers_are_not_recognised_as_a_cylinder(flat):
 
 
 def test_flat_side_between_fillets_remains_flat():
-    """The side consists of two triangles, 150 x 6 mm,
-    and meets fillets on three edges."""
+    """The side consists of two triangles and has tangent fillets on three edges."""
     surface = filleted_plate()
     true = TrueSurface(surface, find_patches(surface, *ENDS))
     middle = np.array([[0.01, 0.15, 0.009], [0.0, -0.15, 0.008]])
@@ -116,9 +116,8 @@ def test_flat_side_between_fillets_remains_flat():
 
 @pytest.mark.slow
 def test_cylinders_next_to_a_hump_are_recognised_separately():
-    """A bar with a hump r = 10 + 4 sin^2 mm over z = 30 .. 70 mm. The facets lack 0.44
-    % of the integral of pi r^2. The smoothed surface lacks less than its stated
-    uncertainty, and the long cylinders are not part of the hump.
+    """The radius of the bar is 10 mm, and between z = 30 mm and z = 70 mm it is 10 + 4
+    sin^2 mm. The error of the volume is less than its uncertainty.
     """
     share = np.linspace(0, 1, 13)
     r = np.r_[0.01, 0.01 + 0.004 * np.sin(np.pi * share) ** 2, 0.01]

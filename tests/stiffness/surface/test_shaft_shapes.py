@@ -1,4 +1,4 @@
-"""Shapes of a stepped shaft with a fillet."""
+"""Tests of the recognition of the shapes of a shaft."""
 
 import pytest
 
@@ -11,7 +11,7 @@ from tests.solids_for_tests import shouldered_shaft
 
 @pytest.mark.parametrize(("around", "rows"), [(36, 6), (48, 8), (48, 12)])
 def test_shoulder_and_fillet_of_a_shaft_are_recognised(around, rows):
-    """Radii 15 and 10 mm, fillet 2 mm: three planes, two cylinders and one torus."""
+    """The radii are 15 and 10 mm, and the fillet radius is 2 mm."""
     points, triangles = shouldered_shaft(0.015, 0.010, 0.002, around, rows)
     surface = check_surface(points, triangles, "shaft")
     patches = find_patches(surface, *map(parse_interface, ("z=0", "z=0.12")))
@@ -32,7 +32,7 @@ def test_shoulder_and_fillet_of_a_shaft_are_recognised(around, rows):
 
 
 def test_fillet_is_found_among_many_congruent_facets():
-    """The shaft has 48 congruent facets in each ring."""
+    """There are 48 congruent facets around the shaft."""
     step = (0.0322355, 0.0772355)
     points, triangles = shouldered_shaft(0.0134315, 0.01, 0.002402, 48, 8, step, 0.005)
     surface = check_surface(points, triangles, "shaft")

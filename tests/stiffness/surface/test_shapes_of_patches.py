@@ -1,4 +1,4 @@
-"""Triangles on an interface, and shapes of patches."""
+"""Tests of the triangles on interfaces and the shapes of patches."""
 
 import re
 
@@ -15,28 +15,28 @@ from forcefit.stiffness.surface.primitives import Cone, Plane
 from forcefit.stiffness.surface.surface import Surface, check_surface
 from tests.solids_for_tests import bar, cylinder
 
-FAR = np.array([[0.0, 0, 1], [0.6, 0, 1], [0, 0.8, 1]])  # off every interface
+FAR = np.array([[0.0, 0, 1], [0.6, 0, 1], [0, 0.8, 1]])  # not on any interface
 
 
 def loose(*triangles, unit=1.0, shift=(0.0, 0.0, 0.0)):
-    """Triangles without common points, and one that extends the bounding box
-    to sqrt 2.
+    """Return a surface of given triangles and a distant triangle, so that the diagonal
+    of the bounding box is sqrt 2.
     """
     corners = np.array([*triangles, FAR]).reshape(-1, 3) + shift
     return Surface(unit * corners, np.arange(len(corners)).reshape(-1, 3), "loose")
 
 
 def tilted(angle, size):
-    """A triangle at the origin whose normal is at an angle to z."""
+    """Return a triangle at the origin whose normal is inclined to z."""
     c, s = size * np.cos(angle), size * np.sin(angle)
     return [[0, 0, 0], [c, 0, s], [0, size, 0]]
 
 
 @pytest.mark.parametrize("unit", [0.01, 1.0, 100.0])
 @pytest.mark.parametrize("kind", ["plane=0,0,0/0,0,1", "disc=0,0,0/0,0,1/{}"])
-def test_triangles_on_a_plane_have_all_corners_and_their_normal_on_it(unit, kind):
-    """Corners lie within 1e-5 of the diagonal on either side, and normals within acos
-    0.9.
+def test_triangles_on_a_plane_are_found(unit, kind):
+    """Corners are within 1e-5 of the diagonal from the plane, and normals within acos
+    0.9 from its normal.
     """
     near = 1e-5 * np.sqrt(2)
     flat = np.array(tilted(0.0, 0.1))
@@ -50,8 +50,8 @@ def test_triangles_on_a_plane_have_all_corners_and_their_normal_on_it(unit, kind
 
 
 def around(radius, angle, tilt=0.0):
-    """A triangle with its corners on a cylinder about z, its normal at a right angle to
-    z, or less by the tilt: two corners at one height, the third half way between."""
+    """Return a triangle whose corners are on a cylinder about z. The angle between its
+    normal and z is 90 degrees minus ``tilt``."""
     half = angle / 2
     sagitta = radius * (1 - np.cos(half))
     height = sagitta / np.tan(tilt) if tilt else radius
@@ -60,9 +60,9 @@ def around(radius, angle, tilt=0.0):
 
 
 @pytest.mark.parametrize("unit", [0.01, 1.0, 100.0])
-def test_triangles_on_a_bore_have_all_corners_on_it_and_face_across_its_axis(unit):
-    """Corners lie within 2e-3 of the radius, and normals at least 60 degrees from the
-    axis.
+def test_triangles_on_a_bore_are_found(unit):
+    """Corners are within 2e-3 of the radius from the cylinder, and normals at least 60
+    degrees from the axis.
     """
     radius = 0.1
     on = around(radius, 0.5)
@@ -79,7 +79,7 @@ def test_triangles_on_a_bore_have_all_corners_on_it_and_face_across_its_axis(uni
 
 
 def test_flat_end_whose_corners_lie_on_a_cylinder_is_not_a_bore():
-    """The end of a square bar: all its corners are one half width from the y axis."""
+    """All corners of the end of a square bar have the same distance from the y axis."""
     corners = [[-1, -1.5, 0], [1, -1.5, 0], [1, 1.5, 0], [-1, 1.5, 0]]
     end = np.array([[corners[i] for i in (0, 2, 1)], [corners[i] for i in (0, 3, 2)]])
     with pytest.raises(BadInput, match="no face of the surface lies on the base"):
@@ -87,14 +87,14 @@ def test_flat_end_whose_corners_lie_on_a_cylinder_is_not_a_bore():
 
 
 def spoke(low, high):
-    """A flat triangle between two distances from the origin."""
+    """Return a flat triangle between two distances from the origin."""
     return [[low, 0, 0], [high, 0, 0], [low, 0.01, 0]]
 
 
 @pytest.mark.parametrize("unit", [0.1, 1.0, 10.0])
 def test_disc_interface_consists_of_the_triangles_within_its_radius(unit):
-    """The radius is met to 0.2 %; a triangle from 1 % inside to 1 % outside is cut and
-    therefore rejected.
+    """The tolerance of the radius is 0.2 %. A triangle from 1 % inside to 1 % outside
+    is rejected.
     """
     radius, shift = 0.2, np.array([0.3, -0.1, 0.2])
     center = ",".join(map(str, unit * shift))
@@ -109,22 +109,24 @@ def test_disc_interface_consists_of_the_triangles_within_its_radius(unit):
             *fine, spoke(low * radius, high * radius), unit=unit, shift=shift
         )
         if cut:
-            words = f"loose: the tip interface {disc} [m] cuts 1 triangles; a disc must"
+            words = (
+                f"loose: the tip interface {disc} [m] crosses 1 triangles; the outline"
+            )
             with pytest.raises(BadInput, match=re.escape(words)):
                 triangles_on(surface, disc, "tip")
         else:
             assert triangles_on(surface, disc, "tip").tolist() == [0, 1]
 
 
-def test_interface_off_the_part_is_rejected_with_the_extent_of_the_part():
-    words = (
-        "bar: no face of the surface lies on the tip interface {} [m]; the part spans "
+def test_interface_outside_the_part_is_rejected_with_its_extent():
+    words = "bar: no face of the surface lies on the tip interface {} [m]; "
+    words += (
+        "the extent of the part is x = -0.02 .. 0.02, y = -0.02 .. 0.02, z = 0 .. 0.1 m"
     )
-    words += "x = -0.02 .. 0.02, y = -0.02 .. 0.02, z = 0 .. 0.1 m"
     plane, disc = parse_interface("z=0.2"), parse_interface("disc=0,0,0.2/0,0,1/1")
     with pytest.raises(BadInput, match=re.escape(words.format(plane)) + "$"):
         triangles_on(bar(), plane, "tip")
-    words += "; a disc must be an outline of the surface's own triangles"
+    words += "; the outline of a disc must consist of edges of triangles"
     with pytest.raises(BadInput, match=re.escape(words.format(disc)) + "$"):
         triangles_on(bar(), disc, "tip")
 
@@ -140,8 +142,8 @@ def patches_of(points, triangles, top):
 
 @pytest.mark.parametrize("unit", [0.02, 1.0, 100.0])
 def test_an_edge_of_more_than_35_degrees_separates_patches(unit):
-    """Ten sides meet at 36 degrees and are planes; eleven meet at 33 degrees and form a
-    cylinder.
+    """The angle between the sides of a prism is 36 degrees for ten sides, and 33
+    degrees for eleven sides.
     """
     for sides, kind, count in ((10, Plane, 10), (11, Cone, 1)):
         points, triangles = cylinder(0.02 * unit, 0.1 * unit, sides)

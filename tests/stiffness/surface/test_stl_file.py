@@ -1,4 +1,4 @@
-"""STL files as written by common programs, and damaged STL files."""
+"""Tests of the reader of STL files."""
 
 import re
 
@@ -9,11 +9,11 @@ from forcefit.inputs.table import BadInput
 from forcefit.stiffness.surface.stl_file import read_stl
 from tests.solids_for_tests import CUBE, CUBE_TRIANGLES
 
-CORNERS = CUBE[CUBE_TRIANGLES]  # (12, 3, 3)
+CORNERS = CUBE[CUBE_TRIANGLES]  # corners of each triangle, (12, 3, 3)
 
 
 def text_of(corners):
-    """A text STL file according to the description of 3D Systems (1988)."""
+    """Return a text STL file according to the specification of 3D Systems (1988)."""
     lines = ["solid cube"]
     for facet in corners:
         lines += [" facet normal 0 0 0", "  outer loop"]
@@ -23,7 +23,7 @@ def text_of(corners):
 
 
 def binary_of(corners, head=b"cube", count=None):
-    """A binary STL file: 80 bytes, the number of triangles, 50 bytes each."""
+    """Return a binary STL file."""
     count = len(corners) if count is None else count
     body = b"".join(
         bytes(12) + facet.astype("<f4").tobytes() + bytes(2) for facet in corners
@@ -63,27 +63,27 @@ BINARIES = {
 
 @pytest.mark.parametrize("case", TEXTS)
 def test_text_stl_file_is_read_without_rounding(tmp_path, case):
-    """In double precision, the numbers are equal to the last bit."""
+    """The coordinates are bit-identical."""
     np.testing.assert_array_equal(read(tmp_path, TEXTS[case]), CORNERS)
 
 
 @pytest.mark.parametrize("case", BINARIES)
 def test_binary_stl_file_is_read(tmp_path, case):
-    """In single precision, as in the format."""
+    """The format has single precision."""
     found = read(tmp_path, BINARIES[case])
     np.testing.assert_array_equal(found, CORNERS.astype("<f4"))
 
 
 @pytest.mark.parametrize(("content", "message"), [
-    (BINARY[:-60], "found 10 whole triangles, expected 12"),
+    (BINARY[:-60], "found 10 complete triangles, expected 12"),
     (b"no stl at all", "not a readable STL file"),
-    (b"solid cube\nendsolid cube\n", "contains no triangles, or is not STL"),
+    (b"solid cube\nendsolid cube\n", "contains no triangles, or is not an STL file"),
     (TEXT[: TEXT.rindex(b"vertex")], "facet 12: found 2 vertices, expected 3; the"),
     (TEXT.replace(b"  endloop\n", b"vertex 1 1 1\n", 1), "facet 1: found 4 vertic"),
     (TEXT.replace(b" facet", b" faces", 1), "before the first facet: found 3"),
     (TEXT.replace(b"0.1", b"0,1", 1), 'facet 1: found "0,1", expected a coord'),
     (TEXT[: TEXT.rindex(b"\n", 0, TEXT.rindex(b"endloop")) - 4], "facet 12: the file"),
-    (TEXT[: TEXT.rindex(b"vertex") + 6], "facet 12: the file is cut"),
+    (TEXT[: TEXT.rindex(b"vertex") + 6], "facet 12: the file is truncated"),
 ])  # fmt: skip
 def test_damaged_stl_file_is_rejected_with_the_number_of_the_facet(
     tmp_path, content, message
@@ -93,8 +93,8 @@ def test_damaged_stl_file_is_rejected_with_the_number_of_the_facet(
     assert "cube.stl" in str(no.value)
 
 
-def test_any_damaged_stl_file_is_read_or_rejected(tmp_path, rng):
-    """500 files with bytes changed, cut out or missing at the end."""
+def test_damaged_stl_file_is_read_or_rejected_without_a_crash(tmp_path, rng):
+    """Bytes are changed or removed in 500 files."""
     for number in range(500):
         content = bytearray(TEXT if number % 2 else BINARY)
         if number % 3:

@@ -1,4 +1,4 @@
-"""Reading, checking and repair of surfaces."""
+"""Tests of the reader of surfaces."""
 
 import struct
 
@@ -27,7 +27,7 @@ def write_stl(path, points, triangles):
 
 @pytest.mark.parametrize("kind", ["stl", "ply", "obj", "vtk", "vtp"])
 def test_every_file_format_has_the_same_surface(tmp_path, kind):
-    """STL and PLY have single precision, 1e-7 of the coordinates."""
+    """STL and PLY files have single precision."""
     pyvista = pytest.importorskip("pyvista")
     points, triangles = cylinder()
     path = tmp_path / f"bar.{kind}"
@@ -42,7 +42,7 @@ def test_surface_unit_scales_the_part_and_a_wrong_unit_is_rejected(tmp_path):
     points, triangles = cylinder()
     path = write_stl(tmp_path / "bar.stl", 1000 * points, triangles)
     assert read_surface(path, "mm").volume == pytest.approx(bar().volume, rel=1e-6)
-    with pytest.raises(BadInput, match='is the file in "mm"'):
+    with pytest.raises(BadInput, match='is the unit of the file "mm"'):
         read_surface(path, "m")
     with pytest.raises(BadInput, match="unit: found 'mmm'; did you mean \"mm\""):
         read_surface(path, "mmm")
@@ -74,7 +74,7 @@ def test_cavity_is_subtracted_from_the_volume_of_a_body():
 
 
 def test_nearly_equal_vertices_are_merged_and_reported(rng):
-    """Every triangle has its own vertices, each displaced by about 1e-10 m."""
+    """Every triangle has its own vertices, which are displaced by about 1e-10 m."""
     loose = CUBE[CUBE_TRIANGLES].reshape(-1, 3) + 1e-10 * rng.normal(size=(36, 3))
     surface = check_surface(loose, np.arange(36).reshape(-1, 3), "cube")
     assert len(surface.points) == 8
@@ -89,7 +89,7 @@ def test_units_of_length_equal_those_of_scipy():
 
 
 def test_signed_volume_does_not_change_far_from_the_origin():
-    """About 40 km away, products of coordinates have no digits left for 1 litre."""
+    """The distance from the origin is 40 km, and the volume is 1 litre."""
     far = CUBE + np.array([1e4, -2e4, 3e4])
     for points, tolerance in ((CUBE, 1e-12), (far, 1e-8)):
         volume = signed_volume(points, CUBE_TRIANGLES)

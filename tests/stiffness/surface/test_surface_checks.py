@@ -1,4 +1,4 @@
-"""Rejection and repair of surfaces."""
+"""Tests of the checks and the repairs of surfaces."""
 
 import re
 
@@ -20,8 +20,8 @@ CORNERS = 0.1 * np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
 
 
 def test_surface_digest_depends_on_the_geometry_only():
-    """It depends on every bit of coordinates and corners,
-    not on name or memory layout."""
+    """It depends on every bit of the coordinates, but not on the name or the memory
+    layout."""
     one = Surface(CUBE, CUBE_TRIANGLES, "one")
     same = Surface(np.asfortranarray(CUBE), CUBE_TRIANGLES.astype(np.int32), "other")
     assert one.digest() == same.digest()
@@ -37,19 +37,19 @@ def test_surface_digest_depends_on_the_geometry_only():
     (1.001e-3, "mm", None), (0.999e-3, "mm", "m"), (0.999e-3, "m", "m"),
 ])  # fmt: skip
 def test_part_of_implausible_size_is_rejected_with_a_likely_unit(size, unit, hint):
-    """Plausible sizes are from a millimetre to twenty metres."""
+    """Plausible sizes are from 1 mm to 20 m."""
     points = CUBE * size / (0.1 * np.sqrt(3))
     if hint is None:
         check_surface(points, CUBE_TRIANGLES, "part", unit)
         return
-    words = f'part: the part is {size:.4g} m across with unit = "{unit}"; '
-    words += f'is the file in "{hint}"?'
+    words = f'part: the size of the part is {size:.4g} m with unit = "{unit}"; '
+    words += f'is the unit of the file "{hint}"?'
     with pytest.raises(BadInput, match="^" + re.escape(words) + "$"):
         check_surface(points, CUBE_TRIANGLES, "part", unit)
 
 
 def test_unit_option_is_ignored_for_a_step_file(tmp_path, monkeypatch):
-    """The file states its unit; the option counts for other files only."""
+    """A STEP file contains its unit."""
     points, triangles = cylinder()
     monkeypatch.setattr(
         surface_module, "_read_triangles", lambda *_: (points, triangles, None)
@@ -62,7 +62,7 @@ def test_unit_option_is_ignored_for_a_step_file(tmp_path, monkeypatch):
 
 
 def test_points_that_belong_to_no_triangle_are_ignored():
-    """Such a point may be NaN or far away."""
+    """The coordinates of this point are NaN or very large."""
     points = np.concatenate([[[np.nan] * 3, [1e6, 0, 0]], CUBE])
     surface = check_surface(points, CUBE_TRIANGLES + 2, "cube")
     assert surface.volume == pytest.approx(1e-3)
@@ -71,7 +71,7 @@ def test_points_that_belong_to_no_triangle_are_ignored():
 
 
 @pytest.mark.parametrize("pair", [[0, 0, 1], [0, 1, 1], [1, 0, 1]])
-def test_triangle_of_two_corners_is_dropped_and_reported(pair):
+def test_triangle_with_two_equal_corners_is_removed_and_reported(pair):
     triangles = np.concatenate([CUBE_TRIANGLES, [pair]])
     surface = check_surface(CUBE, triangles, "cube")
     assert len(surface.triangles) == 12
@@ -81,12 +81,12 @@ def test_triangle_of_two_corners_is_dropped_and_reported(pair):
 @pytest.mark.parametrize("turned", [1, 5, 7, 11])
 @pytest.mark.parametrize("hollow", [False, True])
 def test_reversed_triangles_are_repaired_and_reported(rng, turned, hollow):
-    """The smaller group of triangles is reversed, then a shell that is inside out."""
+    """First, the smaller group of triangles is reversed, then a whole shell."""
     mixed = CUBE_TRIANGLES.copy()
     some = rng.choice(12, turned, replace=False)
     mixed[some] = mixed[some][:, ::-1]
     points, triangles, expected = CUBE, mixed, 1e-3
-    if hollow:  # a cavity whose triangles look as a cavity's should
+    if hollow:  # the triangles of a cavity with the correct orientation
         points = np.concatenate([CUBE, 0.5 * CUBE + 0.025])
         triangles = np.concatenate([mixed, CUBE_TRIANGLES[:, ::-1] + 8])
         expected = 1e-3 * 7 / 8
@@ -104,7 +104,7 @@ def test_reversed_triangles_are_repaired_and_reported(rng, turned, hollow):
 
 
 def test_overlapping_body_is_not_read_as_a_cavity():
-    """Edges meet only edges and diagonals, so none passes through the inside of a face.
+    """No edge of one box passes through the interior of a triangle of the other.
 
     The corners of each box are ordered by x, then y, then z.
     """
@@ -131,7 +131,7 @@ def test_second_body_is_rejected_with_the_position_of_its_centre():
 
 
 def with_corner(corner):
-    """The cube's triangles, one of which has another corner."""
+    """Return the triangles of a cube with a changed corner."""
     triangles = CUBE_TRIANGLES.copy()
     triangles[-1, 0] = corner
     return triangles
@@ -150,18 +150,18 @@ REFUSED = [
     (CORNERS, SLIVERS, "found 3 triangles with an area"),
     (
         CUBE, CUBE_TRIANGLES[:-1],
-        r"open: 3 edges have a triangle on one side .*near \(0, 0.05, 0.1\)",
+        r"open: 3 edges belong to only one triangle, .*near \(0, 0.05, 0.1\)",
     ),
-    (  # two cubes share an edge
+    (  # two cubes with a common edge
         np.concatenate([CUBE, CUBE + [0.1, 0.1, 0]]), CUBES,
         r"1 edges are shared by more than two .*near \(0.1, 0.1, 0.05\)",
     ),
-    (  # two tetrahedra on one base that is there once
+    (  # two tetrahedra with a single common base
         np.concatenate([CORNERS, [[0.02, 0.02, -0.1]]]),
         np.concatenate([TETRAHEDRON, BELOW]),
         "3 edges are shared by more than two",
     ),
-    (  # two billion pairs of vertices would be 32 GB
+    (  # two billion pairs of vertices would need 32 GB
         np.concatenate([CUBE, DUST]),
         np.concatenate([CUBE_TRIANGLES, np.arange(8, 60_008).reshape(-1, 3)]),
         "most of its 60008 vertices are less than",
@@ -176,9 +176,8 @@ def test_surface_that_bounds_no_solid_is_rejected(points, triangles, message):
 
 
 def test_position_of_a_self_intersection_is_reported():
-    """The top of the cube is pulled up to a spike, or down through its bottom. The
-    message names the midpoint of two crossing triangles, one of the spike and one of
-    the bottom.
+    """A corner of the top of the cube is moved below its bottom. The reported position
+    is the midpoint of two intersecting triangles.
     """
     sides = [t for t in CUBE_TRIANGLES if not (CUBE[t][:, 2] == 0.1).all()]
     bottom = [t for t in CUBE_TRIANGLES if (CUBE[t][:, 2] == 0.0).all()]

@@ -1,4 +1,4 @@
-"""Surfaces from MSH and STEP files, and readers in separate processes."""
+"""Tests of the readers of VTK, MSH and STEP files."""
 
 import json
 import subprocess
@@ -25,7 +25,7 @@ TETRAHEDRA = [(1, 2, 4, 6), (1, 4, 3, 7), (1, 4, 7, 6), (1, 6, 7, 5), (4, 8, 7, 
 
 
 def msh2(elements, kind):
-    """MSH 2.2 as in Gmsh's manual: number, type, two tags, corners."""
+    """Return the text of an MSH 2.2 file."""
     nodes = [f"{k} {x} {y} {z}" for k, (x, y, z) in enumerate(CORNERS, 1)]
     cells = [
         f"{k} {kind} 2 1 1 {' '.join(map(str, e))}" for k, e in enumerate(elements, 1)
@@ -38,7 +38,7 @@ def msh2(elements, kind):
 
 
 def test_vtk_file_of_tetrahedra_and_their_surface_is_read(tmp_path):
-    """Gmsh writes tetrahedra (10), triangles (5) and edges (3) into one grid."""
+    """The file contains tetrahedra, triangles and edges."""
     kinds = [(3, [(1, 2)]), (5, TRIANGLES), (10, TETRAHEDRA)]
     cells = [(kind, cell) for kind, some in kinds for cell in some]
     size = sum(len(cell) + 1 for _, cell in cells)
@@ -60,9 +60,7 @@ def test_vtk_file_of_tetrahedra_and_their_surface_is_read(tmp_path):
     ids=["triangles", "solid", "quads"],
 )  # fmt: skip
 def test_msh_file_of_a_cube_is_read(tmp_path, content, capfd):
-    """The file is written by hand from the format description: 12 triangles around 1e-3
-    m^3.
-    """
+    """The cube has 12 triangles and a volume of 1e-3 m^3."""
     path = tmp_path / "cube.msh"
     path.write_text(content)
     surface = read_surface(path)
@@ -70,7 +68,9 @@ def test_msh_file_of_a_cube_is_read(tmp_path, content, capfd):
     assert surface.area == pytest.approx(6e-2, rel=1e-12)
     assert len(surface.triangles) == 12
     assert surface.repairs == ()
-    assert capfd.readouterr().out == ""  # `--json -` prints there
+    assert (
+        capfd.readouterr().out == ""
+    )  # results of `--json -` are printed on this stream
 
 
 @pytest.mark.parametrize(("content", "message"), [
@@ -100,7 +100,7 @@ def test_step_file_without_gmsh_is_rejected_with_the_package_to_install(
 
 @pytest.fixture
 def gmsh():
-    """Gmsh with a tube of 40 x 30 mm outer and inner diameter, 100 mm long."""
+    """Yield gmsh with a tube of diameters 40 and 30 mm and a length of 100 mm."""
     gmsh = pytest.importorskip("gmsh", exc_type=(ImportError, OSError))
     gmsh.initialize(interruptible=False)
     gmsh.option.setNumber("General.Terminal", 0)
@@ -116,7 +116,7 @@ def gmsh():
 def test_step_file_is_read_in_its_own_unit_and_its_cylinders_are_recognised(
     tmp_path, gmsh
 ):
-    """The file is in millimetres; 48 facets per circle lack 0.3 % of the volume."""
+    """The file is in millimetres. The volume of the facets is 0.3 % too small."""
     path = tmp_path / "tube.step"
     gmsh.write(str(path))
     gmsh.finalize()
@@ -145,10 +145,11 @@ gmsh.write(sys.argv[1])
 
 
 def test_one_of_several_solids_is_read_by_its_name(tmp_path, run):
-    """A cylinder of 20 x 100 mm and a box of 10 x 20 x 30 mm; the facets lack 0.3 %."""
+    """The file contains a cylinder and a box."""
     pytest.importorskip("gmsh", exc_type=(ImportError, OSError))
     path = tmp_path / "two.step"
-    # in a process of its own: what was read before decides the unit that is written
+    # runs in a separate process, because the unit depends on files that were read
+    # before
     script = [sys.executable, "-c", TWO_SOLIDS, str(path)]
     subprocess.run(script, check=True, capture_output=True)
     with pytest.raises(
@@ -181,10 +182,8 @@ gmsh.write(sys.argv[1])
 """
 
 
-def test_touching_solids_are_united_and_separate_ones_rejected(tmp_path):
-    """Boxes of 20 x 30 x 40 mm, of 10 x 10 x 50 mm on top of it, and a separate one of
-    1 x 1 x 1 mm.
-    """
+def test_touching_solids_are_united_and_separate_solids_are_rejected(tmp_path):
+    """The file contains two boxes that touch and a separate box."""
     pytest.importorskip("gmsh", exc_type=(ImportError, OSError))
     path = tmp_path / "three.step"
     script = [sys.executable, "-c", TOUCHING, str(path)]
@@ -197,7 +196,9 @@ def test_touching_solids_are_united_and_separate_ones_rejected(tmp_path):
     united = read_surface(f"{path}#{one}+{other}")
     assert united.volume == pytest.approx(29e-6, rel=1e-9)
     for whole in (f"{one}+{apart}", "*"):
-        with pytest.raises(BadInput, match="solids unite to 2 bodies, expected one"):
+        with pytest.raises(
+            BadInput, match="solids form 2 separate bodies, expected one"
+        ):
             read_surface(f"{path}#{whole}")
     with pytest.raises(BadInput, match='no solid "screw"'):
         read_surface(f"{path}#{one}+screw")
@@ -229,7 +230,7 @@ def test_a_broken_step_file_is_rejected(tmp_path, gmsh):
 
 @pytest.mark.parametrize("kept", [0.3, 0.6, 0.9])
 def test_a_file_that_crashes_its_reader_is_rejected(tmp_path, kept):
-    """VTK crashes on a truncated binary PLY file."""
+    """VTK crashes when it reads a truncated binary PLY file."""
     pyvista = pytest.importorskip("pyvista")
     path = tmp_path / "part.ply"
     pyvista.PolyData.from_regular_faces(*cylinder()).save(path)
@@ -240,16 +241,18 @@ def test_a_file_that_crashes_its_reader_is_rejected(tmp_path, kept):
 
 
 def test_reader_is_stopped_at_its_time_limit(tmp_path, monkeypatch):
-    """The time limit applies to the reader's process, which takes more than 1 ms."""
+    """The process of the reader needs more than 1 ms."""
     path = tmp_path / "part.vtk"
     path.write_text("# vtk DataFile Version 3.0\n")
     monkeypatch.setattr(surface_files, "_TIME_LIMIT", 0.001)
-    with pytest.raises(BadInput, match=r"part\.vtk: not read after 0\.001 s as VTK"):
+    with pytest.raises(
+        BadInput, match=r"part\.vtk: the file was not read as VTK within 0\.001 s"
+    ):
         read_surface(path)
 
 
 class Model:
-    """Mock of a gmsh model of an assembly, with solids by tag and their faces."""
+    """Mock of a gmsh model with the faces of solids by tag."""
 
     def __init__(self, **faces):
         self.faces = faces
@@ -271,12 +274,12 @@ class Model:
 
 
 def faces_of(model, path, solid):
-    """Faces of one solid of a model."""
+    """Return the faces of a solid."""
     chosen = chosen_solids(model, path, solid)
     return list(sides(model, dict.fromkeys(chosen.values(), 0)))
 
 
-def test_faces_of_a_named_solid_are_selected_and_unknown_names_rejected(tmp_path):
+def test_faces_of_a_named_solid_are_selected(tmp_path):
     path = tmp_path / "arm.step"
     assert faces_of(Model(arm=[1, 2]), path, "") == [1, 2]
     both = Model(arm=[1, 2], bolt=[3], bolt__2=[4, 5], _=[6])
