@@ -56,8 +56,7 @@ def test_estimated_error_is_zero_for_rigid_motions_and_constant_strains():
 
 
 def shifted(excess, kind="distributing-both"):
-    """Return the compliance of a bar, and the geometry errors for a slightly larger
-    radius."""
+    """Return the compliance of a bar, and its geometry errors for a larger radius."""
     solid = bar_solid(2, 5, R, 0.25)
     mesh = isoparametric(solid)
     lam, mu = constants(mesh)

@@ -84,7 +84,7 @@ def test_peak_at_a_sharp_inner_edge_has_no_error_estimate():
     peak = peak_stress(meshed(solid, [0.05, 0.05, 0.4]), [0, 0, 0, 0, 0, 1], away=0.05)
     assert np.isinf(peak.error)
     assert "inner edges without a fillet" in peak.region
-    assert "none, the peak lies on an inner edge" in stress_text(peak)
+    assert "none, because the peak is on an inner edge" in stress_text(peak)
     assert stress_results(peak)["error"] is None
 
 

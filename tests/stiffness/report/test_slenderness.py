@@ -231,7 +231,7 @@ def rectangle(width, height, up, stiffer=1.0, axis=(0, 0, 1)):
 
 @pytest.mark.parametrize("axis", [(0, 0, 1), (0.6, 0, 0.8)])
 def test_comparison_reports_a_section_rotated_by_90_degrees(axis):
-    """The second moments of area of the bar of 20 x 60 mm differ by a factor of nine."""
+    """The second moments of area of the bar differ by a factor of nine."""
     solid = rectangle(0.06, 0.02, [0, 1, 0], 1.02, axis)
     right = compare_link(rectangle(0.06, 0.02, [0, 1, 0], axis=axis), solid, 0.03)
     assert right.better_turn == (0, pytest.approx(0.02))

@@ -176,8 +176,8 @@ def test_surface_that_bounds_no_solid_is_rejected(points, triangles, message):
 
 
 def test_position_of_a_self_intersection_is_reported():
-    """A corner of the top of the cube is moved below its bottom. The reported position
-    is the midpoint of two intersecting triangles.
+    """A pyramid that points up or down replaces the top of the cube. The reported
+    position is the midpoint of two intersecting triangles.
     """
     sides = [t for t in CUBE_TRIANGLES if not (CUBE[t][:, 2] == 0.1).all()]
     bottom = [t for t in CUBE_TRIANGLES if (CUBE[t][:, 2] == 0.0).all()]
