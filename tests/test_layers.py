@@ -15,7 +15,7 @@ LINTER = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlin
 FOLDERS = ("stiffness", "assembly", "validation", "forcefit")
 MODULES = ("forcefit", "forcefit.stiffness", "forcefit.assembly", "forcefit.validation")
 CONTRACTS = LINTER["contracts"]
-(OWNED,) = (c["forbidden_modules"] for c in CONTRACTS if "heavy package" in c["name"])
+(OWNED,) = (c["forbidden_modules"] for c in CONTRACTS if "large packages" in c["name"])
 HEAVY = {*OWNED, "pyvista", "matplotlib"} - {"typer"}
 # of use to sweeps, statistics, files and drawings, not to one posture
 FOR_MANY = (

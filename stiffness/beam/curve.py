@@ -3,7 +3,7 @@ r"""Compliance of tapered and curved beams, by integration along the curve.
 The compliance of a cantilever is the integral of the compliances of its slices, each
 expressed at the tip:
 
-    C = integral A(s) c(s) A(s)^T ds,   A(s) = screw_map(p(s) - tip, R(s)),
+    C = integral A(s) c(s) A(s)^T ds,   A(s) = screw_map(p(s) - tip, R(s)).
 
 Here c(s) = diag(1/GJ, 1/EI_y, 1/EI_z, 1/EA, 1/GA_y, 1/GA_z) is the compliance per unit
 length in the section's axes R(s). The formula is accurate if the radius of curvature is
@@ -66,7 +66,7 @@ def straight_piece(
         BadInput: the ends coincide or are not finite.
     """
     p, q = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
-    unit_vector("piece from start to end", q - p)
+    unit_vector("piece: vector from start to end", q - p)
     fixed = None if up is None else unit_vector("up", up)
     return Piece(
         place=lambda t: p + t * (q - p),
@@ -198,8 +198,8 @@ def curve_mass(
         density: [kg/m^3] density.
 
     Returns:
-        Mass [kg]; centre of mass, (3,) [m]; and inertia about the centre of mass, (3,
-        3) [kg m^2]; in the axes of the segments.
+        Mass [kg]; centre of mass, (3,) [m]; and inertia about the centre of mass,
+        (3, 3) [kg m^2]; in the axes of the segments.
     """
     mass, moment, second, own = 0.0, np.zeros(3), np.zeros((3, 3)), np.zeros((3, 3))
     for piece in pieces:

@@ -6,7 +6,7 @@ symbol    meaning                                                 unit
 y z       section axes, z up                                      -
 I_y I_z   second moments of area; I_y bends about y               m^4
 J         Saint-Venant's torsion constant                         m^4
-shear_*   shear area for a force along y or z, divided by area        1
+shear_*   shear area for a force along y or z, divided by area    1
 ========  ======================================================  =====
 """
 

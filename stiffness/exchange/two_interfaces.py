@@ -63,7 +63,7 @@ def link_of_both_ends(
     """
     K12 = np.asarray(K12, dtype=float)
     K = K12[6:, 6:]
-    check_definite(f"{who}: the tip's part", K)
+    check_definite(f"{who}: the block of the tip", K)
     X = -inverted(K) @ K12[6:, :6]
     arm = X[3:, :3]
     own_offset = np.array([arm[2, 1] - arm[1, 2], arm[0, 2] - arm[2, 0],

@@ -98,8 +98,8 @@ def solve_level(
     Args:
         solid: straight tetrahedra. Tetrahedra that would be inverted when curved, or
             that touch two singular edges, are bisected first.
-        materials: materials. The first is the material of the whole link, except in the
-            regions of the others.
+        materials: the first material is that of the whole link, except in the regions
+            of the others.
         centers: (2, 3) [m] centres of the base and the tip interface.
         interface: kind of the interfaces, one of ``KINDS``.
         check: callback that is called with the number of unknowns before the solution.

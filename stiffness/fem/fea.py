@@ -198,9 +198,8 @@ def solve_link(
         surface: surface of the link.
         base: clamped interface.
         tip: loaded interface.
-        materials: materials. The first is the material of the whole link, except in the
-            regions of the others. In a STEP file, each solid may instead have its own
-            material.
+        materials: the first material is that of the whole link, except in the regions
+            of the others. In a STEP file, each solid may instead have its own material.
         options: options of the solution.
         point_masses: point masses, which affect the mass properties but not the
             stiffness.
@@ -266,8 +265,8 @@ def _refined(
 
     Args:
         first: first mesh.
-        materials: materials. The first is the material of the whole link, except in the
-            regions of the others.
+        materials: the first material is that of the whole link, except in the regions
+            of the others.
         centers: (2, 3) [m] centres of the base and the tip interface.
         options: options of the solution.
         start: [s] time at which the computation started.
@@ -449,7 +448,7 @@ def _affordable_mesh(
     level: Level, growth: float, budget: Budget, start: float, pace: float = 1.0
 ) -> Solid | None:
     """Refine the mesh by the wanted growth or as far as the budget permits."""
-    part = growth**0.55 - 1  # accounts for the bisected neighbours
+    part = growth**0.55 - 1  # fraction of elements to bisect, without neighbours
     solid = refine_level(level, 1 + part)
     added = len(solid.cells) / len(level.solid.cells) - 1
     if not 0.85 < added / (growth - 1) < 1.08:

@@ -33,8 +33,8 @@ def mass_properties(
         point_masses: point masses to add to the elements.
 
     Returns:
-        Mass [kg]; centre of mass, (3,) [m]; and inertia about the centre of mass, (3,
-        3) [kg m^2]. All are zero if the mass is zero.
+        Mass [kg]; centre of mass, (3,) [m]; and inertia about the centre of mass,
+        (3, 3) [kg m^2]. All are zero if the mass is zero.
     """
     origin = mesh.nodes.mean(axis=0)
     mass, first, second = 0.0, np.zeros(3), np.zeros((3, 3))

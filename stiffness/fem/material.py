@@ -51,8 +51,8 @@ def material_of_elements(
 
     Args:
         mesh: the elements.
-        materials: materials. The first is the material of the whole link, except in the
-            regions of the others.
+        materials: the first material is that of the whole link, except in the regions
+            of the others.
         cut_region: (t,) number of the region of each element, for regions at whose
             faces elements were split; None if no elements were split.
 
@@ -79,8 +79,8 @@ def material_at(points: NDArray, materials: Sequence[Material]) -> NDArray:
 
     Args:
         points: (n, 3) [m] points.
-        materials: materials. The first is the material of the whole link, except in the
-            regions of the others.
+        materials: the first material is that of the whole link, except in the regions
+            of the others.
 
     Returns:
         (n, 3) lambda [Pa], mu [Pa] and density [kg/m^3] at each point.
@@ -97,8 +97,8 @@ def regions_of(materials: Sequence[Material]) -> tuple[Region, ...]:
     """Return the regions of all materials after the first.
 
     Args:
-        materials: materials. The first is the material of the whole link, except in the
-            regions of the others.
+        materials: the first material is that of the whole link, except in the regions
+            of the others.
 
     Returns:
         The regions. In an overlap, the last region is used.

@@ -23,8 +23,8 @@ def placed_materials(
 
     Args:
         surface: surface of the link.
-        materials: materials. Either the first is the material of the whole link, or
-            each solid has a material.
+        materials: either the first material is that of the whole link, or each solid
+            has a material.
 
     Returns:
         The materials with regions in place of the names of solids.

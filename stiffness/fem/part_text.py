@@ -18,7 +18,7 @@ _PART = (
     '"z=0.2..0.4/young=2e11,poisson=0.3", "x=0..1,z=0..0.1/...,density=7800" or '
     '"solid=one+other/..."'
 )
-_MASS = '"1.5/0,0,0.452", kilograms and a place in metres'
+_MASS = '"1.5/0,0,0.452", a mass in kilograms and a position in metres'
 
 
 def parse_part(option: str, text: str) -> Material:

@@ -64,8 +64,8 @@ class StressInfluence:
         places: (p, 3) [m] positions of the nodes, in the link's axes.
         influence: (p, 6, 6) [Pa/(N m), Pa/N] stresses xx yy zz yz xz xy due to unit
             wrenches at the tip. With own weight, the shape is (p, 9, 6), and the last
-            three rows are the stresses due to unit gravity along x, y and z [Pa per
-            m/s^2].
+            three rows are the stresses due to unit gravity along x, y and z
+            [Pa per m/s^2].
         away: [m] smallest distance of the nodes from an interface.
         reentrant_edges: True if some nodes are on re-entrant edges without a fillet,
             where the elastic stress is infinite.
@@ -89,9 +89,8 @@ class StressInfluence:
         )
         if self.reentrant_edges:
             words += (
-                "; some of them on inner edges without a fillet or between two "
-                "materials, where the stress is singular too and grows as the mesh is "
-                "refined"
+                "; some of these nodes are on inner edges without a fillet or between "
+                "two materials, where the elastic stress is infinite"
             )
         if self.source is not None and self.source.left_out.any():
             words += (
@@ -220,7 +219,10 @@ def peak_stress(
     value, place = field.peak(acting)
     error, region = field.peak_error(acting), field.region
     if _peaks_on_facets(field, acting):
-        region += "; the peak lies on facets of no recognised shape, taken as smooth"
+        region += (
+            "; the peak is on facets of unrecognised shape, which are treated as a "
+            "smooth surface"
+        )
     if section is None:
         return PeakStress(w, value, error, place, region, field.away)
     base, tip = solved.link.base, solved.link.tip

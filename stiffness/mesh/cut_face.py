@@ -217,7 +217,7 @@ def _with_cut(solid: Solid, on: NDArray, face: CutFace) -> Solid:
     faces, owners = faces_inside(solid.cells)
     size = float(np.linalg.norm(np.ptp(solid.points, axis=0)))
     known = face_code(solid.inner, count)
-    for _ in range(2):  # moved corners can be on the face
+    for _ in range(2):  # other corners can be on the face after a move
         value = face.shape.signed(solid.points)[0]
         on |= np.abs(value) < ON_FACE * size
         side = np.sign(np.where(on, 0.0, value)[solid.cells].sum(axis=1))

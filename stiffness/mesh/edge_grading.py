@@ -82,8 +82,8 @@ def singular_edges(solid: Solid, held: tuple[int, ...]) -> NDArray:
         held: numbers of the patches that are clamped or loaded.
 
     Returns:
-        (e, 2) corners of each edge. Singular edges are the outlines of these patches,
-        and edges with an inner angle above 215 degrees.
+        (e, 2) corners of each edge. Singular edges are the outlines of the clamped or
+        loaded patches, and edges with an inner angle above 215 degrees.
     """
     count = len(solid.points)
     pairs = np.sort(solid.faces[:, [[0, 1], [1, 2], [0, 2]]], axis=2)

@@ -150,7 +150,7 @@ def read_surface_links(root: Table, accuracy: float) -> tuple[SurfaceLink, ...]:
 def _add(links: dict[str, SurfaceLink], link: SurfaceLink, table: Table) -> None:
     """Add a part, and reject a name that is already in use."""
     if link.name in links:
-        found = f"found {quoted(link.name)} twice, expected other names"
+        found = f"found {quoted(link.name)} twice, expected different names"
         raise table.bad("name", found)
     links[link.name] = link
 
@@ -162,7 +162,9 @@ def _link(table: Table, surface: Path, accuracy: float) -> SurfaceLink:
 
     name = table.text("name")
     if not _NAME.fullmatch(name):
-        expected = "letters, digits, dots, - and _, a letter or digit first"
+        expected = (
+            "letters, digits, dots, - and _, of which the first is a letter or a digit"
+        )
         raise table.bad("name", f"found {describe(name)}, expected {expected}")
     link = SurfaceLink(
         name=name,

@@ -46,7 +46,7 @@ def link_page(link: LinkStiffness, provenance: Provenance) -> str:
             verdict=_verdict(link),
             good=_good(link),
             tiles=_tiles(link),
-            about=f"{link.method}; K_E is read at the tip ({place}) m.",
+            about=f"{link.method}; K_E refers to the tip ({place}) m.",
             body=[
                 _doubts(link),
                 _matrices(link),

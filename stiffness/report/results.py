@@ -128,7 +128,7 @@ def link_text(link: LinkStiffness) -> str:
         Lines of text.
     """
     place = ", ".join(f"{v:g}" for v in link.tip)
-    lines = [f"{link.method}; K read at the tip ({place}) m [N m/rad, N/rad, N/m]"]
+    lines = [f"{link.method}; K at the tip ({place}) m [N m/rad, N/rad, N/m]"]
     lines += _matrix(link.stiffness, "{:14.6g}")
     if not link.mesh:
         return "\n".join(lines)

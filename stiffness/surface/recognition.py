@@ -154,7 +154,7 @@ def _even(angles: NDArray) -> bool:
     """Return whether angles belong to many facets or to three equally wide facets."""
     angles = np.sort(angles)
     gaps = np.diff(np.r_[angles, angles[0] + 2 * np.pi])
-    if gaps[-1] > _STEP:  # the largest gap is outside of an open arc
+    if gaps[-1] > _STEP:  # the largest gap of an open arc is not part of it
         widest = int(np.argmax(gaps))
         outside = gaps[widest] > 1.5 * np.sort(gaps)[-2]
         gaps = np.delete(gaps, widest) if outside else gaps

@@ -213,8 +213,8 @@ def _fragments(
             common = 0.0 if other == number else float(model.occ.getMass(3, tag))
             if common > _TOUCHING * min(volume[other], volume[number]):
                 overlaps.append(
-                    f"solids {quoted(names[other])} and {quoted(names[number])} have "
-                    f"{common:.4g} m^3 in common"
+                    f"solids {quoted(names[other])} and {quoted(names[number])} "
+                    f"overlap in a volume of {common:.4g} m^3"
                 )
     bodies = _bodies(model, list(owners))
     if bodies != 1:

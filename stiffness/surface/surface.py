@@ -257,7 +257,7 @@ def _merge(
     a, b, c = triangles.T
     flat = (a == b) | (b == c) | (c == a)
     if flat.any():
-        repairs.append(f"{flat.sum()} triangles without area dropped")
+        repairs.append(f"{flat.sum()} triangles without an area removed")
     return points, triangles[~flat], repairs
 
 

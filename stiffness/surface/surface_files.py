@@ -143,7 +143,7 @@ def _in_own_process(wanted: str, path: Path, solid: str = "") -> dict[str, NDArr
             with np.load(io.BytesIO(made.read_bytes()), allow_pickle=False) as stored:
                 arrays = dict(stored)
         except (OSError, ValueError, EOFError, zipfile.BadZipFile):
-            versions = "; expected a whole file of MSH 2.2 or 4.1"
+            versions = "; expected a complete file of MSH 2.2 or 4.1"
             raise BadInput(
                 f"{path}: not a readable {kind} file{versions if kind == 'MSH' else ''}"
             ) from None

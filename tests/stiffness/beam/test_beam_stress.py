@@ -163,8 +163,8 @@ def membrane(section, cells):
     ))
     phi = spsolve(matrix.tocsc(), np.full(hole.size, 2 * size**2)).reshape(count)
     J = 2 * phi.sum() * size**2
-    # slope at the face of a parabola through zero at the face and two cells: (9 f1 -
-    # f2) / 3 size
+    # the derivative at the face, of a parabola through the face and two cells, is (9 f1
+    # - f2) / 3 size
     middle = [n // 2 for n in count]
     right = (9 * phi[-1, middle[1]] - phi[-2, middle[1]]) / (3 * size)
     upper = (9 * phi[middle[0], -1] - phi[middle[0], -2]) / (3 * size)

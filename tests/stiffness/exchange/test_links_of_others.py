@@ -39,12 +39,8 @@ def textbook_beam(length=LENGTH):
         [-12, -6 * L, 12, -6 * L], [6 * L, 2 * L**2, -6 * L, 4 * L**2],
     ])  # fmt: skip
     for rows, sign in (([1, 5, 7, 11], 1), ([2, 4, 8, 10], -1)):
-        turn = np.diag([
-            1,
-            sign,
-            1,
-            sign,
-        ])  # a positive rotation about y moves points on the x axis along -z
+        # a positive rotation about y moves points on the x axis along -z
+        turn = np.diag([1, sign, 1, sign])
         K[np.ix_(rows, rows)] += turn @ bend @ turn
     return K
 

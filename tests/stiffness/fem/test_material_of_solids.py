@@ -119,7 +119,7 @@ def test_solids_that_overlap_are_rejected():
         )
 
 
-def test_a_surface_without_solids_is_rejected():
+def test_material_of_a_solid_is_rejected_for_a_surface_without_solids():
     surface = check_surface(*cylinder(), "part.stl")
     with pytest.raises(BadInput, match=r'part.stl: found a material of solid "rod"'):
         placed_materials(surface, [Material(STEEL, 0.3, solid="rod")])

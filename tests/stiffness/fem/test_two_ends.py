@@ -35,11 +35,8 @@ def test_stiffness_of_both_ends_equals_the_schur_complement(interface):
     np.testing.assert_allclose(both.stiffness / size, expected / size, atol=1e-9)
     # a rigid motion causes no force, and its mass is that of the bar
     whole = np.vstack([np.eye(6), np.eye(6)])
-    whole[9:12, :3] = [
-        [0, 1, 0],
-        [-1, 0, 0],
-        [0, 0, 0],
-    ]  # rotation about the base times length
+    # displacement of the tip due to a rotation
+    whole[9:12, :3] = [[0, 1, 0], [-1, 0, 0], [0, 0, 0]]
     np.testing.assert_allclose(both.stiffness @ whole / size[:, :6], 0.0, atol=1e-9)
     shifts = whole[:, 3:]
     np.testing.assert_allclose(

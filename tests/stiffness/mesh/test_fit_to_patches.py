@@ -28,7 +28,7 @@ def test_mesh_of_another_volume_is_rejected(stretch):
 
 
 @pytest.mark.parametrize(("other", "missing"), [(1, "base"), (0, "tip"), (2, "base")])
-def test_a_mesh_without_a_face_on_an_interface_is_rejected(other, missing):
+def test_mesh_without_a_face_on_an_interface_is_rejected(other, missing):
     made = box_solid((2, 2, 2), (0.1, 0.1, 0.1))
     far = Plane(50 * Z, Z)  # no corner is near this plane
     patches = Patches(np.full(len(CUBE_TRIANGLES), other), (far, far, far))

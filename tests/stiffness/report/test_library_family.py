@@ -65,7 +65,7 @@ def test_build_recomputes_only_the_part_whose_file_changed(parts):
 
 
 @pytest.mark.parametrize("length", [0.25, 0.37, 0.55])
-def test_estimated_error_between_family_sizes_covers_the_closed_form(parts, length):
+def test_estimated_interpolation_error_in_a_family_covers_the_true_error(parts, length):
     folder, _ = parts
     build_library(read_spec(folder / "spec.toml"))
     K, error = look_up(read_library(folder / "links"), {"length": length})

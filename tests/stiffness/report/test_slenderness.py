@@ -199,7 +199,7 @@ section = { width = 0.01, height = 0.02, wall = 0.001 }
     (("section =", "sektion ="), "piece[1].section: missing"),
     (("width", "widht"), 'piece[1].section: unknown "widht"; did you mean'),
     (("height = 0.05", "height = -1"), "piece[1]: rectangular_section: height"),
-    (("end = [0, 0, 0.2]", "end = [0, 0, 0]"), "piece[1]: piece from start to end"),
+    (("end = [0, 0, 0.2]", "end = [0, 0, 0]"), "piece[1]: piece: vector from start"),
     (("end = [0, 0, 0.2]", "end = [0, 0]"), "piece[1].end: found"),
     (("up = [0, 1, 0]", "upp = [0, 1, 0]"), 'unknown key "upp"'),
     (("up = [0, 1, 0]", "tip_section = { radius = 0.1 }"),

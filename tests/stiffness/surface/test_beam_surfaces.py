@@ -13,9 +13,8 @@ from forcefit.stiffness.surface.beam_surfaces import (
 )
 
 NU = 0.3
-GON = (
-    64 / 2 * math.sin(2 * math.pi / 64)
-)  # area of a polygon with 64 corners in a unit circle
+# area of a polygon with 64 corners in a unit circle
+GON = 64 / 2 * math.sin(2 * math.pi / 64)
 R, S, L = 0.03, 0.02, 0.2
 AREAS = {
     "round": ({"radius": R}, GON * R**2),

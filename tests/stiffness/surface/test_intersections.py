@@ -36,11 +36,8 @@ def test_intersecting_pairs_do_not_depend_on_order_or_unit(along):
     }
     assert len(expected) > 10
     some = rng.permutation(40)
-    away = np.array([
-        5.0,
-        -3.0,
-        2.0,
-    ])  # offset, so that sums of coordinates differ from differences
+    # offset, so that sums of coordinates differ from differences
+    away = np.array([5.0, -3.0, 2.0])
     for scale, shift in ((1.0, 0.0), (1e3, 0.0), (1.0, away)):
         turned = triangles[some][:, [1, 2, 0]]
         pairs = some[crossing_triangles(scale * points + shift, turned)]

@@ -141,7 +141,7 @@ def patches_of(points, triangles, top):
 
 
 @pytest.mark.parametrize("unit", [0.02, 1.0, 100.0])
-def test_an_edge_of_more_than_35_degrees_separates_patches(unit):
+def test_edge_of_more_than_35_degrees_separates_two_patches(unit):
     """The angle between the sides of a prism is 36 degrees for ten sides, and 33
     degrees for eleven sides.
     """

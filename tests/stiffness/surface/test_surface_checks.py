@@ -75,7 +75,7 @@ def test_triangle_with_two_equal_corners_is_removed_and_reported(pair):
     triangles = np.concatenate([CUBE_TRIANGLES, [pair]])
     surface = check_surface(CUBE, triangles, "cube")
     assert len(surface.triangles) == 12
-    assert surface.repairs == ("1 triangles without area dropped",)
+    assert surface.repairs == ("1 triangles without an area removed",)
 
 
 @pytest.mark.parametrize("turned", [1, 5, 7, 11])
@@ -170,7 +170,7 @@ REFUSED = [
 
 
 @pytest.mark.parametrize(("points", "triangles", "message"), REFUSED)
-def test_surface_that_bounds_no_solid_is_rejected(points, triangles, message):
+def test_invalid_surface_is_rejected(points, triangles, message):
     with pytest.raises(BadInput, match=f"part: .*{message}"):
         check_surface(points, triangles, "part")
 

@@ -68,9 +68,8 @@ def test_msh_file_of_a_cube_is_read(tmp_path, content, capfd):
     assert surface.area == pytest.approx(6e-2, rel=1e-12)
     assert len(surface.triangles) == 12
     assert surface.repairs == ()
-    assert (
-        capfd.readouterr().out == ""
-    )  # results of `--json -` are printed on this stream
+    # results of `--json -` are printed on this stream
+    assert capfd.readouterr().out == ""
 
 
 @pytest.mark.parametrize(("content", "message"), [
@@ -219,7 +218,7 @@ def test_files_written_by_gmsh_are_read(tmp_path, gmsh, version, binary, dimensi
     assert surface.volume == pytest.approx(exact, rel=2e-2)
 
 
-def test_a_broken_step_file_is_rejected(tmp_path, gmsh):
+def test_damaged_step_file_is_rejected(tmp_path, gmsh):
     path = tmp_path / "part.step"
     path.write_text("rubbish")
     with pytest.raises(
@@ -229,7 +228,7 @@ def test_a_broken_step_file_is_rejected(tmp_path, gmsh):
 
 
 @pytest.mark.parametrize("kept", [0.3, 0.6, 0.9])
-def test_a_file_that_crashes_its_reader_is_rejected(tmp_path, kept):
+def test_file_that_crashes_its_reader_is_rejected(tmp_path, kept):
     """VTK crashes when it reads a truncated binary PLY file."""
     pyvista = pytest.importorskip("pyvista")
     path = tmp_path / "part.ply"
