@@ -44,8 +44,8 @@ def screw_map(offset: ArrayLike, rotation: ArrayLike | None = None) -> NDArray:
 
     If ``s`` is the screw of a body at point ``q``, in the axes of a frame with rotation
     matrix ``R``, then ``screw_map(q - p, R) @ s`` is the screw of the same body at
-    point ``p``. The matrix is ``[R 0; [q - p]x R, R]``, see eqs. (13)-(15) of the
-    paper.
+    point ``p``. The matrix is ``[R 0; [q - p]x R, R]``, as in the corrected eqs.
+    (13)-(15) of the paper.
 
     The transposed matrix transforms a wrench from ``p`` to ``q``, so the power ``w @
     s`` is the same at both points.

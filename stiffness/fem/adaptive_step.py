@@ -127,8 +127,8 @@ def solve_level(
     indicated = error_matrices(
         mesh, solution.fields, lam, mu, singular, solution.stiffness
     )
-    # no residual tractions at singular edges, where they overestimate the error by a
-    # factor of 2
+    # residual tractions are not used at singular edges, where they overestimate the
+    # error by a factor of 2
     free = np.flatnonzero((mesh.patch > max(ENDS)) & ~singular[mesh.owner])
     residual = np.zeros_like(indicated)
     tractions = traction_errors(mesh, solution.fields, lam, mu, free)

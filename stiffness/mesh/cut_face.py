@@ -29,8 +29,7 @@ _REACH = 0.005  # largest displacement of a corner, relative to the size of the 
 # smallest accepted ratio of the volumes of a tetrahedron after and before its corners
 # are moved
 _LEAST = 0.2
-# largest distance of a corner on the face from the face, relative to the size of the
-# part
+# distance below which a corner is on the face, relative to the size of the part
 ON_FACE = 1e-6
 # cosine of the largest angle between the normals of a curved face at the ends of an
 # edge

@@ -160,7 +160,7 @@ def _wall(lengths: dict[str, float]) -> float:
 
 
 def _area(lengths: dict[str, float]) -> float:
-    """Return the area [m^2] of a section."""
+    """Return the area of a section [m^2]."""
     if "radius" in lengths:
         return math.pi * (
             lengths["radius"] ** 2 - lengths.get("inner_radius", 0.0) ** 2

@@ -203,8 +203,8 @@ def family_of(common: SurfaceLink, file: Path) -> list[SurfaceLink]:
     names = [name for name in head if name != "surface"]
     if "surface" not in head or not names or len(set(head)) != len(head):
         raise BadInput(
-            f"{file}: line 1: found {describe(','.join(head))}, expected surface and "
-            "different names of sizes"
+            f"{file}: line 1: found {describe(','.join(head))}, expected a header with "
+            "surface and a different name for each size"
         )
     links = []
     for number, row in enumerate(rows[1:], 2):
@@ -232,7 +232,7 @@ def family_of(common: SurfaceLink, file: Path) -> list[SurfaceLink]:
 
 
 def _size(place: str, name: str, cell: str) -> float:
-    """Parse the size [m] in a cell of the table."""
+    """Parse the size in a cell of the table [m]."""
     try:
         value = float(cell)
     except ValueError:

@@ -249,7 +249,7 @@ def _shapes_around(
 def _is_proper(
     graph: TriangleGraph, lifts: _Lifts, piece: NDArray, shape: Shape
 ) -> bool:
-    """Return whether facets on a shape are not facets of another curved shape."""
+    """Return whether a shape is more than a part of another curved shape."""
     # two coplanar triangles can be a single facet of another shape
     straight = not isinstance(shape, Cone) or _is_straight(graph, lifts, piece, shape)
     return len(piece) > 2 and straight

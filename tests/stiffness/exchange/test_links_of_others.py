@@ -240,7 +240,7 @@ def rod(run, tmp_path):
     return path
 
 
-def test_rod_stiffness_is_preserved_by_export_to_nastran_and_import(run, rod):
+def test_stiffness_is_preserved_by_export_to_nastran_and_import(run, rod):
     """The files are written by ``beam --json`` and ``convert``."""
     punch = rod.with_name("rod.pch")
     assert run("stiffness", "convert", rod, "--to", "nastran", "-o", punch)[0] == 0

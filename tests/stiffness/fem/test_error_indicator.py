@@ -41,7 +41,7 @@ def volume(mesh):
 
 
 def test_estimated_error_is_zero_for_rigid_motions_and_constant_strains():
-    """This includes curved elements."""
+    """The mesh includes curved elements."""
     mesh, K = bar(1, 6).mesh, bar(1, 6).solution.stiffness
     lam, mu = constants(mesh)
     singular = np.ones(len(mesh.cells), dtype=bool)

@@ -103,7 +103,7 @@ def test_stress_at_the_face_between_two_solids_is_proportional_to_modulus(rod):
     (["", "rood"], r'no solid "rood"; did you mean "rod"\?'),
     (["", "rod+tub"], r'no solid "tub"; did you mean "tube"\?'),
 ])  # fmt: skip
-def test_unknown_solid_or_solid_without_material_is_rejected_by_name(given, message):
+def test_unknown_solid_or_solid_without_material_is_rejected(given, message):
     surface = rod_in_tube(INNER, OUTER, LENGTH)
     with pytest.raises(BadInput, match=message):
         placed_materials(surface, [Material(STEEL, 0.3, solid=name) for name in given])

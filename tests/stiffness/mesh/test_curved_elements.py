@@ -161,7 +161,6 @@ def test_elements_of_thin_walls_are_not_inverted(counts, inner, order):
 
 @pytest.mark.parametrize(("counts", "inner"), THIN[1:3])
 def test_refining_inverted_elements_more_than_halves_the_volume_error(counts, inner):
-    """The volume error is that of the straightened elements."""
     solid = shell(counts, inner, 1.0)
     error = [
         abs(volume(isoparametric(s)) / shell_volume(inner, 1.0) - 1)

@@ -19,7 +19,7 @@ ENDS = parse_interface("z=0"), parse_interface("z=0.1")
 
 
 @pytest.mark.parametrize("stretch", [0.979, 1.021])
-def test_mesh_of_another_volume_is_rejected(stretch):
+def test_mesh_with_a_wrong_volume_is_rejected(stretch):
     made = box_solid((2, 2, 2), (0.1, 0.1, 0.1 * stretch))
     with pytest.raises(
         MeshFailed, match="the volume of the mesh is 0.00.* inside the surface"

@@ -166,7 +166,7 @@ def test_wrong_entry_is_rejected(spec, text, message):
     assert message in str(caught.value)
 
 
-def test_missing_entry_or_library_is_rejected_by_name(spec, tmp_path):
+def test_missing_entry_or_library_is_rejected(spec, tmp_path):
     build_library(spec)
     with pytest.raises(BadInput, match='no entry "round-beam"'):
         read_entry(spec.folder, "round-beam")

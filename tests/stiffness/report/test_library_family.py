@@ -86,7 +86,7 @@ def test_estimated_error_covers_an_omitted_entry(parts):
 
 
 @pytest.mark.parametrize(("old", "new", "message"), [
-    ("surface,length", "file,length", "rods.csv: line 1: found .*expected surface"),
+    ("surface,length", "file,length", "rods.csv: line 1: found .*expected a header"),
     ("rod1.stl", "gone.stl", "rods.csv: line 3: found no file .*gone.stl"),
     ("0.3,0.02", "0.3", "rods.csv: line 3: found 2 cells, expected 3"),
     ("0.3,0.02", "thick,0.02", "line 3, length: found 'thick', expected a length"),

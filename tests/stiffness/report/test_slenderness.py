@@ -127,7 +127,7 @@ def test_slenderness_command_rejects_wrong_options(run, options, message):
     assert message in err
 
 
-def test_comparison_of_a_beam_with_another_tip_is_rejected():
+def test_comparison_with_a_different_tip_is_rejected():
     C = beam_compliance(0.4, round_section(0.02, 0.3), 6e10, 0.3)
     one = LinkStiffness("beam", C, tip=[0.4, 0, 0], base=[0, 0, 0])
     other = LinkStiffness("fea", C, tip=[0.41, 0, 0], base=[0, 0, 0])

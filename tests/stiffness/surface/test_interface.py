@@ -75,7 +75,7 @@ def test_wrong_interface_is_rejected(text, message):
     ("bore=1,2,3/0,3,4/0.5", "bore=1,2,3/0,0.6,0.8/0.5"),
     ("disc=1,2,3/0,3,4/0.5", "disc=1,2,3/0,0.6,0.8/0.5"),
 ])  # fmt: skip
-def test_written_interface_is_read_as_the_same_interface(text, written):
+def test_formatted_interface_is_parsed_as_the_same_interface(text, written):
     assert str(parse_interface(text)) == written
     assert str(parse_interface(written)) == written
 
@@ -97,7 +97,7 @@ def test_interface_distance_is_measured_from_the_plane_or_the_cylinder(rng):
     assert parse_interface("bore=1,2,3/0,3,4/0.5").distance(point) == pytest.approx(0.5)
 
 
-def test_rigid_faces_that_share_an_edge_are_rejected():
+def test_rigid_faces_with_a_common_edge_are_rejected():
     """The stiffness between two adjacent sides of a cube is infinite."""
     surface = check_surface(CUBE, CUBE_TRIANGLES, "cube")
     one, other = parse_interface("y=0"), parse_interface("z=0.1")

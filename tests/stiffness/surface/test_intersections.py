@@ -61,7 +61,7 @@ def test_intersecting_pairs_are_found_among_many_triangles():
 
 @pytest.mark.parametrize("unit", [1e-3, 1.0, 1e3])
 @pytest.mark.parametrize("way", [1, -1])
-def test_touching_triangles_do_not_cross(unit, way):
+def test_touching_triangles_do_not_intersect(unit, way):
     """A long thin triangle touches another triangle. They intersect after a
     displacement of 1e-9.
     """

@@ -55,7 +55,7 @@ def test_signed_distance_equals_the_offset_along_the_normal(name):
 
 
 @pytest.mark.parametrize("sign", [1, -1])
-def test_normal_of_a_fitted_plane_has_the_sign_of_its_facets(sign):
+def test_normal_of_a_fitted_plane_has_the_direction_of_its_facets(sign):
     points = CASES["plane"][1]
     tilted = AXIS + 0.3 * np.linalg.svd(AXIS[None])[2][1]
     tilted /= np.linalg.norm(tilted)

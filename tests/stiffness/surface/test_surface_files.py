@@ -87,9 +87,7 @@ def test_wrong_msh_file_is_rejected(tmp_path, content, message, capfd):
     assert capfd.readouterr().out == ""
 
 
-def test_step_file_without_gmsh_is_rejected_with_the_package_to_install(
-    tmp_path, monkeypatch
-):
+def test_step_file_is_rejected_without_gmsh(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "gmsh", None)
     path = tmp_path / "part.step"
     path.write_text("ISO-10303-21;")
