@@ -6,9 +6,9 @@ K_beam = 1 + c r / L, where r is the section size and L the length. The coeffici
 depends on the section and on Poisson's ratio. For a slender link, both stiffnesses
 agree, unless one of the two models is wrong.
 
-If width and height of the section are exchanged, the beam is rotated about its axis.
-The comparison is therefore repeated for the beam rotated by multiples of 90 degrees. A
-rotation is reported if the agreement is much better.
+If the user exchanges width and height of the section, the beam is rotated about its
+axis. The comparison is therefore repeated for the beam rotated by multiples of 90
+degrees. A rotation is reported if the agreement is much better.
 """
 
 from dataclasses import dataclass
