@@ -1,4 +1,4 @@
-"""Functions that write campaign folders from published data, and find that data."""
+"""Find or download published measurements and write them as campaign folders."""
 
 import argparse
 import os
@@ -22,12 +22,13 @@ SOURCES = Path(__file__).parent / "data.toml"
 
 
 def data_folder(name: str, data: Path | None = None) -> Path:
-    """Return the folder of a set of measured data; download the data if it is absent.
+    """Return the folder of a data set, which is downloaded if it is absent.
 
     Args:
-        name: name of the set.
-        data: folder of all sets; by default the variable ``FORCEFIT_DATA``, else
-            ``../shared/data`` next to the repository, else the cache of ``pooch``.
+        name: name of the data set.
+        data: folder of all data sets. The default is the variable
+            ``FORCEFIT_DATA``, then ``../shared/data`` next to the repository, then
+            the cache of ``pooch``.
 
     Returns:
         The folder.
@@ -39,7 +40,7 @@ def data_folder(name: str, data: Path | None = None) -> Path:
     folder = Path(given or DATA) / name
     if folder.is_dir():
         return folder
-    wanted = f"{folder}: no such folder; expected the measured data there"
+    wanted = f"{folder}: no such folder; expected the measured data in it"
     sources = tomllib.loads(SOURCES.read_text())
     if given or name not in sources:
         raise BadInput(wanted)
@@ -47,15 +48,15 @@ def data_folder(name: str, data: Path | None = None) -> Path:
         return _fetched(name, sources[name])
     except ImportError as error:
         raise BadInput(
-            f"{wanted}, FORCEFIT_DATA naming the folder that contains it, or pooch to "
-            "fetch it (pip install 'forcefit[examples]'; docs/measured_data.md)"
+            f"{wanted}, or in the folder given by FORCEFIT_DATA; to download the data, "
+            "run pip install 'forcefit[examples]' (docs/measured_data.md)"
         ) from error
     except (OSError, ValueError) as error:
-        raise BadInput(f"{wanted}, or a network: {error}") from error
+        raise BadInput(f"{wanted}; the download failed: {error}") from error
 
 
 def _fetched(name: str, source: dict[str, Any]) -> Path:
-    """Return folder of a set in the cache, with all files and correct checksums."""
+    """Download a data set, verify its checksums and return its folder."""
     import pooch
 
     folder = Path(pooch.os_cache("forcefit")) / name
@@ -70,7 +71,7 @@ def _fetched(name: str, source: dict[str, Any]) -> Path:
 def from_command_line(
     convert: Callable[[Path, Path | None], object], about: str | None
 ) -> None:
-    """Run a converter as a program: print the written folders, or an error."""
+    """Run a converter as a program, which prints the written folders or an error."""
     parser = argparse.ArgumentParser(description=(about or "").split("\n")[0])
     parser.add_argument("-o", "--out", type=Path, required=True)
     parser.add_argument("--data", type=Path, help="folder that contains the data sets")
@@ -96,8 +97,8 @@ def write_campaign(
     Args:
         folder: folder, created if it is absent.
         robot: robot whose platform is the point that was measured.
-        columns: (k,) values by column of ``measurements.csv``; ``id`` is added if
-            absent.
+        columns: (k,) values of each column of ``measurements.csv``; ``id`` is added
+            if it is absent.
         sigma: [rad], [m] standard deviations of a reading.
         registration: ``"known"`` or ``"unknown"``.
 
@@ -122,25 +123,25 @@ def write_campaign(
 
 
 def _cell(value: float | str) -> str:
-    """Return the text of a cell; NaN gives an empty text."""
+    """Return the text of a table cell, which is empty for NaN."""
     if isinstance(value, str):
         return value
     return "" if np.isnan(value) else f"{value:.12g}"
 
 
 def deviation_columns(nominal: NDArray, measured: NDArray, turn: bool) -> dict:
-    """Return columns ``meas.*`` of poses measured in the device's frame.
+    """Return columns ``meas.*`` of poses measured in the frame of the device.
 
-    The device's frame is fitted to the base by least squares over the positions
-    (Kabsch, 1976), so that deviations are small; its exact pose is still to be fitted.
+    The pose of the device is estimated by least squares over the positions (Kabsch,
+    1976), so that the deviations are small.
 
     Args:
         nominal: (k, 4, 4) platform poses in base axes.
-        measured: (k, 4, 4) poses in the device's axes.
+        measured: (k, 4, 4) poses in the axes of the device.
         turn: whether rotations were also measured.
 
     Returns:
-        Columns (k,).
+        (k,) values of each column.
     """
     base = base_pose(nominal, measured)
     R = base[:3, :3].T

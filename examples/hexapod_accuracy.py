@@ -1,14 +1,13 @@
-"""Accuracy of a hexapod, and the gain from better ball joints, by one sweep.
+"""Compute the accuracy of a hexapod for two clearances of its ball joints.
 
-Run ``python examples/hexapod_accuracy.py``; it takes some minutes.  Over a square of
-100 mm at working height the sweep draws the errors of ``hexapod_errors.toml`` at every
-posture, for ball joints with 8 and with 4 micrometres of clearance.  It bounds the pose
-error (27) by errors and clearances together.  For each clearance it prints the error
-that 90 % of the machines do not exceed, at the middle of the square and at its worst
-posture.  It also prints the error by clearances alone, and the distance of the square
-from a singularity.
+Run ``python examples/hexapod_accuracy.py``, which takes some minutes.  The sweep covers
+a square of 100 mm at working height.  At every posture it draws the errors of
+``hexapod_errors.toml`` and bounds the pose error due to errors and clearances, problem
+(27).  For clearances of 8 and 4 micrometres it prints the 90 % quantile of the pose
+error, in the middle of the square and at the worst posture.  It also prints the error
+due to clearances alone, and the distance from a singularity.
 
-The same sweep on the command line, with two processes:
+The equivalent command, with two processes:
 
     forcefit assembly sweep hexapod --errors examples/hexapod_errors.toml --draws 10 \\
         --grid "tx=-0.05:0.05:0.025,ty=-0.05:0.05:0.025,tz=0.53,rx=0,ry=0,rz=0" \\
@@ -29,8 +28,8 @@ CLEARANCE = "ball_3.clearance.axial"
 def main():
     """Run the sweep, draw the figure and print the errors."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("--draws", type=int, default=10, help="machines")
-    parser.add_argument("--step", type=float, default=0.025, help="of the grid [m]")
+    parser.add_argument("--draws", type=int, default=10, help="number of machines")
+    parser.add_argument("--step", type=float, default=0.025, help="grid spacing [m]")
     parser.add_argument("-o", "--output", type=Path, default=Path("hexapod.nc"))
     options = parser.parse_args()
     square = ",".join(f"{axis}=-0.05:0.05:{options.step}" for axis in ("tx", "ty"))
@@ -53,13 +52,13 @@ def main():
     distances = ", ".join(
         f"{k} {float(near.sel(kind=k)):.2f}" for k in near.kind.values
     )
-    print(f"least distances to singularities in the square: {distances}")
+    print(f"smallest distances to singularities in the square: {distances}")
     figure = ff.show(data, at={CLEARANCE: 8e-6})
     figure.savefig(options.output.with_suffix(".png"), dpi=150)
 
 
 def print_errors(clearance, data):
-    """Print the errors at the middle and at the worst posture, for one clearance."""
+    """Print the errors in the middle and at the worst posture for one clearance."""
     upper = data.sel(bound="upper")
     print(
         f"ball joints with {clearance * 1e6:.0f} um of clearance, "

@@ -1,11 +1,11 @@
-"""The paper's figure 5 by one sweep, in both sign conventions of its errors.
+"""Draw figure 5 of the paper for positive errors and for errors of random signs.
 
 Run ``python examples/paper_figure5.py``; with ``--step 0.05`` it takes a quarter of the
-time.  For each convention it writes a robot file with the errors of one draw, the data
-set of its maps and the figure.  It prints least, median and largest values, and those
-of a reference by another program.  The reference has the same draw for the positive
-errors and other signs.  To draw the figure again without solving: ``forcefit assembly
-plot figure5_literal.nc --figure figure5_literal.png``.
+time.  For each sign convention it writes a robot file with the drawn errors, the data
+set of the maps and the figure.  It prints the smallest, median and largest value of
+each map and of a reference from another program.  The positive errors are the same in
+the reference, but the random signs differ.  To draw the figure again without solving,
+run ``forcefit assembly plot figure5_literal.nc --figure figure5_literal.png``.
 """
 
 import argparse
@@ -25,9 +25,9 @@ from forcefit.assembly.model.random_errors import (
 from forcefit.assembly.robots import load_robot
 
 FRAMES = ["elbow_a", "link_a", "elbow_b", "link_b", "loop2_platform", "tip"]
-LEAST = (1e-4, 1e-4, 1e-4, 1e-6, 1e-6, 1e-6)  # [rad, m] the paper's section IV
+LEAST = (1e-4, 1e-4, 1e-4, 1e-6, 1e-6, 1e-6)  # [rad, m] from section IV of the paper
 MOST = (2e-2, 2e-2, 2e-2, 2e-4, 2e-4, 2e-4)
-# variable, factor, unit, reference: positive errors, random signs (another draw)
+# variable, factor, unit, reference for positive errors, reference for random signs
 ROWS = (
     ("margin_free", 1, "-", (0.060, 2.76, 5.37), (0.071, 5.32, 8.66)),
     ("margin", 1, "-", (13.2, 18.8, 22.8), (17.7, 20.7, 24.1)),
@@ -48,7 +48,7 @@ ROWS = (
 def main():
     """Run the sweep, draw the figures and print the tables."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("--step", type=float, default=0.025, help="of the grid [m]")
+    parser.add_argument("--step", type=float, default=0.025, help="grid spacing [m]")
     parser.add_argument("-o", "--output", type=Path, default=Path("."))
     options = parser.parse_args()
     step = options.step
@@ -72,7 +72,7 @@ def main():
 
 
 def print_table(signs, data, column):
-    """Print least, median and largest value of each map, and of the reference."""
+    """Print the smallest, median and largest value of each map and its reference."""
     reached = data["status"] == "ok"
     inside = (data["margin_free"] <= ASSEMBLABLE).sum() / reached.sum()
     print(f"{signs}: {int(reached.sum())} postures, {100 * float(inside):.1f} % "

@@ -175,7 +175,7 @@ def test_ur5_table_is_converted_to_a_campaign(q, tmp_path):
     campaign = read_campaign(folder)
     assert campaign.ids == ("m0",)
     assert campaign.measured[0, 3:] == pytest.approx([2e-3, -1e-3, 5e-4])
-    with pytest.raises(BadInput, match=r"targets are 0\.01 m off"):
+    with pytest.raises(BadInput, match=r"targets differ by 0\.01 m"):
         convert_serial(serial_table(tmp_path / "b.csv", 0.0, 0.041), tmp_path / "b")
 
 

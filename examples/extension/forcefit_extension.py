@@ -1,7 +1,7 @@
-"""A reader, an effect and a link model, as another distribution adds them to forcefit.
+"""Example package that extends forcefit by a reader, an effect and a link model.
 
-``pip install ./examples/extension`` installs them.  docs/extensions.md describes what
-forcefit expects of each.
+``pip install ./examples/extension`` installs it.  docs/extensions.md describes the
+requirements on the three objects.
 """
 
 from math import pi
@@ -38,7 +38,7 @@ def _with_gains(conditions, gains):
     """Return conditions in which each drive moves by (1 + gain) times its command."""
     for name, gain in gains.items():
         row = conditions.robot.index(name)
-        more = gain * conditions.coordinates[:, row]  # [rad or m] of each reading
+        more = gain * conditions.coordinates[:, row]  # [rad or m] for each measurement
         screws = more[:, None] * own_screw(conditions.robot.frames[row])
         conditions = with_screws(conditions, name, screws)
     return conditions
@@ -56,14 +56,16 @@ DRIVE_GAIN = Effect(
 
 
 def cone(span, values):
-    """Return K_E of a solid cone along the span, by Euler and Bernoulli's theory.
+    """Return K_E of a solid cone along the span, by Euler-Bernoulli theory.
 
     Args:
-        span: (3,) [m] from the start of the link to its end, in the frame's axes.
+        span: (3,) [m] vector from the start of the link to its end, in the axes of
+            the frame.
         values: ``start_radius`` and ``end_radius`` [m], ``young`` [Pa], ``poisson``.
 
     Returns:
-        (6, 6) [N m/rad .. N/m] at the end of the link, in the frame's axes.
+        (6, 6) [N m/rad .. N/m] stiffness at the end of the link, in the axes of the
+        frame.
     """
     length = float(np.linalg.norm(span))
     R, r = float(values["start_radius"]), float(values["end_radius"])
@@ -73,10 +75,10 @@ def cone(span, values):
     compliance = np.zeros((6, 6))
     nodes, weights = np.polynomial.legendre.leggauss(12)
     for node, weight in zip(nodes, weights, strict=True):
-        s = (node + 1) / 2  # from the start, 0, to the end, 1
+        s = (node + 1) / 2  # position along the cone, from 0 at the start to 1
         radius = R + (r - R) * s
         area, second = pi * radius**2, pi * radius**4 / 4
-        slice_ = np.zeros((6, 6))  # compliance of a slice, per length
+        slice_ = np.zeros((6, 6))  # compliance per unit length
         slice_[:3, :3] = axial / (2 * G * second) + (np.eye(3) - axial) / (E * second)
         slice_[3:, 3:] = axial / (E * area)
         to_end = screw_map((s - 1) * np.asarray(span))

@@ -1,4 +1,4 @@
-"""Robot of a four-anchor Hangprinter, and a campaign folder of its 41 samples."""
+"""Write the robot file and the campaign folder of a Hangprinter with four anchors."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -28,17 +28,17 @@ ANCHORS = np.array([
 ADVANTAGE = np.array([2.0, 2.0, 2.0, 4.0])  # mechanical advantage of the blocks
 GEAR = 255 / 20  # turns of the motor for one turn of the spool
 RADIUS = 0.075  # [m] radius of the spools
-STIFFNESS = 1e4  # [N/m] of every line; only equal stiffnesses matter here
-CAMERA = 2e-3  # [m] sigma of a position: four lines determine three coordinates
+STIFFNESS = 1e4  # [N/m] stiffness of every line; only the ratios of stiffnesses matter
+CAMERA = 2e-3  # [m] standard deviation of a measured position
 
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """The recorded samples: k rows, a column for each line.
+    """Recorded samples, with one row per sample and one column per line.
 
     Attributes:
-        position: (k, 3) [m] position of the effector by camera.
-        spool: (k, 4) [rad] turn of each spool since the first sample.
+        position: (k, 3) [m] position of the effector measured by a camera.
+        spool: (k, 4) [rad] rotation of each spool since the first sample.
         force: (k, 4) [N] force of each line.
     """
 
@@ -58,15 +58,15 @@ def read_samples(data: Path | None = None) -> Samples:
 
 
 def cable_robot(anchors: NDArray = ANCHORS) -> Robot:
-    """Return a robot of four taut lines from anchors to a point, as driven struts.
+    """Return a robot in which driven struts represent the lines of a Hangprinter.
 
     Args:
         anchors: (4, 3) [m] positions of the anchors.
 
     Returns:
-        The robot at the origin.  The coordinate of ``A.line`` is the length of that
-        line. The platform is a point that can rotate, so a pose must contain its
-        rotation.
+        The robot with its platform at the origin.  The coordinate of ``A.line`` is
+        the length of this line. The platform can rotate freely, so a pose must
+        include its rotation.
     """
     placed: list[PlacedFrame] = []
     for line, anchor in zip(LINES, anchors, strict=True):
@@ -77,7 +77,7 @@ def cable_robot(anchors: NDArray = ANCHORS) -> Robot:
 
 
 def _line(name: str, anchor: NDArray) -> Sequence[PlacedFrame]:
-    """Return a line from its anchor to the origin, from a cardan to a ball joint."""
+    """Return a strut between a cardan joint at the anchor and a ball at the origin."""
     length = float(np.linalg.norm(anchor))
     along = -anchor / length
     first = np.cross([1.0, 0.0, 0.0], along)
@@ -97,7 +97,7 @@ def _line(name: str, anchor: NDArray) -> Sequence[PlacedFrame]:
 
 
 def commanded(samples: Samples) -> NDArray:
-    """Return (k, 3) [m] effector positions by the motors, by least squares."""
+    """Return effector positions, (k, 3) [m], fitted to the motor angles."""
     paid = RADIUS * samples.spool / ADVANTAGE
     lengths = np.linalg.norm(ANCHORS, axis=1) + paid
 
@@ -112,11 +112,11 @@ def commanded(samples: Samples) -> NDArray:
 
 
 def convert(out: Path, data: Path | None = None) -> Path:
-    """Write the campaign folder: commanded poses, and deviations by the camera.
+    """Write the campaign folder with commanded poses and measured deviations.
 
     Args:
         out: folder of the campaign.
-        data: folder of all measured data.
+        data: folder of all data sets.
 
     Returns:
         The folder.

@@ -1,7 +1,7 @@
-"""Hilti's construction robot: robot file from its URDF, campaigns from its waypoints.
+"""Write the robot file and the campaign folders of Hilti's construction robot.
 
-The robot file is derived from the URDF and has its licence (CC BY-NC-SA 3.0): it is
-written to the campaigns' folder, and is not part of this repository.
+The robot file is derived from the published URDF, whose licence (CC BY-NC-SA 3.0)
+applies to it.  It is therefore not part of this repository.
 """
 
 import xml.etree.ElementTree as ET
@@ -26,7 +26,7 @@ from forcefit.stiffness.screws import rotation_matrix, rotation_vector, transfor
 
 NAME = "hilti_trailblazer"
 FILES = ("flat", "pallet", "orthogonal_wood")
-# [m] from the README of the data
+# [m] offsets of the column segments, from the README of the data
 SEGMENTS = {"column_middle_joint": -0.706, "column_top_joint": -0.736}
 ARM = tuple(f"dsr_joint{k}" for k in range(1, 7))
 G = 9.80665  # [m/s^2] gravity
@@ -35,10 +35,11 @@ STATIONING = ("stationing_measurements", "evaluation_measurements")
 
 
 def urdf_robot(path: Path, tip: str = "prism") -> Robot:
-    """Return the chain of a URDF from its root to a link, whose frame is the platform.
+    """Return the chain of a URDF from its root to a link, which is the platform.
 
-    A URDF link follows its joint; a body of forcefit leads to its joint.  So the mass
-    of a link belongs to the next frame.  Side branches are left out with their masses.
+    A link of a URDF begins at its joint, whereas a body of forcefit ends at its joint.
+    The mass of a link therefore belongs to the next frame.  Other branches of the URDF
+    and their masses are omitted.
 
     Args:
         path: path of the file.
@@ -48,7 +49,7 @@ def urdf_robot(path: Path, tip: str = "prism") -> Robot:
         The robot, in which every movable joint of the chain is actuated.
 
     Raises:
-        BadInput: a joint moves about or along another axis than its z axis.
+        BadInput: the axis of a joint is not its z axis.
     """
     root = ET.parse(path).getroot()
     links = {attribute(link, "name"): link for link in root.findall("link")}
@@ -84,13 +85,13 @@ def urdf_robot(path: Path, tip: str = "prism") -> Robot:
 def attribute(
     element: ET.Element, key: str, inside: str = "", default: str = ""
 ) -> str:
-    """Return an attribute of an element, or of an element inside it."""
+    """Return an attribute of an XML element or of its child."""
     found = element.find(inside) if inside else element
     return default if found is None else found.get(key) or default
 
 
 def _origin(element: ET.Element) -> NDArray:
-    """Return (4, 4) transform of an ``origin``; roll, pitch, yaw about fixed axes."""
+    """Return the transform, (4, 4), of an ``origin`` (rotations about fixed axes)."""
     xyz = [float(x) for x in attribute(element, "xyz", "origin", "0 0 0").split()]
     rpy = attribute(element, "rpy", "origin", "0 0 0").split()
     r, p, y = (float(x) for x in rpy)
@@ -99,14 +100,14 @@ def _origin(element: ET.Element) -> NDArray:
 
 
 def convert(out: Path, data: Path | None = None) -> dict[str, Path]:
-    """Write one campaign folder for each file of waypoints.
+    """Write a campaign folder for each file of waypoints.
 
     Args:
         out: folder of the campaigns.
-        data: folder of all measured data.
+        data: folder of all data sets.
 
     Returns:
-        The folders by file.
+        The folder of each file.
     """
     source = data_folder(NAME, data)
     robot = urdf_robot(source / "trailblazer.urdf")
@@ -132,13 +133,13 @@ def _convert(robot: Robot, source: Path, file: str, folder: Path) -> Path:
     columns["cov.time"] = time - time[0]
     for name in ("stationing", "height", "space"):
         columns[f"cov.{name}"] = np.array([float(row[name]) for row in rows])
-    # tilt of the column relative to the base, and of the base relative to its mean; the
-    # mean tilt is that of the floor, different on another day
+    # The mean tilt of the base is subtracted, because it is the tilt of the floor.
     rocking = _up(rows, "base") - _up(rows, "base").mean(axis=0)
     lean = _up(rows, "column") - _up(rows, "base")
     for name, up in (("column", lean), ("base", rocking)):
         columns[f"cov.{name}_rx"], columns[f"cov.{name}_ry"] = up[:, 1], -up[:, 0]
-    # the total station's z is vertical; the accelerometer gives changes between rows
+    # The z axis of the total station is vertical, and the accelerometer of the base
+    # measures the changes between rows.
     vertical = base_pose(T, measured)[2, :3] + rocking
     for k, axis in enumerate("xyz"):
         columns[f"cov.gravity.{axis}"] = -G * vertical[:, k]
@@ -146,7 +147,7 @@ def _convert(robot: Robot, source: Path, file: str, folder: Path) -> Path:
 
 
 def _up(rows: list[dict], place: str) -> NDArray:
-    """Return (k, 3) unit vectors upward in the axes of an accelerometer."""
+    """Return upward unit vectors, (k, 3), in the axes of an accelerometer."""
     accel = np.array([row[f"tilt_sensor_{place}_accel"] for row in rows])
     return accel / np.linalg.norm(accel, axis=1)[:, None]
 

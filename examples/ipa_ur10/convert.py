@@ -1,4 +1,4 @@
-"""IPA's UR10, measured by a laser tracker: campaign folders of two series of poses."""
+"""Write campaign folders of a UR10 that was measured by a laser tracker."""
 
 import csv
 from datetime import datetime
@@ -31,8 +31,8 @@ JOINTS = (
     "wrist_1_joint", "wrist_2_joint", "wrist_3_joint",
 )  # fmt: skip
 SIGMA = (4e-5, 1.2e-5)  # [rad], [m] medians of the values in series B
-TMAC = 1.0  # [kg] mass of the tracker's target, a guess
-MOVED = 1e-3  # [rad] smaller changes are no motion, and the last direction remains
+TMAC = 1.0  # [kg] assumed mass of the target of the laser tracker
+MOVED = 1e-3  # [rad] smallest change of a joint angle that is regarded as a motion
 
 
 def convert(out: Path, data: Path | None = None) -> dict[str, Path]:
@@ -40,10 +40,10 @@ def convert(out: Path, data: Path | None = None) -> dict[str, Path]:
 
     Args:
         out: folder of the campaigns.
-        data: folder of all measured data.
+        data: folder of all data sets.
 
     Returns:
-        The folders by series.
+        The folder of each series.
     """
     source = data_folder(NAME, data)
     arm = read_robot(Path(__file__).parent / "ur10.toml")
@@ -52,7 +52,7 @@ def convert(out: Path, data: Path | None = None) -> dict[str, Path]:
     for series, file in SERIES.items():
         table = read_series(source / file)
         measured = measured_poses(table)
-        if series == "A":  # the axes of the target are in no file
+        if series == "A":  # the orientation of the target was not published
             T = _platform(with_target(arm, tool), table)
             turn = base_pose(T, measured)[:3, :3] @ T[:, :3, :3]
             relative = np.swapaxes(turn, 1, 2) @ measured[:, :3, :3]
@@ -67,10 +67,10 @@ def convert(out: Path, data: Path | None = None) -> dict[str, Path]:
 
 
 def read_series(path: Path) -> dict[str, NDArray]:
-    """Return columns of a series in the order of measurement, with the file's units.
+    """Return the columns of a series in chronological order, in the units of the file.
 
-    ``Timestamp`` becomes seconds since the first row.  A spreadsheet rounded the times
-    of series B, so its rows are numbered instead.
+    ``Timestamp`` is converted to seconds since the first row.  The times of series B
+    are rounded in the file, so its rows are numbered instead.
     """
     with path.open(newline="") as file:
         header, *rows = csv.reader(file, delimiter=";")
@@ -90,7 +90,7 @@ def read_series(path: Path) -> dict[str, NDArray]:
 
 
 def measured_poses(table: dict[str, NDArray]) -> NDArray:
-    """Return (k, 4, 4) poses of the target in tracker axes; R = Rx Ry Rz, by trial."""
+    """Return poses of the target, (k, 4, 4), in tracker axes, with R = Rx Ry Rz."""
     where = np.column_stack([table[f"measurement_{a}"] for a in "xyz"]) / 1e3
     angles = np.column_stack([table[f"measurement_r{a}"] for a in "xyz"])
     turn = Rotation.from_euler("XYZ", angles, degrees=True).as_matrix()
@@ -98,21 +98,21 @@ def measured_poses(table: dict[str, NDArray]) -> NDArray:
 
 
 def with_target(arm: Robot, tool: NDArray) -> Robot:
-    """Return the arm with the tracker's target on its flange."""
+    """Return the arm with the target of the tracker on its flange."""
     turn = rotation_vector(tool[:3, :3])
     target = Frame("tmac", "flange", tool[:3, 3], turn, mass=TMAC)
     return Robot("ur10", "tmac", (*arm.frames, target), (), arm.description)
 
 
 def _tool(path: Path) -> NDArray:
-    """Return (4, 4) transform of a file of 3 x 4 numbers in mm, made orthogonal."""
+    """Return the orthogonalised transform, (4, 4), of a file of 3 x 4 numbers in mm."""
     T = np.loadtxt(path)
     U, _, Vt = np.linalg.svd(T[:3, :3])
     return transform(T[:3, 3] / 1e3, U @ Vt)
 
 
 def _platform(robot: Robot, table: dict[str, NDArray]) -> NDArray:
-    """Return (k, 4, 4) nominal poses of the platform."""
+    """Return nominal poses of the platform, (k, 4, 4)."""
     q = np.zeros((len(table["time"]), len(robot.frames)))
     for name in JOINTS:
         q[:, robot.index(name)] = table[name]
@@ -121,7 +121,7 @@ def _platform(robot: Robot, table: dict[str, NDArray]) -> NDArray:
 
 
 def _covariates(table: dict[str, NDArray]) -> dict[str, NDArray]:
-    """Return time, temperature, and the direction of each joint's last motion."""
+    """Return time, temperature, and the last direction of motion of each joint."""
     warm = table["measurement_temperature"]
     columns = {"cov.temperature": warm - np.median(warm)}
     columns["cov.gravity.z"] = np.full(len(warm), -9.81)  # the arm is upright
@@ -135,7 +135,7 @@ def _covariates(table: dict[str, NDArray]) -> dict[str, NDArray]:
 
 
 def last_direction(q: NDArray) -> NDArray:
-    """Return (k,) sign of the last motion of a joint before a row; 0 at first."""
+    """Return the sign of the last motion of a joint, (k,), or 0 before any motion."""
     side = np.sign(np.where(np.abs(np.diff(q)) > MOVED, np.diff(q), 0.0))
     moved = np.flatnonzero(side)
     latest = np.searchsorted(moved, np.arange(len(side)), side="right") - 1

@@ -1,4 +1,4 @@
-"""A UR5 and a Barrett WAM, measured by a laser tracker: a campaign folder of poses.
+"""Write the campaign folder of a UR5 or a Barrett WAM measured by a laser tracker.
 
     python -m examples.serial_robots.convert FILE.csv -o FOLDER
     forcefit validation diagnose FOLDER --save corrected.toml
@@ -22,17 +22,17 @@ from forcefit.inputs.table import BadInput
 
 HERE = Path(__file__).parent
 NAME = "serial_robots"
-# [m] from the manufacturers' repeatability, 0.1 and 2 mm
+# [m] standard deviation, from repeatabilities of 0.1 mm and 2 mm
 SIGMA = {"ur5": 3e-5, "wam": 1e-3}
 _AGREES = 1e-4  # [m] largest difference between targets and the poses of the angles
 _AXES = "xyz"
 
 
 def convert(file: Path, out: Path) -> Path:
-    """Write a campaign folder of one file of the data.
+    """Write the campaign folder of one table of the data set.
 
     Args:
-        file: file with columns ``x_t`` .., ``x_dif`` .. [mm] and ``joint_1`` ..
+        file: table with the columns ``x_t`` .., ``x_dif`` .. [mm] and ``joint_1`` ..
             [degrees].
         out: folder of the campaign.
 
@@ -40,7 +40,8 @@ def convert(file: Path, out: Path) -> Path:
         The folder.
 
     Raises:
-        BadInput: the file has other columns, or the angles do not lead to the targets.
+        BadInput: the table has other columns, or the nominal poses at these angles
+            differ from the targets.
     """
     with file.open(newline="", encoding="utf-8-sig") as lines:
         rows = list(csv.DictReader(lines))
@@ -58,8 +59,8 @@ def convert(file: Path, out: Path) -> Path:
     _check_targets(file, robot, q, target)
     columns = {"id": np.array([f"m{row['step_order']}" for row in rows])}
     columns |= {f"q.joint{k + 1}": angle for k, angle in enumerate(q.T)}
-    # reached = target + difference: the sums have six decimals in every row, as the
-    # tracker writes them, and the differences target - difference do not
+    # The reached position is the target plus the difference, because these sums have
+    # six decimals, like the output of the tracker.
     columns |= {f"meas.t{k}": deviation[:, i] for i, k in enumerate(_AXES)}
     return write_campaign(out, robot, columns, (1e-4, SIGMA[name]))
 
@@ -67,22 +68,22 @@ def convert(file: Path, out: Path) -> Path:
 def _check_targets(
     file: Path, robot: Robot, q: np.ndarray, target: np.ndarray
 ) -> None:  # fmt: skip
-    """Raise an error if the angles do not lead to the targets."""
+    """Raise an error if the nominal positions differ from the targets."""
     coordinates = np.zeros((len(q), len(robot.frames)))
     coordinates[:, : q.shape[1]] = q
     postures, _ = place_many_joints(robot, coordinates)
     nominal = np.array([p.platform[:3, 3] for p in postures if p is not None])
     off = float(np.abs(nominal - target).max())
     if off > _AGREES:
-        raise BadInput(f"{file}: targets are {off:.3g} m off the robot's own poses")
+        raise BadInput(f"{file}: targets differ by {off:.3g} m from the nominal poses")
 
 
 def find(file: Path, data: Path | None = None) -> Path:
-    """Return the path of a table, given by its path or its name in the data set.
+    """Return the path of a table that is given by its path or its name.
 
     Args:
-        file: path or name.
-        data: folder of all measured data, see :func:`.campaign_folder.data_folder`.
+        file: path, or name in the data set.
+        data: folder of all data sets, see :func:`.campaign_folder.data_folder`.
 
     Returns:
         The path of the table.

@@ -1,4 +1,4 @@
-"""Homing heights of a printer at varying temperatures: campaign folders of two runs."""
+"""Write campaign folders of the homing heights of a printer at varying temperatures."""
 
 import csv
 from datetime import datetime
@@ -15,24 +15,24 @@ RUNS = {
     "run_a": "run_a_2021-06-13_05-41-53.csv",
     "run_b": "run_b_2021-06-13_20-04-43.csv",
 }
-# [m]; the header of run b has 0.0125 mm, but then the runs would disagree
+# [m] step of the motor; the value in the header of run b, 0.0125 mm, is wrong
 STEP = 0.0025e-3
-SIGMA = 2.0e-6  # [m] from a step and the repeats in a sample
+SIGMA = 2.0e-6  # [m] standard deviation, from the motor step and repeated homings
 OTHERS = ("bed", "chamber", "he")
 
 
 def convert(out: Path, data: Path | None = None) -> dict[str, Path]:
     """Write a campaign folder for each run.
 
-    A nozzle that is too high by d touches the pin d lower, so the deviation is minus
-    the change of the homing position.
+    A nozzle that is too high by d touches the homing pin at a coordinate that is lower
+    by d. The deviation is therefore minus the change of the homing position.
 
     Args:
         out: folder of the campaigns.
-        data: folder of all measured data.
+        data: folder of all data sets.
 
     Returns:
-        The folders by run.
+        The folder of each run.
     """
     source = data_folder(NAME, data)
     robot = read_robot(Path(__file__).parent / "robot.toml")
@@ -57,7 +57,7 @@ def convert(out: Path, data: Path | None = None) -> dict[str, Path]:
 
 
 def read_run(path: Path) -> dict[str, NDArray]:
-    """Return columns of a run, with ``time`` in seconds since its first row."""
+    """Return the columns of a run, with ``time`` in seconds since its first row."""
     with path.open(newline="") as file:
         rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
     clock = [datetime.strptime(row.pop("time"), "%Y/%m/%d-%H:%M:%S") for row in rows]
