@@ -1,16 +1,15 @@
-r"""Newton's method for an equilibrium at which the loaded clearances are known.
+r"""Newton's method for an equilibrium with known contacts in the clearances.
 
-A clearance is called closed if it is at its bound and carries a force.  Cone programs
-are solved up to a certified gap, so that closed clearances are within 1e-6 of their
-bounds and their forces have the same accuracy.  Once the closed clearances are known,
-the conditions of equilibrium are equations,
+A clearance is called closed if the joint touches its bound and the contact force is not
+zero.  A cone program is solved to a relative accuracy of about 1e-6.  Once the closed
+clearances are known, the equilibrium is the solution of the equations
 
     [ H   A'  N ] [ dx       ]     [ g ]      g = H_y y - loads - A' lambda + N f
     [ A   0   0 ] [ -dlambda ] = - [ r ],     r = A x + misfit
     [ N'  0   0 ] [ df       ]     [ c ]      c = (|u_k|^2 - 1) / 2
 
-which Newton's method solves to machine precision.  N contains the normals u_k of the
-bounds of closed clearances.
+which Newton's method solves to machine precision.  The columns of N are the unit
+normals u_k to the bounds of the closed clearances.
 
 Sources:
     Nocedal, Wright (2006), Numerical Optimization, sections 16.2 and 18.1.
@@ -28,31 +27,30 @@ from forcefit.assembly.linear.closure import Linearisation, VirtualJoints
 from forcefit.assembly.linear.load import FrameLoads
 from forcefit.assembly.solvers.cones import cone_sizes
 
-AT_BOUND = 1e-6  # [-] relative distance within which a clearance counts as at its bound
-# [-] relative distance from its bound within which a clearance can be closed
+AT_BOUND = 1e-6  # [-] tolerance of a contact, relative to the clearance
+# [-] largest gap, relative to the clearance, at which a contact force is possible
 _NEAR_BOUND = 1e-3
-_PRESSED = 1e-8  # relative to the largest force: a smaller force counts as zero
-# relative to the energy without clearance: a force below this counts as zero
+_PRESSED = 1e-8  # [-] threshold of a zero force, relative to the largest force
+# [-] threshold of a zero force, relative to the energy without clearance
 _ROUNDING = 1e-12
-_RANK = 1e-10  # relative size below which a singular value counts as zero
-_FLAT = 1e-12  # relative to the largest curvature: smaller curvatures count as zero
-_STEPS = 4  # largest number of Newton steps; two are usual
-_SETTLED = 1e-14  # [-] largest accepted relative excess of a clearance over its bound
-_GUESSES = 3  # largest number of guesses of the set of closed clearances
+_RANK = 1e-10  # [-] threshold of a zero singular value, relative to the largest
+_FLAT = 1e-12  # [-] threshold of a zero curvature, relative to the largest
+_STEPS = 4  # maximum number of Newton steps
+_SETTLED = 1e-14  # [-] tolerance by which a motion may exceed its clearance
+_GUESSES = 3  # maximum number of trial sets of closed clearances
 
 
 def contacts(assembly: Assembly) -> tuple[NDArray, NDArray]:
-    """Return the closed clearances, and those at their bound without a force.
+    """Return the contacts with a force, and the contacts without a force.
 
-    In the solution of a cone solver, the product of gap and force is the same for all
-    clearances.  A clearance near its bound is closed if its force, relative to the
-    energy, exceeds its gap.
+    A cone solver stops with small gaps in the contacts.  A gap of less than 1e-3 is
+    therefore a contact if the force, relative to the energy, exceeds the gap.
 
     Args:
         assembly: minimum-energy assembly.
 
     Returns:
-        Two masks (cones,) bool: clearances at their bound with and without a force.
+        Two boolean arrays (cones,): contacts with a force and contacts without one.
     """
     force = bound_forces(assembly)
     gap = 1.0 - cone_sizes(assembly.clearances, assembly.joints.group)
@@ -66,7 +64,7 @@ def contacts(assembly: Assembly) -> tuple[NDArray, NDArray]:
 
 
 def bound_forces(assembly: Assembly) -> NDArray:
-    """Return the (cones,) [J] products of each clearance's force and bound."""
+    """Return the product of contact force and clearance, (cones,) [J]."""
     forces = assembly.joints.cones.T @ assembly.joint_wrenches.ravel()
     return cone_sizes(forces, assembly.joints.group)
 
@@ -74,14 +72,12 @@ def bound_forces(assembly: Assembly) -> NDArray:
 def settle(assembly: Assembly) -> Assembly:
     """Refine an equilibrium of problem (22) to machine precision by Newton's method.
 
-    The closed clearances are held at their bounds.
-
     Args:
         assembly: minimum-energy assembly computed by a cone solver.
 
     Returns:
-        The refined assembly; the given assembly if no clearance is closed, or if the
-        closed clearances cannot be identified.
+        The refined assembly.  The given assembly is returned if no clearance is closed,
+        or if the closed clearances cannot be identified.
     """
     pressed, _ = contacts(assembly)
     for _ in range(_GUESSES):
@@ -91,7 +87,7 @@ def settle(assembly: Assembly) -> Assembly:
         size = cone_sizes(settled.clearances, settled.joints.group)
         if np.array_equal(contacts(settled)[0], pressed) and np.all(size <= 1 + 1e-9):
             return settled
-        # a clearance exceeds its bound because its small force was wrongly set to zero
+        # the bound is exceeded where a small contact force was set to zero by mistake
         beyond = size > 1.0 + 1e-9
         if not (beyond & ~pressed).any():
             break
@@ -100,7 +96,7 @@ def settle(assembly: Assembly) -> Assembly:
 
 
 def _settled(assembly: Assembly, pressed: NDArray) -> Assembly:
-    """Return the equilibrium with the given clearances at their bounds."""
+    """Return the equilibrium for given closed clearances."""
     joints, group = assembly.joints, assembly.joints.group
     x, multipliers = unknowns(assembly), assembly.multipliers
     bounded = bounded_unknowns(joints)
@@ -126,7 +122,7 @@ def _settled(assembly: Assembly, pressed: NDArray) -> Assembly:
 
 
 def unknowns(assembly: Assembly) -> NDArray:
-    """Return the (N,) unknowns: springs, clearances and free motions."""
+    """Return the unknowns (N,): springs, clearances and free motions."""
     parts = (assembly.elastic, assembly.clearances, assembly.motions)
     return np.concatenate(parts)
 
@@ -138,12 +134,12 @@ def bounded_unknowns(joints: VirtualJoints) -> slice:
 
 
 def closure_rows(lin: Linearisation, joints: VirtualJoints) -> NDArray:
-    """Return the (6 closures, N) closure rows for all unknowns."""
+    """Return the coefficients of the loop-closure equations, (6 closures, N)."""
     return lin.rows @ np.hstack([joints.elastic, joints.cones, joints.free])
 
 
 def work_of_loads(loads: FrameLoads, joints: VirtualJoints) -> NDArray:
-    """Return the (N,) [J] work of the loads per unit of each unknown."""
+    """Return the work of the loads per unit of each unknown, (N,) [J]."""
     of_links, of_joints = (joints.elastic.T @ w for w in (loads.body, loads.joint))
     springs = np.where(joints.links, of_links, of_joints)
     others = (columns.T @ loads.joint for columns in (joints.cones, joints.free))
@@ -151,13 +147,16 @@ def work_of_loads(loads: FrameLoads, joints: VirtualJoints) -> NDArray:
 
 
 def curvature(joints: VirtualJoints, force: NDArray) -> NDArray:
-    """Return the (N, N) [J] curvature due to springs and round bounds under force."""
+    """Return the second derivative of the Lagrangian, (N, N) [J].
+
+    Springs and contact forces on round bounds contribute to it.
+    """
     diagonal = [np.ones(joints.elastic.shape[1]), force[joints.group]]
     return np.diag(np.concatenate([*diagonal, np.zeros(joints.free.shape[1])]))
 
 
 def _normals(joints: VirtualJoints, u: NDArray, pressed: NDArray) -> NDArray:
-    """Return the (N, pressed) normals of the active bounds in all unknowns."""
+    """Return the normals to the bounds of the closed clearances, (N, pressed)."""
     normals = np.zeros((_count(joints), int(pressed.sum())))
     normals[bounded_unknowns(joints)] = boundary_normals(u, pressed, joints.group)
     return normals
@@ -169,7 +168,7 @@ def _count(joints: VirtualJoints) -> int:
 
 
 def held_rows(assembly: Assembly, pressed: NDArray) -> NDArray:
-    """Return the (6 closures + pressed, N) derivatives of closures and bounds."""
+    """Return the derivatives of the constraints, (6 closures + pressed, N)."""
     normals = _normals(assembly.joints, assembly.clearances, pressed)
     return np.vstack([closure_rows(assembly.linearisation, assembly.joints), normals.T])
 
@@ -181,13 +180,13 @@ def newton_step(
 
     Args:
         H: (N, N) [J] second derivative of the Lagrangian.
-        held: (m, N) derivatives of the constraints: closures, and bounds.
+        held: (m, N) derivatives of the constraints.
         left: (m,) residuals of the constraints.
         gradient: (N,) [J] gradient of the Lagrangian.
 
     Returns:
-        (N,) change of the unknowns, and (m,) change of the multipliers; the
-        minimum-norm solution if they are not unique.
+        Change of the unknowns (N,) and of the multipliers (m,).  The minimum-norm
+        solution is returned if the solution is not unique.
     """
     closing = -np.linalg.lstsq(held, left, rcond=_RANK)[0]
     Z = null_space(held, rcond=_RANK) if len(held) else np.eye(len(H))

@@ -1,21 +1,22 @@
-r"""Follow the load-deflection path beyond limit points by arc length.
+r"""Arc-length continuation of the load-deflection path beyond limit points.
 
-At a maximum of the load (a limit point), the path of equilibria turns back, and no
-nearby equilibrium exists for larger loads.  The load is therefore treated as an
-unknown, and the path (x, lambda) is followed in steps of given length.  Each step
-consists of a prediction along the tangent and Newton corrections perpendicular to it,
+At a maximum of the load (a limit point), no nearby equilibrium exists for larger loads.
+The load lambda is therefore treated as an unknown, and the path (x, lambda) is computed
+in steps of given arc length.  Each step consists of a prediction along the tangent to
+the path and of Newton corrections perpendicular to this tangent,
 
         [ Z'HZ   -Z'q ] [ t       ]     [ unbalanced force       ]
-        [ tau_x   tau ] [ dlambda ] = - [ error of step's length ].
+        [ tau_x   tau ] [ dlambda ] = - [ error of the arc length ].
 
-Z contains the motions that preserve the closures, H is the exact second derivative of
-the potential, q the work of a unit load, and tau the direction of the step.  Both
-stable and unstable equilibria are found.  Clearances are fixed at zero.
+The columns of Z span the motions that satisfy the loop-closure equations, H is the
+exact second derivative of the potential, q the work of a unit load, and tau the
+direction of the step.  Both stable and unstable equilibria are found.  Clearances are
+fixed at zero.
 
 The load is critical if an eigenvalue of Z'HZ changes sign.  Either the load has an
-extremum there (limit point), or another path branches off, as for a buckled column; the
-branch is reported but not followed.  Motions without stiffness and load, such as the
-spin of a rod between two ball joints, have no curvature and are omitted from Z.
+extremum there (limit point), or a second path branches off, as for a buckled column.
+The second path is not computed.  Z excludes motions without stiffness and load, such as
+the spin of a rod between two ball joints.
 
 Sources:
     Riks (1979), An incremental approach to the solution of snapping and buckling
@@ -49,11 +50,11 @@ from forcefit.assembly.platform_stiffness.exact_tangent import (
 from forcefit.assembly.platform_stiffness.matrices import Part
 from forcefit.assembly.solvers.method import Method, check_method
 
-_STEPS = 400  # largest number of steps of a path
-_CORRECTIONS = 8  # largest number of corrections of a step
-_CLOSED = 1e-10  # [-] size of the last correction, relative to the step
-_SMALLEST = 1e-6  # smallest step, relative to the first
-_HALVINGS = 20  # number of bisections that bracket a critical load within a step
+_STEPS = 400  # maximum number of steps along a path
+_CORRECTIONS = 8  # maximum number of Newton corrections in a step
+_CLOSED = 1e-10  # [-] convergence tolerance on the arc length of a correction
+_SMALLEST = 1e-6  # [-] minimum step length, relative to the first step
+_HALVINGS = 20  # number of bisections to locate a critical load within a step
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,9 +66,9 @@ class _Place:
         local: expansion of the problem at the equilibrium.
         motion: (N,) derivative of the unknowns with respect to arc length.
         rise: [N or N m] derivative of the load with respect to arc length.
-        curvatures: (k,) second derivatives of the potential along its modes, lowest
-            first; only their signs are used.
-        modes: (N, k) the modes.
+        curvatures: (k,) second derivatives of the potential along the modes, in
+            ascending order.  Only their signs are used.
+        modes: (N, k) modes of the potential.
     """
 
     load: float
@@ -92,10 +93,9 @@ class _Path:
         component: component of the load that varies.
         rest: (6,) [N m, N] constant components of the load.
         gravity: (3,) [m/s^2] gravity vector, or None.
-        weight: factor on squared motions in the squared arc length, to which the
-            squared ratio of load to largest load is added.
-        range: [N or N m] largest load.
-        parts: owner of each spring.
+        weight: factor w of the arc length s, ds^2 = w |dx|^2 + (dload / range)^2.
+        range: [N or N m] difference between the first and the last load.
+        parts: link or joint to which each spring belongs.
         idle: number of motions without stiffness on which no load acts.
     """
 
@@ -117,17 +117,17 @@ class _Path:
         return expand(placement, loads, np.zeros(len(placement.residual)))
 
     def reference_load(self, local: Expansion) -> NDArray:
-        """Return the (N,) work of a unit load per unit of each unknown."""
+        """Return the work of a unit load per unit of each unknown, (N,)."""
         unit = dead_loads(self.posture, np.eye(6)[self.component])
         unit = replace(unit, drives=0 * unit.drives)
         return work_gradient(local.placement, unit)
 
     def covector(self, local: Expansion, motion: NDArray) -> NDArray:
-        """Return the (N,) inner product with a motion, in the arc-length metric."""
+        """Return the inner product of a motion with each unknown, (N,)."""
         return self.weight * motion / local.placement.model.units**2
 
     def modes(self, local: Expansion) -> tuple[NDArray, NDArray]:
-        """Return the curvatures of the potential, lowest first, and the motions Z."""
+        """Return the curvatures of the potential in ascending order, and the modes."""
         B, units = local.basis, local.placement.model.units
         values, motions = curvature_modes(B, B.T @ local.hessian @ B, units)
         kept = np.sort(np.argsort(np.abs(values))[self.idle :])
@@ -145,29 +145,30 @@ def follow_load(
     progress: Progress = lambda what, done, most: None,
     method: Method = "compiled",
 ) -> DeflectionCurve:
-    """Follow the path of equilibria until the load reaches a given value.
+    """Compute the path of equilibria until the load reaches a given value.
 
     Args:
         posture: the robot's configuration with its errors; clearances are fixed at
             zero.
         component: component of the load that varies, 0 to 5.
-        first: [N m or N] load at which the path begins.
-        last: [N m or N] load at which the path ends.
+        first: [N m or N] first load of the path.
+        last: [N m or N] last load of the path.
         load: (6,) [N m, N] constant components of the load.
         gravity: (3,) [m/s^2] gravity vector in base axes.
-        count: number of steps from the first to the last load if all steps were as long
-            as the first; steps grow to twice that length where the path is straight.
-        progress: function called with the current and the largest number of points.
-        method: method of the first equilibrium; the path is then followed in numpy.
+        count: reciprocal of the first step's arc length.  Later steps are at most twice
+            as long.
+        progress: function called with the current and the maximum number of points.
+        method: method for the first equilibrium.  The other equilibria are computed in
+            numpy.
 
     Returns:
-        The curve, whose events are the ``"critical"`` loads with their modes.
+        The curve.  Its events are the ``"critical"`` loads with their modes.
 
     Raises:
-        CannotAssemble: the errors cannot be closed.
-        FreeMotion: a load drives a motion that nothing resists.
-        NotConverged: no equilibrium was found at the first load or along the path; a
-            :class:`SolverFailed`.
+        CannotAssemble: the loops cannot be closed with these errors.
+        FreeMotion: a load acts on a motion without stiffness.
+        NotConverged: no equilibrium was found at the first load or along the path.
+            The class is derived from :class:`SolverFailed`.
         ValueError: the method is unknown.
     """
     check_method(method)
@@ -176,7 +177,7 @@ def follow_load(
     rest = np.zeros(6) if load is None else np.array(load, dtype=float)
     rest[component] = first
     start = solve_exact(tight, rest, gravity=gravity, method=method)
-    # reject a free motion that the load drives before the path is followed
+    # raises FreeMotion if the load acts on a motion without stiffness
     solve_assembly(tight, np.eye(6)[component], method=method)
     span = abs(last - first)
     cut = start.cut.cut(tight)
@@ -205,7 +206,7 @@ def follow_load(
 def _begin(
     path: _Path, start: ExactAssembly, first: float, last: float
 ) -> tuple[_Place, _Path]:
-    """Return the first equilibrium with its tangent, and the path to be followed."""
+    """Return the first equilibrium with its tangent, and the path to be computed."""
     local = start.expansion
     values, _ = path.modes(local)
     flat = np.abs(values) <= FLAT * np.abs(values).max(initial=0.0)
@@ -213,15 +214,15 @@ def _begin(
     values, Z = path.modes(local)
     motion = Z @ ((Z.T @ path.reference_load(local)) / values)
     size = np.linalg.norm(motion / local.placement.model.units) * path.range
-    weight = 1.0 / (size or 1.0) ** 2  # if the robot is rigid, the size is zero
-    # the weight is chosen so that the load contributes half of the arc length
+    weight = 1.0 / (size or 1.0) ** 2  # the size is zero if the robot is rigid
+    # the load and the unknowns contribute equally to the squared arc length
     rise = path.range / np.sqrt(2.0) * np.sign(last - first)
     place = _Place(first, local, motion * rise, float(rise), values, Z)
     return place, replace(path, weight=float(weight))
 
 
 def _advance(path: _Path, place: _Place, step: float) -> tuple[_Place | None, int]:
-    """Return the next equilibrium or None, and the number of Newton corrections."""
+    """Return the next equilibrium, or None, and the number of Newton corrections."""
     x0, load = place.local.placement.x, place.load
     x = x0 + step * place.motion
     load = load + step * place.rise
@@ -255,7 +256,7 @@ def _solve(
     path: _Path, local: Expansion, modes: tuple[NDArray, NDArray], tangent: NDArray,
     left: NDArray,
 ) -> NDArray | None:  # fmt: skip
-    """Return the change of the unknowns and of the load that removes a residual."""
+    """Return the Newton correction of the modes and of the load."""
     values, Z = modes
     M = np.zeros((len(left), len(left)))
     M[:-1, :-1] = np.diag(values)
@@ -270,7 +271,7 @@ def _solve(
 def _oriented(
     path: _Path, local: Expansion, load: float, normal_to: NDArray, rise: float
 ) -> _Place | None:
-    """Return an equilibrium with its unit tangent, in the direction of the path."""
+    """Return an equilibrium with the unit tangent to the path."""
     values, Z = path.modes(local)
     left = np.zeros(len(values) + 1)
     left[-1] = -1.0
@@ -286,18 +287,18 @@ def _oriented(
 
 
 def _critical(path: _Path, low: _Place, high: _Place, step: float) -> Event:
-    """Return the critical load between two points, with its mode."""
+    """Return the critical load between two points, and its mode."""
     start, short, long_ = low, 0.0, step
     for _ in range(_HALVINGS):
         middle, _ = _advance(path, start, (short + long_) / 2)
         if middle is None:
-            break  # the equations are singular, for example at a branch
+            break  # the equations are singular, for example at a branch point
         if middle.unstable == start.unstable:
             low, short = middle, (short + long_) / 2
         else:
             high, long_ = middle, (short + long_) / 2
     turns = low.rise * high.rise < 0
-    # on the side with more negative modes, the critical mode is the last negative one
+    # the curvature of the critical mode is the negative one nearest to zero
     more = high if high.unstable > low.unstable else low
     soft = more.unstable - 1
     bent = more.modes[:, soft]
@@ -315,7 +316,7 @@ def _curve(
     path: _Path, posture: Posture, places: list[_Place], events: list[Event],
     method: Method,
 ) -> DeflectionCurve:  # fmt: skip
-    """Return the points and events as a curve."""
+    """Return the load-deflection curve of these points and events."""
     screws = np.array([p.local.placement.platform_screw for p in places])
     moved = [p.local.placement.platform_rows[path.component] @ p.motion for p in places]
     with np.errstate(divide="ignore"):

@@ -1,17 +1,15 @@
 """Platform deflection as a function of a load, with contact changes and buckling.
 
-One component of the load takes a list of values while the others are constant.  At each
-value, the equilibrium is computed by problem (22) or with finite motions.  With finite
-motions, each equilibrium serves as the initial guess for the next, so that a path can
-be followed forwards or backwards.  The curve has a kink where the set of closed
-clearances (clearances that carry a force) changes.  The load is critical where the
-smallest curvature of the potential passes through zero.  There, the path of equilibria
-branches, or it ends and the platform jumps to another equilibrium.  Critical loads are
-bracketed by bisection.
+One component of the load varies, and the other components are constant.  For each load,
+the equilibrium is computed by problem (22) or with finite motions.  With finite
+motions, each equilibrium is the initial guess for the next.
 
-Because the load is prescribed, only the stable part of a path that turns back is found,
-and the jump over the unstable part is reported.  Use :mod:`.arc_length` to follow that
-part.
+The curve has a kink where a contact in a clearance opens or closes.  The load is
+critical where the smallest curvature of the potential changes sign.  There, the path of
+equilibria branches, or the platform jumps to a distant equilibrium.  Both events are
+located by bisection.
+
+Unstable equilibria are not found; see :mod:`.arc_length`.
 """
 
 from collections.abc import Callable, Sequence
@@ -49,21 +47,15 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-_HALVINGS = 14  # bisections that locate an event to 6e-5 of a load step
-# product of force and bound, relative to the largest product, that counts as zero
+_HALVINGS = 14  # number of bisections, for an accuracy of 6e-5 of a load step
+# [-] threshold of a zero contact force, relative to the largest contact force
 _CARRIES = 1e-6
-# largest number of contact changes that are followed within a load step: in symmetric
-# robots, round-off can cause forces in some contacts
-_CHANGES = 8
-# platform motion, relative to the largest motion in a mode, below which the platform
-# counts as fixed
+_CHANGES = 8  # maximum number of changes of contact within a load step
+# [-] threshold of a zero platform motion, relative to the largest of all modes
 _STAYS = 1e-6
-_STILL = 1e-12  # smaller motions, in characteristic lengths, count as round-off
-# a motion is a jump if it exceeds the prediction of both tangents by this factor
-_JUMP = 5.0
-# relative to the largest load: below this load, clearances can leave the pose
-# undetermined
-_NO_LOAD = 1e-9
+_STILL = 1e-12  # [characteristic lengths] round-off of platform motions
+_JUMP = 5.0  # [-] smallest ratio of a jump to the motion predicted by the tangents
+_NO_LOAD = 1e-9  # [-] threshold of a zero load, relative to the largest load
 
 
 @dataclass(frozen=True)
@@ -73,9 +65,8 @@ class Event:
     Attributes:
         load: [N or N m] load at the event, or directly after it.
         kind: ``"contact"``, ``"release"``, ``"critical"`` or ``"jump"``.
-        what: description: the clearances, the mode or the distance.
-        deflection: [rad or m] deflection of the platform at the event, along the load's
-            component.
+        what: description of the clearances, of the mode or of the distance.
+        deflection: [rad or m] component of the platform's deflection along the load.
     """
 
     load: float
@@ -91,13 +82,13 @@ class DeflectionCurve:
     Attributes:
         posture: the robot's nominal configuration.
         component: component of the wrench and of the screw, 0 to 5.
-        loads: (k,) [N m or N] values of that component, in the order of application.
+        loads: (k,) [N m or N] values of this component, in the order of application.
         screws: (k, 6) [rad, m] screws of the platform at its origin, base axes.
         energies: (k,) [J] elastic energies.
-        stiffness: (k,) [N m/rad or N/m] tangent stiffness along the component, with the
-            other components of the motion free.
-        pressed: (k,) names of the closed clearances, which carry a force.
-        open_: (k,) bool, True if clearances leave the pose undetermined.
+        stiffness: (k,) [N m/rad or N/m] tangent stiffness along this component, with
+            the other components of the motion free.
+        pressed: (k,) names of the clearances with a contact force.
+        open_: (k,) bool, True if the pose is undetermined because of clearances.
         events: events in the order of the curve.
         method: requested method of all equilibria: ``"compiled"`` or ``"reference"``.
     """
@@ -122,14 +113,14 @@ class DeflectionCurve:
         return curve_dataset(self)
 
     def to_pandas(self) -> "pandas.DataFrame":
-        """Return a table with one row per load and columns (variable, component)."""
+        """Return a pandas table with a row for each load."""
         from forcefit.assembly.model.tables import frame_table
 
         return frame_table(self.to_xarray(), "point")
 
     @property
     def deflection(self) -> NDArray:
-        """(k,) [rad or m] deflections along the component."""
+        """Deflections along the component of the load, (k,) [rad or m]."""
         return self.screws[:, self.component]
 
 
@@ -167,8 +158,8 @@ def deflection_curve(
         load: (6,) [N m, N] constant components, at the platform's origin, base axes; or
             a mapping of components such as ``{"fz": -50}``.
         gravity: (3,) [m/s^2] gravity vector in base axes.
-        state: ``"contact"``, by problem (22); ``"exact"``, with finite motions.
-        progress: function called at each load with the current and the largest number
+        state: ``"contact"`` for problem (22), or ``"exact"`` for finite motions.
+        progress: function called at each load with the current and the maximum number
             of steps.
         method: method of :func:`forcefit.assembly.linear.energy.solve_assembly` or
             :func:`forcefit.assembly.exact.exact.solve_exact`.
@@ -177,9 +168,9 @@ def deflection_curve(
         The curve with its kinks and critical loads.
 
     Raises:
-        CannotAssemble: the errors cannot be closed.
-        FreeMotion: the load drives a motion that nothing resists.
-        SolverFailed: no equilibrium was found; the message contains the load.
+        CannotAssemble: the loops cannot be closed with these errors.
+        FreeMotion: the load acts on a motion without stiffness.
+        SolverFailed: no equilibrium was found.
         BadInput: the component is unknown, or the loads are missing or not numbers.
         ValueError: ``state`` or ``method`` is unknown.
     """
@@ -260,7 +251,7 @@ def _solve(
             posture, wrench, gravity=gravity, progress=progress, method=method
         )
     active, force = active_clearances(equilibrium.expansion)
-    # omit contacts whose forces are only round-off
+    # omit contacts whose forces are round-off
     active &= force > _CARRIES * force.max(initial=0.0)
     names = clearance_names(equilibrium.expansion.placement.model.joints, active)
     return _Point(value, equilibrium, exact_tangent(equilibrium, "unloading"), names)
@@ -270,9 +261,9 @@ def _settled(
     point: _Point, largest: float, rest: NDArray, gravity: ArrayLike | None,
     method: Method,
 ) -> tuple[NDArray, bool]:  # fmt: skip
-    """Return the platform screw, and whether clearances leave the pose undetermined.
+    """Return the platform screw, and whether the pose is undetermined.
 
-    If they do, the screw is the one nearest to nominal.
+    Of all possible poses, the pose nearest to nominal is returned.
     """
     equilibrium = point.equilibrium
     others = rest.any() or gravity is not None or driven(equilibrium.posture.robot)
@@ -284,10 +275,10 @@ def _settled(
 
 
 def clearance_names(joints: VirtualJoints, marked: NDArray) -> frozenset[str]:
-    """Return the names, such as ``"leg1.elbow radial"``, of selected clearances.
+    """Return the names of selected clearances, such as ``"leg1.elbow radial"``.
 
     Args:
-        joints: the virtual joints with these clearances.
+        joints: virtual joints with clearances.
         marked: (cones,) bool, True for the selected clearances.
 
     Returns:
@@ -337,7 +328,7 @@ def _events(
 
 
 def _event(point: _Point, kind: str, what: str, component: int) -> Event:
-    """Return an event at a point."""
+    """Return an event at a point of the curve."""
     moved = float(point.equilibrium.platform_screw[component])
     return Event(point.load, kind, what, moved)
 
@@ -345,18 +336,21 @@ def _event(point: _Point, kind: str, what: str, component: int) -> Event:
 def _bracket(
     low: _Point, high: _Point, at: _Solver, same: Callable[[_Point], bool]
 ) -> tuple[_Point, _Point]:
-    """Bracket the first change of a property between two close loads."""
+    """Return two close loads between which a property changes."""
     for _ in range(_HALVINGS):
         try:
             middle = at((low.load + high.load) / 2, low)
         except SolverFailed:
-            break  # for example, between free motion and the smallest load
+            break  # for example, a load below the contact tolerance
         low, high = (middle, high) if same(middle) else (low, middle)
     return low, high
 
 
 def _apart(one: _Point, other: _Point) -> float:
-    """Return the distance [m] between platform poses, with rotations times a length."""
+    """Return the distance [m] between platform poses.
+
+    Rotations are multiplied by the characteristic length.
+    """
     change = other.equilibrium.platform_screw - one.equilibrium.platform_screw
     return float(np.linalg.norm(change * np.repeat([one.tangent.length, 1.0], 3)))
 
@@ -371,11 +365,11 @@ def _jumps(before: _Point, after: _Point, component: int) -> bool:
     step = abs(after.load - before.load)
     apart = _apart(before, after)
     moved = apart > _STILL * before.tangent.length
-    return moved and apart > _JUMP * step * farthest  # False if the platform is free
+    return moved and apart > _JUMP * step * farthest  # a free platform does not jump
 
 
 def _mode(point: _Point) -> str:
-    """Describe the mode of negative stiffness by platform motion and deformed part."""
+    """Return a description of the mode with negative stiffness."""
     tangent = point.tangent
     soft = int(np.flatnonzero(tangent.signs < 0)[0])
     return "buckles: " + mode_text(
@@ -386,25 +380,31 @@ def _mode(point: _Point) -> str:
 def mode_text(
     screws: NDArray, mode: int, springs: NDArray, parts: Sequence[Part], length: float
 ) -> str:
-    """Describe a mode by the platform motion and the part that deforms most.
+    """Return a description of a mode.
 
     Args:
         screws: (6, k) [rad, m] screws of the platform in all modes, with a common
             factor.
         mode: index of the mode.
         springs: (m,) [sqrt(2 J)] deformations of the springs in this mode.
-        parts: (m,) owner of each spring.
-        length: [m] factor that makes rotations comparable with translations.
+        parts: (m,) link or joint to which each spring belongs.
+        length: [m] characteristic length, by which rotations are multiplied.
 
     Returns:
-        Text with the unit screw of the platform, or the statement that it does not
-        move; and the name of the part that deforms most.
+        Text with the unit screw of the platform and the link or joint that deforms
+        most.
     """
     part = parts[largest_row(np.square(springs))]
     scale, screw = np.repeat([length, 1.0], 3), screws[:, mode]
     sizes = np.linalg.norm(screws * scale[:, None], axis=0)
     size = sizes[mode]
     if size <= _STAYS * sizes.max():
-        return f"inside the links, the platform stays; most in {part.frame} {part.kind}"
+        return (
+            "no motion of the platform, largest deformation in "
+            f"{part.frame} {part.kind}"
+        )
     way = np.where(np.abs(screw) * scale > 1e-6 * size, screw / (size or 1.0), 0.0)
-    return f"platform along {numbers(way)} rad, m; most in {part.frame} {part.kind}"
+    return (
+        f"platform motion {numbers(way)} rad, m, largest deformation in "
+        f"{part.frame} {part.kind}"
+    )

@@ -1,22 +1,22 @@
 r"""Tangent stiffness of the exact equilibrium on SE(3), including geometric stiffness.
 
-Near an equilibrium the unknowns move by Z t, which satisfies the closures and keeps
-closed clearances at their bounds.  The total potential (energy minus the work of the
-loads) changes by t.Z'HZt / 2, where H is the exact Hessian of the Lagrangian.  It
-includes the springs and the effect of assembly forces and loads on rotating parts.  A
-small additional wrench w does the work w.(V Z t), where V Z t is the platform's small
-motion from its current pose, in base axes.  The compliance is C = V Z (Z'HZ)^-1 Z'V'.
+Small motions Z t of the unknowns satisfy the linearised constraints: loops remain
+closed, and contacts in clearances remain in contact.  The potential (energy minus the
+work of the loads) changes by t.Z'HZt / 2, where H is the exact Hessian of the
+Lagrangian.  H includes the geometric stiffness due to internal forces and loads.  The
+small motion of the platform is V Z t, in base axes, and its compliance is
 
-The potential is stationary at the equilibrium, so its second derivative does not depend
-on the chart of SE(3), and C and K are symmetric in any coordinates of the platform.
-Both depend on how the existing load follows the motion.  Here the force is a dead load,
-and the work of the moment m is m . theta, where theta is the rotation vector from the
-nominal posture.  A moment that is constant in base axes has no potential: near theta =
-0 it adds the antisymmetric skew(m) / 2 to the rotational block of K.
+    C = V Z (Z'HZ)^-1 Z'V'.
+
+C is symmetric because the potential is stationary at an equilibrium.  The force on the
+platform is a dead load.  The work of the moment m on the platform is m . theta, where
+theta is the rotation vector from the nominal posture.  A moment that is constant in
+base axes is not conservative.  Near theta = 0, it would add the antisymmetric matrix
+skew(m) / 2 to the rotational block of K.
 
 Sources:
     Zefran, Kumar (2002), A geometrical approach to the study of the Cartesian stiffness
-    matrix (charts, connections; symmetry where the potential is stationary).
+    matrix (symmetry of the stiffness at an equilibrium).
 """
 
 import numpy as np
@@ -34,8 +34,7 @@ from forcefit.assembly.platform_stiffness.matrices import (
     unit_screws,
 )
 
-# relative to the largest curvature of the potential: smaller ones count as zero
-FLAT = 1e-12
+FLAT = 1e-12  # [-] threshold of a zero curvature, relative to the largest
 
 
 def exact_tangent(
@@ -44,13 +43,13 @@ def exact_tangent(
     """Return the stiffness of the platform at an exact equilibrium.
 
     Args:
-        equilibrium: the manipulator assembled with finite motions, under its loads.
-        side: behaviour of clearances at their bound without a force: ``"loading"`` if
-            they stay at the bound, ``"unloading"`` if they leave it.
+        equilibrium: equilibrium of the robot with finite motions.
+        side: ``"loading"`` if contacts without a force remain closed, ``"unloading"``
+            if they open.
 
     Returns:
-        The stiffness at the platform's displaced origin, base axes; modes of negative
-        curvature have the sign -1.
+        The stiffness at the displaced origin of the platform, base axes.  Modes with
+        negative curvature have the sign -1.
     """
     local = equilibrium.expansion
     model, at = local.placement.model, local.placement
@@ -74,7 +73,7 @@ def exact_tangent(
 
 
 def part_owners(equilibrium: ExactAssembly) -> tuple[Part, ...]:
-    """Return the owner of each spring; the pieces of a beam belong to the beam."""
+    """Return the link or joint to which each spring belongs."""
     cut, robot = equilibrium.cut, equilibrium.posture.robot
     parts = owners(equilibrium.expansion.placement.model.joints)
     rows = [cut.owner[row_of(cut.robot, part.frame)] for part in parts]
@@ -85,7 +84,10 @@ def part_owners(equilibrium: ExactAssembly) -> tuple[Part, ...]:
 
 
 def platform_moves(local: Expansion) -> NDArray:
-    """Return (6, N) small motions of the platform at its current origin, base axes."""
+    """Return the platform's small motion per unit of each unknown, (6, N).
+
+    The reference point is the displaced origin of the platform; base axes.
+    """
     rows = local.placement.platform_rows.copy()
     rows[:3] = turn_jacobian(local.placement.platform_screw[:3]) @ rows[:3]
     return rows

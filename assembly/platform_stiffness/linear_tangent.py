@@ -1,18 +1,18 @@
-r"""Modes of the linear virtual-joint model: motions that the closures allow.
+r"""Modes of the linear virtual-joint model: motions that keep all loops closed.
 
-Without loads, the small motions of springs y and free joints q satisfy the closures,
+Without loads, small motions y of the springs and q of the free joints satisfy the
+loop-closure equations,
 
     A_q q + A_y y = 0,      platform screw  P_q q + P_y y.
 
-Multiplication by rows orthogonal to A_q eliminates q, which leads to Z'A_y y = 0.  The
-solutions y = W t, with W orthonormal, are the modes.  Their energy is t.t / 2, and C =
-L L', where L contains the platform's screws.  Because compliances are never added,
-stiff and soft springs retain their relative accuracy.
+Multiplication by Z', whose rows are orthogonal to the columns of A_q, eliminates q.
+The solutions y = W t of Z'A_y y = 0, with W orthonormal, are the modes.  Their energy
+is t.t / 2, and C = L L', where the columns of L are the platform screws of the modes.
 
-A clearance is either fixed at zero (classical model) or in its state in problem (22):
-free within its bound, or closed.  A closed clearance is rigid in the direction normal
-to its bound.  Along a round bound it is compliant: sliding along the bound rotates the
-contact force f [J, per unit of the bound], which thus acts as a spring of stiffness f.
+In the classical model, clearances are fixed at zero.  In problem (22), a clearance is
+either free or closed.  A closed clearance is rigid in the direction normal to its
+bound.  If the joint slides along a round bound, the contact force f [J, per unit of the
+bound] rotates and acts like a spring of stiffness f.
 
 Sources:
     Pashkevich, Chablat, Wenger (2009), Stiffness analysis of overconstrained parallel
@@ -47,8 +47,8 @@ from forcefit.assembly.platform_stiffness.matrices import (
 from forcefit.assembly.solvers.method import Method
 
 Side = Literal["loading", "unloading"]
-_RANK = 1e-10  # relative size below which a singular value counts as zero
-_NOISE = 1e-12  # relative round-off of a column that a projection removes
+_RANK = 1e-10  # [-] threshold of a zero singular value, relative to the largest
+_NOISE = 1e-12  # [-] relative round-off of a projection
 
 
 def without_clearance(posture: Posture) -> PlatformStiffness:
@@ -66,16 +66,15 @@ def without_clearance(posture: Posture) -> PlatformStiffness:
 
 
 def in_contact(assembly: Assembly, side: Side = "loading") -> PlatformStiffness:
-    """Return the tangent of problem (22), with each clearance free or closed.
+    """Return the tangent stiffness of problem (22) at an equilibrium.
 
     Args:
         assembly: minimum-energy assembly under its loads.
-        side: behaviour of clearances at their bound without a force: ``"loading"`` if
-            they stay at the bound, ``"unloading"`` if they leave it.
+        side: ``"loading"`` if contacts without a force remain closed, ``"unloading"``
+            if they open.
 
     Returns:
-        The stiffness at the platform's origin, from the second derivative of the
-        minimum potential.
+        The stiffness at the platform's origin.
     """
     return active_tangent(settle(assembly), side)
 
@@ -85,8 +84,7 @@ def active_tangent(assembly: Assembly, side: Side = "loading") -> PlatformStiffn
 
     Args:
         assembly: assembly whose clearances are accurate to machine precision.
-        side: behaviour of clearances at their bound without a force, see
-            :func:`in_contact`.
+        side: behaviour of contacts without a force, see :func:`in_contact`.
 
     Returns:
         The stiffness at the platform's origin.
@@ -114,20 +112,20 @@ def active_tangent(assembly: Assembly, side: Side = "loading") -> PlatformStiffn
 
 
 def _tangents(u: NDArray) -> NDArray:
-    """Return (d - 1, d) directions along the boundary of a cone at its point u (d,)."""
+    """Return the tangents to the boundary of a cone at a point u (d,), (d - 1, d)."""
     if len(u) == 2:
         return np.array([[-u[1], u[0]]])
     return np.asarray(np.linalg.svd(u[None])[2][1:])
 
 
 def _frame(joints: VirtualJoints, column: int) -> str:
-    """Return the name of the frame or joint of a clearance."""
+    """Return the name of the frame or joint that has a clearance."""
     row = int(np.abs(joints.cones[:, column]).argmax()) // 6
     return shown_name(joints.robot, row)
 
 
 def owners(joints: VirtualJoints) -> list[Part]:
-    """Return the owner of each column of ``joints.elastic``."""
+    """Return the link or joint of each column of ``joints.elastic``."""
     rows = np.abs(joints.elastic).argmax(axis=0) // 6 if joints.elastic.size else ()
     return [
         Part(shown_name(joints.robot, row), "link" if link else "joint")
@@ -139,7 +137,7 @@ def _stiffness(
     lin: Linearisation, state: str, springs: NDArray, parts: list[Part], free: NDArray,
     method: Method,
 ) -> PlatformStiffness:  # fmt: skip
-    """Reduce springs and free motions to modes; see the module docstring."""
+    """Return the stiffness computed from the modes, see the module docstring."""
     free = free / _sizes(free, lin.size)
     A_q, A_y = lin.rows @ free, lin.rows @ springs
     tolerance = _RANK + 30.0 * lin.posture.mismatch
@@ -167,7 +165,7 @@ def _stiffness(
 
 
 def _sizes(columns: NDArray, length: float) -> NDArray:
-    """Return the sizes of screws, in rad and reference lengths."""
+    """Return the norms of screws, in rad and reference lengths."""
     weights = np.tile(in_reference_lengths(length), len(columns) // 6)
     return np.linalg.norm(columns * weights[:, None], axis=0)
 

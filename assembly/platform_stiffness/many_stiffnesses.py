@@ -1,4 +1,4 @@
-"""Platform stiffness at many postures, with the contribution of each part."""
+"""Platform stiffness at many postures, with the contribution of each component."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -25,30 +25,29 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-# relative size below which a singular value of the compliance root denotes rigidity
-_RANK = 1e-10
+_RANK = 1e-10  # [-] threshold of a zero singular value, relative to the largest
 
 
 @dataclass(frozen=True, eq=False)
 class Stiffnesses:
     """Stiffness of the platform at k postures; ``[i]`` returns posture i.
 
-    The shapes of the arrays of :class:`PlatformStiffness` (modes, free motions, rigid
-    directions) vary between postures.  This class therefore stores only arrays of
-    constant shape: compliances, eigen-stiffnesses and shares.
+    The number of modes, free motions and rigid directions varies between postures.
+    This class therefore stores only arrays that have the same shape for all postures.
 
     Attributes:
         posture: the robot's nominal configuration, k postures.
         state: state, see :class:`PlatformStiffness`.
         point: (k, 3) [m] reference point of screws and wrenches, base axes.
         length: [m] characteristic length.
-        springs: (k, ny, 6) [sqrt(2 J) per N m and N] deformation of every spring under
-            unit wrenches at that point, base axes; NaN for postures in ``apart``.
-        parts: (ny,) owner of each spring.
-        method: (k,) method used to solve for the stiffness or its equilibrium:
-            ``"compiled"`` or ``"reference"``.
-        apart: stiffnesses stored with their modes, by posture number: those with a free
-            platform motion, and all stiffnesses in states other than ``"nominal"``.
+        springs: (k, ny, 6) [sqrt(2 J) per N m and N] deformations of the springs under
+            unit wrenches at this point, base axes; NaN for postures in ``apart``.
+        parts: (ny,) link or joint to which each spring belongs.
+        method: (k,) method used for the stiffness or its equilibrium, ``"compiled"`` or
+            ``"reference"``.
+        apart: stiffnesses that are stored as :class:`PlatformStiffness`, by index of
+            the posture.  Either the platform can move freely, or the state is not
+            ``"nominal"``.
     """
 
     posture: Posture
@@ -66,7 +65,7 @@ class Stiffnesses:
         return len(self.springs)
 
     def __getitem__(self, i: int) -> PlatformStiffness:
-        """Return posture i; its modes are at most six combinations of the springs."""
+        """Return the stiffness at posture i."""
         i = range(len(self))[i]
         if i in self.apart:
             return self.apart[i]
@@ -91,7 +90,7 @@ class Stiffnesses:
         return stiffnesses_dataset(self)
 
     def to_pandas(self) -> "pandas.DataFrame":
-        """Return a table with one row per point and columns (variable, component)."""
+        """Return a pandas table with a row for each posture."""
         from forcefit.assembly.model.tables import frame_table
 
         return frame_table(self.to_xarray(), "point")
@@ -111,7 +110,7 @@ class Stiffnesses:
 
     @cached_property
     def compliance(self) -> NDArray:
-        """(k, 6, 6) [rad/(N m) .. m/N]; NaN in components along a free motion."""
+        """Compliance, (k, 6, 6) [rad/(N m) .. m/N]; NaN along free motions."""
         compliance = np.swapaxes(self.springs, 1, 2) @ self.springs
         for row, one in self.apart.items():
             compliance[row] = one.compliance
@@ -119,9 +118,9 @@ class Stiffnesses:
 
     @cached_property
     def _roots(self) -> tuple[NDArray, NDArray]:
-        """Singular values (k, 6), vectors (k, 6, 6) of the scaled compliance roots."""
+        """Singular values (k, 6) and vectors (k, 6, 6) of the scaled ``springs``."""
         scale = np.repeat([self.length, 1.0], 3)
-        # a triangular factor reduces the many rows of springs to six
+        # a QR factorisation reduces the number of rows to six
         known = np.isfinite(self.springs).all(axis=(1, 2))
         values = np.full((len(self.springs), 6), np.nan)
         vectors = np.full((len(self.springs), 6, 6), np.nan)
@@ -135,9 +134,10 @@ class Stiffnesses:
 
     @cached_property
     def eigen_stiffnesses(self) -> NDArray:
-        """(k, 6) [N/m] eigen-stiffnesses, softest first, rotations times the length.
+        """Principal stiffnesses in ascending order, (k, 6) [N/m].
 
-        Values are inf for rigid directions and 0 for free motions.
+        Rotations are multiplied by the characteristic length.  Values are inf for rigid
+        directions and 0 for free motions.
         """
         values, _ = self._roots
         rigid = values <= _RANK * values[:, :1]
@@ -149,7 +149,7 @@ class Stiffnesses:
 
     @cached_property
     def eigen_screws(self) -> NDArray:
-        """(k, 6, 6) [rad, m] screws of the eigen-stiffnesses, in columns."""
+        """Screws of the principal stiffnesses, in columns, (k, 6, 6) [rad, m]."""
         screws = self._roots[1] / np.repeat([self.length, 1.0], 3)[:, None]
         for row, one in self.apart.items():
             screws[row] = one.eigen.screws
@@ -157,23 +157,24 @@ class Stiffnesses:
 
     @property
     def condition(self) -> NDArray:
-        """(k,) [-] ratio of the stiffest to the softest eigen-stiffness."""
+        """Ratio of the largest to the smallest principal stiffness, (k,)."""
         with np.errstate(divide="ignore"):
             return self.eigen_stiffnesses[:, -1] / self.eigen_stiffnesses[:, 0]
 
     def along(self, direction: ArrayLike) -> NDArray:
-        """Return (k,) [N m/rad or N/m] stiffness along a direction, other motions free.
+        """Return the stiffness along a direction, with all other motions free.
 
         Args:
-            direction: (6,) unit direction of a wrench.
+            direction: (6,) unit direction d of a wrench.
 
         Returns:
-            1 / (d . C d); inf for a rigid direction, 0 along a free motion.
+            1 / (d . C d), (k,) [N m/rad or N/m]; inf for a rigid direction and 0 along
+            a free motion.
         """
         d, scale = np.asarray(direction), np.repeat([self.length, 1.0], 3)
         compliance = np.sum((self.springs @ d) ** 2, axis=1)
         largest = np.sum((self.springs * scale) ** 2, axis=(1, 2))
-        # along a motion that no part allows, the compliance is only round-off
+        # the compliance along a rigid direction is round-off
         still = compliance <= _RANK**2 * largest * np.sum((d / scale) ** 2)
         with np.errstate(divide="ignore"):
             K = 1.0 / np.where(still, 0.0, compliance)
@@ -182,14 +183,14 @@ class Stiffnesses:
         return K
 
     def shares(self, direction: ArrayLike) -> dict[Part, NDArray]:
-        """Return the (k,) share of each part in the compliance along a direction.
+        """Return the compliance share of each component along a direction.
 
         Args:
             direction: (6,) direction of a wrench.
 
         Returns:
-            Shares by part, which add up to 1, or NaN at postures with a free motion.
-            Clearances and forces are treated as in :meth:`PlatformStiffness.shares`.
+            Shares (k,) of each component, which add up to 1.  They are NaN at postures
+            with a free motion.  See :meth:`PlatformStiffness.shares`.
         """
         energies = (self.springs @ np.asarray(direction)) ** 2
         with np.errstate(invalid="ignore"):
@@ -209,9 +210,8 @@ def many_without_clearance(posture: Posture, method: Method) -> Stiffnesses:
 
     Args:
         posture: k postures.
-        method: ``"compiled"``, which falls back on the reference for postures that the
-            compiled method does not cover; or ``"reference"``, in numpy, one posture at
-            a time.
+        method: ``"compiled"`` or ``"reference"``.  The compiled method uses the
+            reference method for postures that it does not support.
 
     Returns:
         The stiffnesses at the platform's origin.
@@ -229,7 +229,7 @@ def many_without_clearance(posture: Posture, method: Method) -> Stiffnesses:
         log_reference(posture.robot.name, "platform stiffness", count, len(left))
     size = size_of(posture.robot)
     springs = np.zeros((len(T), joints.elastic.shape[1], 6))
-    # the translations in the kernel are divided by the reference length
+    # the C++ function divides translations by the reference length
     unit = np.repeat([1.0, size], 3)
     springs[:, structure.spring_order] = np.swapaxes(inner, 1, 2) * unit
     apart = {}
@@ -251,11 +251,11 @@ def many_without_clearance(posture: Posture, method: Method) -> Stiffnesses:
 
 
 def many_of_each(posture: Posture, each: Sequence[PlatformStiffness]) -> Stiffnesses:
-    """Collect stiffnesses that have already been computed.
+    """Return an object that contains stiffnesses at many postures.
 
     Args:
         posture: k postures.
-        each: k stiffnesses of the same state.
+        each: k stiffnesses with the same state.
 
     Returns:
         All stiffnesses in one object.

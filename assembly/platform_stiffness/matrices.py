@@ -1,18 +1,17 @@
 r"""Stiffness and compliance matrices of the platform, and derived quantities.
 
-A small wrench w on the platform moves it by s = C w, and holding the platform at s
-requires the wrench K s.  Both matrices are computed from the modes of the manipulator,
-which are combinations of the motions that its closures allow.  The energy of a mode is
-sigma / 2 per squared unit, with sigma = +-1.
+A small wrench w displaces the platform by the screw s = C w, and w = K s.  Both
+matrices are computed from the modes of the manipulator, which are motions that keep all
+loops closed.  A mode of amplitude a has the energy sigma a^2 / 2, with sigma = +-1.
 
 ======  ==============  ========  ====================================================
 symbol  code            shape     meaning
 ======  ==============  ========  ====================================================
 L       ``root``        (6, k)    platform screw of each mode: C = L diag(sigma) L^T
-sigma   ``signs``       (k,)      -1 only for unstable directions of an equilibrium
+sigma   ``signs``       (k,)      -1 for unstable modes, 1 for all others
 Y       ``springs``     (m, k)    scaled deformation of the springs in each mode
 F       ``free``        (6, f)    unit screws of the platform without resistance
-l       ``length``      m         converts rotations to lengths, for eigenvalues
+l       ``length``      [m]       characteristic length; multiplies rotations
 ======  ==============  ========  ====================================================
 
 Free motions make compliances infinite, and rigid directions make stiffnesses infinite.
@@ -23,7 +22,7 @@ Sources:
     coordinates (the Cartesian stiffness matrix).
     Loncaric (1987), Normal forms of stiffness and compliance matrices (the centre).
     Lipkin, Patterson (1992), Geometrical properties of modelled robot elasticity
-    (eigenscrews; why a length must be chosen).
+    (eigenscrews; choice of a characteristic length).
 """
 
 from dataclasses import dataclass, replace
@@ -45,16 +44,17 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-_RANK = 1e-10  # relative size below which a motion counts as zero
-_ROUNDING = 1e-12  # relative round-off in platform motions
-_UNTOUCHED = 1e-9  # component of a unit screw below which it counts as zero
+_RANK = 1e-10  # [-] threshold of a zero motion, relative to the largest
+_ROUNDING = 1e-12  # [-] relative round-off of platform motions
+_UNTOUCHED = 1e-9  # [-] threshold of a zero component of a unit screw
 
 
 class Part(NamedTuple):
-    """Deformable part: the ``link``, ``joint`` or ``clearance`` of a frame.
+    """Compliant component of a robot.
 
-    ``frame`` can be the name of a joint that consists of several frames
-    (:func:`forcefit.assembly.model.joint_names.shown_name`).
+    Attributes:
+        frame: name of the frame, or of a joint that consists of several frames.
+        kind: ``"link"``, ``"joint"`` or ``"clearance"``.
     """
 
     frame: str
@@ -62,19 +62,21 @@ class Part(NamedTuple):
 
     @property
     def words(self) -> str:
-        """Name in tables, such as ``"leg1.link_a link"``."""
+        """Name of the component in printed tables, such as ``"leg1.link_a link"``."""
         known = f"{self.frame} {self.kind}"
         return known if self.frame else "internal forces and loads"
 
 
 @dataclass(frozen=True, eq=False)
 class EigenStiffnesses:
-    """Principal stiffnesses in ascending order, with rotations scaled to lengths.
+    """Principal stiffnesses in ascending order.
+
+    Rotations are multiplied by the characteristic length.
 
     Attributes:
         values: (6,) [N/m] principal stiffnesses: 0 along free motions, inf along rigid
             directions.
-        screws: (6, 6) [rad, m] screws in columns, of unit size after rotations are
+        screws: (6, 6) [rad, m] screws in columns, of unit size if rotations are
             multiplied by the length.
         length: [m] characteristic length.
     """
@@ -87,13 +89,16 @@ class EigenStiffnesses:
 
     @property
     def condition(self) -> float:
-        """[-] ratio of stiffest to softest; inf if a motion is free or rigid."""
+        """Ratio of the largest to the smallest principal stiffness.
+
+        It is inf if the platform can move freely or is rigid in a direction.
+        """
         least, most = self.values[0], self.values[-1]
         return float(most / least) if least > 0.0 and np.isfinite(most) else np.inf
 
     @property
     def pitches(self) -> NDArray:
-        """(6,) [m] pitch of each screw, inf for a translation."""
+        """Pitch of each screw, (6,) [m]; inf for a translation."""
         turn, shift = self.screws[:3], self.screws[3:]
         squared = np.sum(turn**2, axis=0)
         turns = squared * self.length**2 > _UNTOUCHED**2
@@ -114,10 +119,10 @@ class PlatformStiffness:
         root: (6, k) [rad, m] platform screw of each mode per sqrt(2 J).
         signs: (k,) sign of each mode's energy, 1 or -1.
         springs: (m, k) [sqrt(2 J)] deformations of the springs in each mode.
-        parts: (m,) owner of each spring.
+        parts: (m,) link or joint to which each spring belongs.
         free: (6, f) [rad, m] unit screws of the free motions.
-        method: method of the solution or of its equilibrium: ``"compiled"``, or
-            ``"reference"`` for numpy and Clarabel.
+        method: method used for the stiffness or its equilibrium, ``"compiled"`` or
+            ``"reference"`` (numpy and Clarabel).
     """
 
     posture: Posture
@@ -135,7 +140,7 @@ class PlatformStiffness:
     plot = show
 
     def _figures(self) -> Figures:
-        """Return the numbers that ``forcefit assembly stiffness`` prints first."""
+        """Return the quantities that are shown in the short representation."""
         eigen = self.eigen
         return {
             "state": self.state,
@@ -146,13 +151,13 @@ class PlatformStiffness:
         }
 
     def to_xarray(self) -> "xarray.Dataset":
-        """Return a data set; see :mod:`forcefit.assembly.platform_stiffness.tables`."""
+        """Return an xarray data set; see :mod:`.tables`."""
         from forcefit.assembly.platform_stiffness.tables import stiffness_dataset
 
         return stiffness_dataset(self)
 
     def to_pandas(self) -> "pandas.DataFrame":
-        """Return a table with the compliance share of each part along each axis."""
+        """Return a pandas table with the compliance shares along each axis."""
         from forcefit.assembly.model.tables import frame_table
 
         return frame_table(self.to_xarray(), "part")
@@ -161,8 +166,8 @@ class PlatformStiffness:
         """Return the stiffness at another point of the platform.
 
         Args:
-            point: (3,) [m] the point, base axes.
-            length: [m] new characteristic length; by default unchanged.
+            point: (3,) [m] reference point, base axes.
+            length: [m] new characteristic length; unchanged by default.
 
         Returns:
             The stiffness at this point.
@@ -176,25 +181,25 @@ class PlatformStiffness:
 
     @cached_property
     def compliance(self) -> NDArray:
-        """(6, 6) [rad/(N m) .. m/N] symmetric; NaN in components of a free motion."""
+        """Symmetric compliance, (6, 6) [rad/(N m) .. m/N]; NaN along free motions."""
         return _blank((self.root * self.signs) @ self.root.T, self.free)
 
     @cached_property
     def stiffness(self) -> NDArray:
-        """(6, 6) [N m/rad .. N/m] symmetric; NaN where the platform is rigid."""
+        """Symmetric stiffness, (6, 6) [N m/rad .. N/m]; NaN in rigid directions."""
         way, core, rigid = self._resisted
         K = way @ core @ way.T
         return _blank((K + K.T) / 2, rigid)
 
     @property
     def free_text(self) -> str:
-        """Description of the free platform motions; empty if there are none."""
+        """Description of the free platform motions, or an empty string."""
         screws = ", ".join(numbers(screw) for screw in self.free.T)
         return f"the platform moves freely along {screws} [rad, m]" * bool(screws)
 
     @property
     def rigid(self) -> NDArray:
-        """(6, r) [N m, N] unit wrenches that cause no motion."""
+        """Unit wrenches that do not move the platform, (6, r) [N m, N]."""
         return self._resisted[2]
 
     @property
@@ -204,17 +209,17 @@ class PlatformStiffness:
 
     @cached_property
     def _scale(self) -> NDArray:
-        """(6,) factors that multiply rotations by the characteristic length."""
+        """Factors that multiply rotations by the characteristic length, (6,)."""
         return np.array([*[self.length] * 3, 1.0, 1.0, 1.0])
 
     @cached_property
     def _resisted(self) -> tuple[NDArray, NDArray, NDArray]:
-        """Basis (6, r) of resisted wrenches, its stiffness, and rigid wrenches."""
+        """Basis of the elastic wrenches, stiffness in this basis, rigid wrenches."""
         scale = self._scale[:, None]
         basis = null_space((scale * self.free).T) if self.free.size else np.eye(6)
         whole = scale * self.root
         U, S, Vt = np.linalg.svd(basis.T @ whole)
-        # springs along free motions would cause round-off in other directions
+        # springs along free motions cause round-off in other directions
         rounding = _ROUNDING * np.abs(whole).max(initial=0.0)
         rank = int(np.sum(S > max(_RANK * S.max(initial=0.0), rounding)))
         inverse = np.diag(1.0 / S[:rank])
@@ -231,7 +236,7 @@ class PlatformStiffness:
         way, core, rigid = self._resisted
         values, vectors = np.linalg.eigh(core)
         scale = self._scale[:, None]
-        # the screws are orthonormal after rotations are multiplied by the length
+        # the screws are orthonormal if rotations are multiplied by the length
         screws = np.hstack([
             np.linalg.qr(scale * self.free)[0],
             way @ vectors / scale,
@@ -244,15 +249,15 @@ class PlatformStiffness:
         return EigenStiffnesses(values[order], screws[:, order] / scale, self.length)
 
     def along(self, direction: ArrayLike) -> tuple[float, float]:
-        """Return the stiffness along a direction, with other motions free and blocked.
+        """Return two stiffnesses along a direction.
 
         Args:
             direction: (6,) direction of a wrench and of a screw, such as
                 ``[0, 0, 0, 0, 0, 1]``.
 
         Returns:
-            [N/m or N m/rad] wrench per displacement if all other wrenches are zero, and
-            wrench per displacement if all other displacements are zero.
+            [N/m or N m/rad] stiffness with all other motions free, and stiffness with
+            all other motions blocked.
 
         Raises:
             BadInput: the direction is zero or is not six numbers.
@@ -264,13 +269,13 @@ class PlatformStiffness:
         return free, blocked
 
     def _compliance_along(self, d: NDArray) -> float:
-        """Return d . C d for a unit direction d; infinite along free motions."""
+        """Return d . C d for a unit direction d, or inf along free motions."""
         if _touches(self.free, d):
             return np.inf
         screws = self.root.T @ d
         largest = np.linalg.norm(self._scale[:, None] * self.root)
         if np.linalg.norm(screws) <= _RANK * largest * np.linalg.norm(d / self._scale):
-            return 0.0  # no part allows this motion, so the value is round-off
+            return 0.0  # the compliance along a rigid direction is round-off
         return float(self.signs @ screws**2)
 
     def _held(self, d: NDArray) -> float:
@@ -280,7 +285,7 @@ class PlatformStiffness:
 
     @cached_property
     def centre(self) -> NDArray:
-        """(3,) [m] centre of stiffness, base axes; NaN if there is none.
+        """Centre of stiffness in base axes, (3,) [m]; NaN if it does not exist.
 
         At this point, the block of K that maps translations to moments is symmetric.
         """
@@ -295,14 +300,15 @@ class PlatformStiffness:
         return self.point + np.linalg.solve(spread, axial)
 
     def contributions(self) -> dict[Part, NDArray]:
-        """Return the contribution of every part to the compliance.
+        """Return the contribution of each component to the compliance.
+
+        The contributions add up to :attr:`compliance`, except for the geometric
+        stiffness in the state ``"exact"``.  In the other states, a contribution is the
+        derivative of the compliance with respect to the logarithm of the component's
+        own compliance (Castigliano).
 
         Returns:
-            (6, 6) by part [rad/(N m) .. m/N], which add up to :attr:`compliance`,
-            except that in the state ``"exact"`` the effect of forces on rotating parts
-            is missing.  In the other states, each contribution equals the derivative of
-            the compliance with respect to the logarithm of the part's own compliance
-            (Castigliano).
+            Contribution of each component, (6, 6) [rad/(N m) .. m/N].
         """
         response = self.springs @ (self.signs[:, None] * self.root.T)
         shares: dict[Part, NDArray] = {}
@@ -311,15 +317,15 @@ class PlatformStiffness:
         return {part: _blank(C, self.free) for part, C in shares.items()}
 
     def shares(self, direction: ArrayLike) -> dict[Part, float]:
-        """Return the compliance share of each part along a direction.
+        """Return the compliance share of each component along a direction.
 
         Args:
             direction: (6,) direction of a wrench, such as ``[0, 0, 0, 0, 0, 1]``.
 
         Returns:
-            [-] shares by part, largest first, which add up to 1.  The part ``("",
-            "forces")`` stands for the effect of existing forces on rotating parts,
-            whose share can be negative.  NaN if the compliance is infinite or zero.
+            Shares in descending order, which add up to 1.  The share ``("", "forces")``
+            is due to the geometric stiffness and can be negative.  All shares are NaN
+            if the compliance is infinite or zero.
 
         Raises:
             BadInput: the direction is zero or is not six numbers.
@@ -342,12 +348,12 @@ def unit_screws(screws: NDArray, length: float) -> NDArray:
     """Return independent unit screws that span the same motions.
 
     Args:
-        screws: (6, k) [rad, m] screws of the order of 1 rad or length; much smaller
-            ones count as round-off.
+        screws: (6, k) [rad, m] screws of the order of 1 rad or 1 length.  Much smaller
+            screws are treated as round-off.
         length: [m] length by which rotations are multiplied.
 
     Returns:
-        (6, f) screws of 1 rad, or of 1 m for translations; along the axes if possible.
+        (6, f) screws of 1 rad, or of 1 m for translations, along the axes if possible.
     """
     scale = np.array([*[length] * 3, 1.0, 1.0, 1.0])[:, None]
     U, S, _ = np.linalg.svd(scale * screws, full_matrices=False)
@@ -370,19 +376,19 @@ def unit_screws(screws: NDArray, length: float) -> NDArray:
 
 
 def numbers_of(name: str, value: ArrayLike, count: int, unit: str) -> NDArray:
-    """Convert an argument to an array with a given number of finite entries.
+    """Return an argument as an array with a given number of finite entries.
 
     Args:
         name: name of the argument, for error messages.
-        value: the argument.
+        value: value of the argument.
         count: expected number of entries.
-        unit: unit of the entries, for the message.
+        unit: unit of the entries, for error messages.
 
     Returns:
         (count,) numbers.
 
     Raises:
-        BadInput: the argument cannot be converted.
+        BadInput: the value cannot be converted.
     """
     fault = find_fault(np.asarray(value).tolist(), (count,))
     if fault:
@@ -391,7 +397,7 @@ def numbers_of(name: str, value: ArrayLike, count: int, unit: str) -> NDArray:
 
 
 def _direction(direction: ArrayLike) -> NDArray:
-    """Return the (6,) direction scaled to unit size."""
+    """Return a unit vector along a direction, (6,)."""
     d = numbers_of("direction", direction, 6, "N m, N")
     if not d.any():
         raise BadInput("direction: found only zeros, expected a nonzero direction")
@@ -399,12 +405,12 @@ def _direction(direction: ArrayLike) -> NDArray:
 
 
 def _touches(vectors: NDArray, d: NDArray) -> bool:
-    """Return whether a direction has a component along at least one of the vectors."""
+    """Return whether a direction has a component along a vector."""
     return bool(np.abs(vectors.T @ d).max(initial=0.0) > _UNTOUCHED)
 
 
 def _blank(matrix: NDArray, unbounded: NDArray) -> NDArray:
-    """Return the matrix with NaN in rows and columns along unbounded directions."""
+    """Return a matrix with NaN in the rows and columns of unbounded directions."""
     touched = np.abs(unbounded).max(axis=1, initial=0.0) > _UNTOUCHED
     matrix = np.where(touched[:, None] | touched, np.nan, matrix)
     matrix.setflags(write=False)

@@ -61,36 +61,30 @@ def platform_stiffness(
     The stiffness relates a small additional wrench to the resulting small motion.
 
     Args:
-        posture: the robot's configuration; or many postures of one robot.
-        state: ``"nominal"``, the classical virtual-joint model of the nominal
-            robot, with every clearance fixed at zero; ``"contact"``, the tangent of
-            problem (22) with the robot's errors, clearances and loads; ``"exact"``, the
-            tangent of the exact equilibrium, including the stiffness due to internal
-            forces and loads.
+        posture: configuration of a robot, or many configurations of one robot.
+        state: ``"nominal"`` for the classical virtual-joint model of the nominal robot,
+            with clearances fixed at zero.  ``"contact"`` for problem (22), with errors,
+            clearances and loads.  ``"exact"`` for finite motions, with the geometric
+            stiffness due to internal forces and loads.
         load: (6,) [N m, N] wrench on the platform at its origin, base axes; or a
-            mapping of components such as ``{"fz": -50}``.  It has no effect on the
-            classical model.
-        gravity: (3,) [m/s^2] gravity vector in base axes.  It has no effect on the
-            classical model.
+            mapping of components such as ``{"fz": -50}``.  The classical model ignores
+            loads.
+        gravity: (3,) [m/s^2] gravity vector in base axes.
         at: (3,) [m] reference point of screws and wrenches, in platform axes.
-        side: behaviour of clearances that touch their bound without a force:
-            ``"loading"`` if they stay at the bound, ``"unloading"`` if they leave it.
-        method: ``"compiled"``, which falls back on the reference method where
-            necessary; or ``"reference"``, which uses only numpy and Clarabel.  In the
-            state ``"contact"``, the method is passed to
-            :func:`forcefit.assembly.linear.energy.solve_assembly`, in ``"exact"`` to
-            :func:`forcefit.assembly.exact.exact.solve_exact`.  The classical model of
-            one posture always uses numpy, and its field ``method`` is then
-            ``"reference"``; many postures are computed by the compiled method.
+        side: ``"loading"`` if contacts without a force remain closed, ``"unloading"``
+            if they open.
+        method: ``"compiled"`` or ``"reference"``.  The reference method uses only numpy
+            and Clarabel.  The classical model of one posture always uses the reference
+            method.
 
     Returns:
         Stiffness, compliance, free motions and shares at the reference point, base
-        axes; for many postures, or a :class:`Posture` of many, one
+        axes.  For many postures, the result is a
         :class:`~forcefit.assembly.platform_stiffness.many_stiffnesses.Stiffnesses`.
 
     Raises:
-        CannotAssemble: the errors cannot be closed.
-        FreeMotion: a load drives a motion that nothing resists.
+        CannotAssemble: the loops cannot be closed with these errors.
+        FreeMotion: a load acts on a motion without stiffness.
         SolverFailed: no equilibrium was found.
         BadInput: a point or a load does not consist of numbers.
         ValueError: ``state``, ``side`` or ``method`` is unknown.

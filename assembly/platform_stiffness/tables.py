@@ -2,12 +2,12 @@
 
 ========================  ======================================================
 ``compliance``            matrix C
-``stiffness_matrix``      matrix K_C, of one posture only
-``stiffness``             along each axis, the others free
+``stiffness_matrix``      matrix K_C (for one posture)
+``stiffness``             stiffness along each axis, with other motions free
 ``eigen_stiffness``       principal stiffnesses
-``stiffness_condition``   largest over smallest principal stiffness
-``share``                 of each part in the compliance along each axis
-``read_at``               point to which all of these refer, base axes
+``stiffness_condition``   ratio of largest to smallest principal stiffness
+``share``                 compliance share of each component along each axis
+``read_at``               reference point of all these quantities, base axes
 ========================  ======================================================
 """
 
@@ -35,11 +35,11 @@ _EIGEN = tuple("123456")
 def tangent_quantities(
     tangent: "PlatformStiffness", parts: "Sequence[Part]"
 ) -> dict[str, NDArray]:
-    """Return the quantities of one stiffness.
+    """Return arrays that describe the stiffness at one posture.
 
     Args:
         tangent: stiffness at one posture.
-        parts: m parts whose shares are returned.
+        parts: m links and joints whose shares are returned.
 
     Returns:
         ``compliance`` (6, 6), ``stiffness`` (6,), ``eigen_stiffness`` (6,),
@@ -57,7 +57,7 @@ def tangent_quantities(
 
 
 def many_quantities(many: "Stiffnesses") -> dict[str, NDArray]:
-    """Return the quantities of :func:`tangent_quantities` for k postures."""
+    """Return the arrays of :func:`tangent_quantities` for k postures."""
     by_axis = [list(many.shares(axis).values()) for axis in np.eye(6)]
     return {
         "compliance": many.compliance,
@@ -69,7 +69,7 @@ def many_quantities(many: "Stiffnesses") -> dict[str, NDArray]:
 
 
 def stiffness_dataset(tangent: "PlatformStiffness") -> "xarray.Dataset":
-    """Return the stiffness at one posture; see the module's table."""
+    """Return a data set of the stiffness at one posture."""
     parts = list(dict.fromkeys([*tangent.parts, *tangent.shares(np.eye(6)[0])]))
     values = tangent_quantities(tangent, parts)
     values |= {"stiffness_matrix": tangent.stiffness, "read_at": tangent.point}
@@ -80,7 +80,7 @@ def stiffness_dataset(tangent: "PlatformStiffness") -> "xarray.Dataset":
 
 
 def stiffnesses_dataset(many: "Stiffnesses") -> "xarray.Dataset":
-    """Return the stiffness at many postures over ``point``; see the module's table."""
+    """Return a data set of the stiffness at many postures."""
     parts = [part.words for part in many.shares(np.eye(6)[0])]
     labels = {"eigen": _EIGEN, "part": parts}
     values = many_quantities(many) | {"read_at": many.point}
@@ -90,7 +90,7 @@ def stiffnesses_dataset(many: "Stiffnesses") -> "xarray.Dataset":
 
 
 def modes_dataset(modes: "NaturalModes") -> "xarray.Dataset":
-    """Return a data set of natural modes: frequency, platform motion, energy shares."""
+    """Return a data set of natural modes."""
     parts = sorted({part for shares in modes.shares for part in shares})
     shares = [[one.get(part, 0.0) for part in parts] for one in modes.shares]
     count = len(modes.frequencies)
@@ -111,7 +111,7 @@ def modes_dataset(modes: "NaturalModes") -> "xarray.Dataset":
 
 
 def curve_dataset(curve: "DeflectionCurve") -> "xarray.Dataset":
-    """Return a data set of a load-deflection curve, in the order of the loads."""
+    """Return a data set of a load-deflection curve."""
     turns = curve.component < 3
     load, deflection = ("N m", "rad") if turns else ("N", "m")
     pressed = [", ".join(sorted(names)) for names in curve.pressed]

@@ -1,22 +1,19 @@
 r"""Derivative of the platform compliance with respect to a parameter of the robot.
 
-The stiffness at an equilibrium depends on a parameter p directly, and through the
-equilibrium (x, lambda, f): unknowns, closure multipliers, and forces on the closed
-clearances.  The change of the equilibrium follows from the derivative of its
-conditions,
+The tangent stiffness depends on a parameter p directly and through the equilibrium.
+The equilibrium consists of the unknowns x, the multipliers lambda of the loop-closure
+equations and the contact forces f in the closed clearances.  It changes by
 
     [ H   A'  N ] [ dx       ]     [ dg/dp ]
     [ A   0   0 ] [ -dlambda ] = - [ dr/dp ] dp
     [ N'  0   0 ] [ df       ]     [   0   ]
 
 (:mod:`.active_set`).  Here g is the gradient of the Lagrangian, r the residual of the
-closures at x, and N the normals of the bounds of closed clearances.  Both g and r are
-known in closed form for any p, so no equilibrium needs to be recomputed.  The tangent
-is then evaluated one step ahead and one step back along (p, x, lambda).  The error of
-these central differences is of second order in the step.
+loop-closure equations, and N the normals to the bounds of the closed clearances.  The
+tangent stiffness is evaluated at p + dp and at p - dp, and its derivative is the
+central difference.
 
-Closed clearances are assumed to remain closed.  At a change of contact, the tangent has
-no derivative, and the result is NaN.
+At a change of contact, the tangent stiffness has no derivative, and the result is NaN.
 
 Sources:
     Haftka, Adelman (1989), Recent developments in structural sensitivity analysis
@@ -67,7 +64,7 @@ from forcefit.assembly.platform_stiffness.platform_stiffness import State
 
 @dataclass(frozen=True)
 class TangentState:
-    """State of the tangent stiffness, and its reference point.
+    """Arguments of a tangent stiffness.
 
     See
     :func:`forcefit.assembly.platform_stiffness.platform_stiffness.platform_stiffness`.
@@ -77,7 +74,7 @@ class TangentState:
         load: (6,) [N m, N] wrench on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] gravity vector in base axes.
         at: (3,) [m] reference point, in platform axes.
-        side: state of clearances at their bound without a force.
+        side: behaviour of contacts without a force.
     """
 
     state: State = "nominal"
@@ -100,15 +97,15 @@ def compliance_slope(
         ahead: the configuration with the parameter increased by a step.
         back: the configuration with the parameter decreased by a step.
         step: size of the step, in the unit of the parameter.
-        asked: state of the tangent, and its reference point.
+        asked: state and reference point of the stiffness.
 
     Returns:
-        (6, 6) [rad/(N m) .. m/N per unit of the parameter], base axes; NaN if a motion
-        of the platform is free, or at a change of contact.
+        (6, 6) [rad/(N m) .. m/N per unit of the parameter], base axes.  All entries are
+        NaN at a change of contact, and some are NaN if the platform can move freely.
 
     Raises:
-        CannotAssemble: the errors cannot be closed.
-        FreeMotion: a load drives a motion that nothing resists.
+        CannotAssemble: the loops cannot be closed with these errors.
+        FreeMotion: a load acts on a motion without stiffness.
         SolverFailed: no equilibrium was found.
         BadInput: a point or a load does not consist of numbers.
     """
@@ -125,14 +122,14 @@ def compliance_slope(
 def _classical(
     posture: Posture, ahead: Posture, back: Posture, step: float, asked: TangentState
 ) -> _Moved:
-    """Return a function that computes neighbouring tangents of the classical model."""
+    """Return a function for the classical stiffness at a changed parameter."""
     return lambda there, by: (without_clearance(there), there.platform)
 
 
 def _linear(
     posture: Posture, ahead: Posture, back: Posture, step: float, asked: TangentState
 ) -> _Moved:
-    """Return a function that computes neighbouring tangents of problem (22)."""
+    """Return a function for the stiffness of problem (22) at a changed parameter."""
     start = settle(solve_assembly(posture, asked.load, gravity=asked.gravity))
     pressed, touching = contacts(start)
     x, multipliers = unknowns(start), start.multipliers
@@ -175,7 +172,7 @@ def _like(joints: VirtualJoints, there: Posture) -> VirtualJoints:
 def _exact(
     posture: Posture, ahead: Posture, back: Posture, step: float, asked: TangentState
 ) -> _Moved:
-    """Return a function that computes neighbouring tangents with finite motions."""
+    """Return a function for the exact stiffness at a changed parameter."""
     start = solve_exact(posture, asked.load, gravity=asked.gravity)
     local = start.expansion
     at, model = local.placement, local.placement.model
@@ -223,11 +220,11 @@ def _difference(
     conditions: Callable[[Posture], tuple[NDArray, NDArray]],
     ahead: Posture, back: Posture, step: float,
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
-    """Return the partial derivatives of closures and gradient, at fixed unknowns."""
+    """Return the partial derivatives of the equilibrium conditions."""
     there, behind = conditions(ahead), conditions(back)
     return (there[0] - behind[0]) / (2 * step), (there[1] - behind[1]) / (2 * step)
 
 
 def _unknown(tangent: PlatformStiffness) -> PlatformStiffness:
-    """Return NaN, because the derivative does not exist at a change of contact."""
+    """Return a stiffness of NaN, which marks a change of contact."""
     return replace(tangent, root=np.full_like(tangent.root, np.nan))

@@ -1,17 +1,19 @@
 r"""Natural frequencies and modes at a posture, with the drives fixed.
 
-The stiffness is the tangent Z'HZ of the equilibrium, see
+The modes are the solutions of the eigenvalue problem
+
+    (Z'HZ - omega^2 Z'MZ) t = 0.
+
+Z'HZ is the tangent stiffness of
 :mod:`forcefit.assembly.platform_stiffness.exact_tangent`.  The mass matrix M includes
-all moving bodies.  Masses and moments of inertia of frames are treated as rigid bodies.
-Beams with a density have a consistent mass matrix, for a cubic displacement between
-their ends and including the rotary inertia of their sections.
+all moving bodies.  The masses and moments of inertia of frames belong to rigid bodies.
+A beam with a density has a consistent mass matrix for a cubic displacement, including
+the rotary inertia of its cross-sections.  The mass matrix of a mesh link with a density
+is condensed to both ends of the link.  Links defined by a matrix or a library have no
+mass.
 
-    (Z'HZ - omega^2 Z'MZ) t = 0
-
-The cubic approximation overestimates the first frequency of a cantilever by 0.5 % with
-one piece and by 0.01 % with two pieces.  The mass of a mesh link with a density is that
-of its finite elements, condensed to both ends.  Links given by a matrix or a library
-have no mass.
+The cubic displacement overestimates the first frequency of a cantilever by 0.5 % with
+one beam element and by 0.01 % with two elements.
 
 Sources:
     Przemieniecki (1968), Theory of Matrix Structural Analysis, section 11.3 (consistent
@@ -48,13 +50,13 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-_NULL = 1e-12  # eigenvalues below this fraction of the largest count as zero
-_ROUNDING = 1e-14  # round-off in the mass matrix, relative to its largest entry
+_NULL = 1e-12  # [-] threshold of a zero eigenvalue, relative to the largest
+_ROUNDING = 1e-14  # [-] round-off in the mass matrix, relative to its largest entry
 
 
 @dataclass(frozen=True, eq=False)
 class NaturalModes:
-    """Lowest natural modes of a robot, in order of increasing frequency.
+    """Natural modes of a robot in ascending order of frequency.
 
     Attributes:
         posture: the robot's nominal configuration.
@@ -62,11 +64,11 @@ class NaturalModes:
             NaN for unstable modes.
         platform_screws: (6, k) [rad, m] platform motions, normalised to a modal mass of
             1 kg.
-        shares: for each mode, the energy share of every part, largest first; empty
-            without elastic energy.
-        idle: number of free motions that leave the platform fixed, such as the spin of
+        shares: for each mode, the energy shares of links and joints in descending
+            order; empty without elastic energy.
+        idle: number of free motions that do not move the platform, such as the spin of
             a rod between two ball joints.  They are not included in the modes.
-        method: method of the equilibrium: ``"compiled"`` or ``"reference"``.
+        method: method of the equilibrium, ``"compiled"`` or ``"reference"``.
     """
 
     posture: Posture
@@ -85,7 +87,7 @@ class NaturalModes:
         return modes_dataset(self)
 
     def to_pandas(self) -> "pandas.DataFrame":
-        """Return a table with one row per mode and columns (variable, component)."""
+        """Return a pandas table with a row for each mode."""
         from forcefit.assembly.model.tables import frame_table
 
         return frame_table(self.to_xarray(), "mode")
@@ -104,12 +106,12 @@ def natural_modes(
 
     Args:
         posture: the robot's configuration.
-        count: largest number of modes.
+        count: maximum number of modes.
         load: (6,) [N m, N] wrench on the platform; or a mapping of components such as
-            ``{"fz": -50}``.  Only for the state ``"exact"``; the load adds no mass.
-        gravity: (3,) [m/s^2] gravity vector, only for the state ``"exact"``.
-        state: ``"nominal"``, for the nominal robot with clearances fixed at zero;
-            ``"exact"``, around the equilibrium with errors, clearances and loads.
+            ``{"fz": -50}``.  The nominal state ignores it.
+        gravity: (3,) [m/s^2] gravity vector.  The nominal state ignores it.
+        state: ``"nominal"`` for the nominal robot with clearances fixed at zero, or
+            ``"exact"`` for the equilibrium with errors, clearances and loads.
         method: method of :func:`forcefit.assembly.exact.exact.solve_exact`.
 
     Returns:
@@ -117,8 +119,8 @@ def natural_modes(
 
     Raises:
         BadInput: no moving body has a mass.
-        CannotAssemble: the errors cannot be closed.
-        FreeMotion: a load drives a motion that nothing resists.
+        CannotAssemble: the loops cannot be closed with these errors.
+        FreeMotion: a load acts on a motion without stiffness.
         SolverFailed: no equilibrium was found.
         ValueError: ``state`` or ``method`` is unknown.
     """
@@ -127,7 +129,7 @@ def natural_modes(
             f"natural_modes: no state {state!r}; expected 'nominal' or 'exact'"
         )
     if state == "nominal":
-        # drive forces are loads, which the nominal state excludes
+        # the nominal state ignores loads, including drive forces
         frames = (
             replace(f, clearance=None, drive_force=0.0) for f in posture.robot.frames
         )
@@ -141,7 +143,7 @@ def natural_modes(
     if not np.trace(M) > 0.0:
         raise BadInput(_no_mass(posture.robot))
     squares, modes = _modes(H, M, rounding)
-    if not squares.size:  # the mass of the moving parts is only round-off
+    if not squares.size:  # the mass of the moving bodies is round-off
         raise BadInput(_no_mass(posture.robot))
     squares, modes, idle = _without_idle(
         squares, modes, platform_moves(equilibrium.expansion) @ D
@@ -202,7 +204,7 @@ def discretisation_errors(
 
 
 def check_masses(robot: Robot) -> None:
-    """Raise BadInput for a robot without any mass.
+    """Raise BadInput if no body of a robot has a mass.
 
     Raises:
         BadInput: no body has a mass.
@@ -214,7 +216,7 @@ def check_masses(robot: Robot) -> None:
 
 
 def _no_mass(robot: Robot) -> str:
-    """Return the message for a robot without masses."""
+    """Return the error message for a robot without masses."""
     return (
         f'{robot.name}: found no moving mass; expected "density" of beams or '
         'meshes, or "mass" or "inertia" of frames'
@@ -224,7 +226,7 @@ def _no_mass(robot: Robot) -> str:
 def _without_idle(
     squares: NDArray, modes: NDArray, moves: NDArray
 ) -> tuple[NDArray, NDArray, int]:
-    """Remove and count free motions that leave the platform fixed."""
+    """Remove and count the free motions that do not move the platform."""
     free = squares == 0.0
     if not free.any():
         return squares, modes, 0
@@ -238,12 +240,12 @@ def _without_idle(
 
 
 def _modes(K: NDArray, M: NDArray, rounding: NDArray) -> tuple[NDArray, NDArray]:
-    """Return squared angular frequencies, lowest first, and modes of modal mass 1.
+    """Return squared angular frequencies in ascending order, and normalised modes.
 
     Args:
-        K: (k, k) stiffness.
-        M: (k, k) mass.
-        rounding: (k, k) bound on the round-off in M, as a quadratic form.
+        K: (k, k) stiffness matrix.
+        M: (k, k) mass matrix.
+        rounding: (k, k) bound on the round-off in M, a quadratic form.
 
     Returns:
         (m,) squared frequencies and (k, m) modes.
@@ -252,7 +254,7 @@ def _modes(K: NDArray, M: NDArray, rounding: NDArray) -> tuple[NDArray, NDArray]
     shift = np.trace(K) / np.trace(M) or 1.0
     values, vectors = np.linalg.eigh(K + shift * M)
     least = shift * np.sum(vectors * (rounding @ vectors), axis=0)
-    # omit motions that involve neither a mass nor a spring
+    # omit motions without mass and stiffness
     kept = values > np.maximum(_NULL * values.max(), least)
     if not kept.any():
         return np.zeros(0), np.zeros((len(K), 0))
@@ -267,7 +269,7 @@ def _modes(K: NDArray, M: NDArray, rounding: NDArray) -> tuple[NDArray, NDArray]
 
 
 def _shares(parts: tuple[Part, ...], springs: NDArray) -> dict[Part, float]:
-    """Return the energy share of each part in a mode, largest first."""
+    """Return the energy shares of links and joints in descending order."""
     energies: dict[Part, float] = {}
     for part, y in zip(parts, springs, strict=True):
         energies[part] = energies.get(part, 0.0) + float(y) ** 2
@@ -279,13 +281,13 @@ def _shares(parts: tuple[Part, ...], springs: NDArray) -> dict[Part, float]:
 
 
 def mass_matrix(equilibrium: ExactAssembly) -> NDArray:
-    """Return the (N, N) [kg m^2 per squared unit] mass matrix in the unknowns.
+    """Return the mass matrix for the unknowns of an equilibrium.
 
     Args:
         equilibrium: equilibrium of the robot.
 
     Returns:
-        Symmetric, positive semidefinite matrix.
+        (N, N) [kg m^2 per squared unit] symmetric, positive semidefinite matrix.
     """
     placement, robot = equilibrium.placement, equilibrium.cut.robot
     M = np.zeros((len(placement.x), len(placement.x)))
@@ -313,7 +315,10 @@ def mass_matrix(equilibrium: ExactAssembly) -> NDArray:
 
 
 def _body_motion(equilibrium: ExactAssembly, i: int) -> NDArray:
-    """Return the (6, N) small motion of body i, at the platform's nominal origin."""
+    """Return the small motion of body i per unit of each unknown, (6, N).
+
+    The reference point is the nominal origin of the platform.
+    """
     model = equilibrium.placement.model
     above = equilibrium.cut.robot.on_path[i].copy()
     above[i] = False
@@ -324,17 +329,17 @@ def _body_motion(equilibrium: ExactAssembly, i: int) -> NDArray:
 def _ends(
     equilibrium: ExactAssembly, i: int, tip: NDArray, span: NDArray, axes: NDArray
 ) -> NDArray:
-    """Return the (12, N) motion of a link's base and tip, each at its own position.
+    """Return the small motions of both ends of a link.
 
     Args:
         equilibrium: equilibrium of the robot.
         i: index of the link's frame.
         tip: (6, N) motion of the body's end, at the platform's nominal origin.
         span: (3,) [m] vector from base to tip, in the frame's axes.
-        axes: (3, 3) axes of the returned motions, seen from the frame.
+        axes: (3, 3) axes of the returned motions, as a rotation from the frame's axes.
 
     Returns:
-        Rotations and translations of the base, then of the tip.
+        (12, N) rotations and translations of the base, then those of the tip.
     """
     placement, robot = equilibrium.placement, equilibrium.cut.robot
     above = robot.on_path[i].copy()
@@ -352,7 +357,7 @@ def _ends(
 
 
 def _beam_mass(frame: Frame) -> NDArray:
-    """Return the (12, 12) consistent mass for motions of base and tip."""
+    """Return the consistent mass matrix of a beam, (12, 12)."""
     link = frame.link
     assert isinstance(link, BeamLink)
     assert link.density is not None
@@ -367,7 +372,7 @@ def _beam_mass(frame: Frame) -> NDArray:
     e, f, g = 3 * length, 4 * length**2, length**2
     bends = ((4, 2, 10, 8), 1, section.I_z), ((5, 1, 11, 7), -1, section.I_y)
     for plane, sign, second in bends:
-        # a positive rotation about y moves points at positive x in the direction -z
+        # a positive rotation about y moves points with x > 0 in the direction -z
         s = np.array([1, sign, 1, sign])
         shift = np.array([
             [156, a, 54, -b], [a, c, b, -d], [54, b, 156, -a], [-b, -d, -a, c]

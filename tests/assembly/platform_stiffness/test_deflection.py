@@ -1,4 +1,4 @@
-"""Load-deflection curves and paths past limit points, compared with closed forms."""
+"""Tests of load-deflection curves against closed-form solutions."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ FY, FZ = 4, 5
 
 
 def bush(clearance=1e-4, stiffness=1e5):
-    """A spring in series with an axial clearance, along z."""
+    """Return a spring in series with an axial clearance along z."""
     K = np.diag([1e3, 1e3, 1e3, 1e5, 1e5, stiffness])
     frames = (
         Frame("spring", link=MatrixLink(K), clearance=Clearance(axial=clearance)),
@@ -29,8 +29,8 @@ def cantilever(link):
 
 
 @pytest.mark.parametrize("state", ["contact", "exact"])
-def test_rigid_direction_has_infinite_stiffness_and_no_events(state):
-    """A slide with a spring along x, turned by a rounded right angle about y."""
+def test_rigid_direction_has_infinite_stiffness(state):
+    """The axis of the slide is z after a rotation by pi / 2, which has round-off."""
     K = np.diag([np.inf] * 5 + [1e5])
     frames = (
         Frame("slide", rotation=[0, np.pi / 2, 0], joint="prismatic",
@@ -46,8 +46,8 @@ def test_rigid_direction_has_infinite_stiffness_and_no_events(state):
 
 
 @pytest.mark.parametrize("state", ["contact", "exact"])
-def test_curve_crosses_the_clearance_and_then_follows_the_spring(state):
-    """The deflection is sign(F) c + F / k, and undetermined without load."""
+def test_deflection_equals_clearance_plus_spring_deflection(state):
+    """The deflection is sign(F) c + F / k.  Without load, it is undetermined."""
     c, k = 1e-4, 1e5
     curve = deflection_curve(bush(c, k), FZ, np.arange(-30.0, 31.0, 10.0), state=state)
     loaded = curve.loads != 0.0
@@ -63,11 +63,11 @@ def test_curve_crosses_the_clearance_and_then_follows_the_spring(state):
     assert max(abs(release.load), abs(contact.load)) < 0.01
 
 
-def test_contact_forced_by_an_error_opens_at_its_preload():
-    """A closure preloaded on its stop by k (e - c) opens at that load.
+def test_preloaded_contact_opens_at_its_preload():
+    """An error e that exceeds the clearance c preloads the contact.
 
-    Two springs k hold the tip; the contact opens when the other spring carries the
-    whole load, 2 k (e - c) / 2.
+    Two springs k act on the tip.  The contact opens at the load k (e - c), which the
+    second spring then carries alone.
     """
     c, e, k = 1e-4, 3e-4, 1e5
     K = np.diag([1e3, 1e3, 1e3, 1e5, 1e5, k])
@@ -84,7 +84,7 @@ def test_contact_forced_by_an_error_opens_at_its_preload():
     first, *_ = curve.events
     assert (first.kind, first.what) == ("release", "one axial")
     assert first.load == pytest.approx(k * (e - c), abs=0.01)
-    # then the clearance, 2 c wide, is crossed on one spring alone
+    # the joint moves through the clearance of width 2 c against the second spring
     second = curve.events[1]
     assert (second.kind, second.what) == ("contact", "one axial")
     assert second.load == pytest.approx(k * (e + c), abs=0.01)
@@ -92,8 +92,8 @@ def test_contact_forced_by_an_error_opens_at_its_preload():
     np.testing.assert_allclose(curve.stiffness[between], k, rtol=1e-6)
 
 
-def test_tangent_stiffness_is_the_slope_of_the_curve():
-    """Central differences along the curve of a loaded robot, of second order."""
+def test_tangent_stiffness_equals_slope_of_deflection_curve():
+    """The slope of the curve is computed by central differences."""
     posture = home_posture(load_robot("four_bar"))
     loads = 100.0 + np.array([-0.5, 0.0, 0.5])
     curve = deflection_curve(posture, FY, loads, state="exact")
@@ -102,7 +102,7 @@ def test_tangent_stiffness_is_the_slope_of_the_curve():
 
 
 @pytest.mark.slow
-def test_clamped_column_has_a_critical_event_at_the_euler_load():
+def test_clamped_column_buckles_at_euler_load():
     width, E = 0.02, 70e9
     link = BeamLink({"width": width, "height": width}, E, 0.3, pieces=16,
                     theory="euler")  # fmt: skip
@@ -114,10 +114,10 @@ def test_clamped_column_has_a_critical_event_at_the_euler_load():
     assert "tip link" in event.what
 
 
-def test_thin_cantilever_has_a_critical_event_at_the_lateral_buckling_load():
-    """4.013 sqrt(EI GJ) / L^2 (Michell, Prandtl 1899), with the effect of prebuckling.
+def test_thin_cantilever_buckles_at_lateral_buckling_load():
+    """The buckling load is 4.013 sqrt(EI GJ) / L^2 (Michell, Prandtl 1899).
 
-    1 / sqrt((1 - I_y/I_z) (1 - GJ/EI_z)) for the latter; 16 pieces leave 0.1 %.
+    The deflection before buckling divides it by sqrt((1 - I_y/I_z) (1 - GJ/EI_z)).
     """
     E, nu = 70e9, 0.3
     G = E / (2 * (1 + nu))
@@ -133,7 +133,7 @@ def test_thin_cantilever_has_a_critical_event_at_the_lateral_buckling_load():
 
 
 def shallow_arch():
-    """Von Mises truss: two inclined springs k that meet at a slider."""
+    """Return a von Mises truss, two inclined springs k with a common end."""
     half, rise, k = 1.0, 0.1, 1e5
     length, angle = np.hypot(half, rise), np.arctan2(rise, half)
     K = np.diag([np.inf, np.inf, np.inf, k, np.inf, np.inf])
@@ -151,8 +151,11 @@ def shallow_arch():
 
 
 @pytest.mark.slow
-def test_shallow_arch_jumps_at_its_limit_load():
-    """F(w) = 2 k (L / l - 1) (h - w), l^2 = a^2 + (h - w)^2 jumps at its maximum."""
+def test_shallow_arch_jumps_at_limit_load():
+    """The limit load is the maximum of F(w) = 2 k (L / l - 1) (h - w).
+
+    Here l^2 = a^2 + (h - w)^2.
+    """
     rise = 0.1
     limit = arch_force(np.linspace(0.0, rise, 100_001)).max()
     loads = -np.array([0.0, 0.5, 0.9, 0.99, 1.05, 1.2]) * limit
@@ -163,15 +166,15 @@ def test_shallow_arch_jumps_at_its_limit_load():
     assert -jump.load == pytest.approx(limit, rel=1e-3)
     assert curve.deflection[3] > -rise
     assert curve.deflection[4] < -2 * rise
-    # unloading: it stays below until the load falls to the lower limit point
+    # the arch remains inverted during unloading
     assert curve.deflection[-2] == pytest.approx(curve.deflection[5], rel=0.2)
     assert curve.deflection[-2] < -2 * rise < curve.deflection[1]
 
 
-def test_pinned_column_with_a_guided_platform_buckles_in_its_links():
-    """Euler load pi^2 E I / L^2 of a column with both ends pinned, guided by a slide.
+def test_pinned_column_buckles_at_euler_load():
+    """The Euler load of a column with two pinned ends is pi^2 E I / L^2.
 
-    The buckling load of n pieces is too low by a fraction proportional to 1 / n^2.
+    With n beam elements, the relative error is proportional to 1 / n^2.
     """
     E, width, height = 7e10, 0.01, 0.02
     beam = BeamLink({"width": width, "height": height}, E, 0.3, up=(0, 0, 1), pieces=16)
@@ -190,18 +193,19 @@ def test_pinned_column_with_a_guided_platform_buckles_in_its_links():
     (event,) = (e for e in curve.events if e.kind == "critical")
     assert event.load == pytest.approx(-euler, rel=0.01)
     assert (
-        event.what == "buckles: inside the links, the platform stays; most in top link"
+        event.what
+        == "buckles: no motion of the platform, largest deformation in top link"
     )
 
 
 def arch_force(height, half=1.0, rise=0.1, k=1e5):
-    """Downward load on the von Mises truss at a given height of its apex."""
+    """Return the downward load on a von Mises truss at a given height of its apex."""
     length = np.hypot(half, rise)
     return 2 * k * (length / np.hypot(half, height) - 1) * height
 
 
-def test_path_of_a_shallow_arch_equals_its_closed_form_past_limit_points():
-    """The path rises to the limit point, passes the flat state, and falls again."""
+def test_arc_length_path_of_shallow_arch_equals_closed_form():
+    """The path includes both limit points and the unstable part between them."""
     limit = arch_force(np.linspace(0, 0.1, 100_001)).max()
     curve = follow_load(shallow_arch(), FY, 0.0, -1.5 * limit)
     heights = 0.1 + curve.deflection
@@ -216,21 +220,21 @@ def test_path_of_a_shallow_arch_equals_its_closed_form_past_limit_points():
     assert (curve.stiffness[np.abs(heights) < 0.03] < 0).all()
 
 
-def test_column_on_a_torsion_spring_has_a_branch_point_at_k_over_l():
-    """A straight rigid bar remains in equilibrium, but can buckle from k / L on."""
+def test_bar_on_torsion_spring_buckles_at_k_over_l():
+    """The straight bar is in equilibrium under any load, but unstable above k / L."""
     K = np.diag([np.inf, np.inf, 50.0, np.inf, np.inf, np.inf])
     hinge = Frame("hinge", joint="revolute", joint_stiffness=K)
     bar = Frame("bar", "hinge", [0.4, 0, 0])
     curve = follow_load(home_posture(Robot("bar", "bar", (hinge, bar))), 3, 0.0, -200.0)
     (event,) = curve.events
     assert -event.load == pytest.approx(50.0 / 0.4, rel=1e-5)
-    assert event.what.startswith("branch point, buckles: platform along [0 0 1.768 0 ")
-    assert event.what.endswith("most in hinge joint")
+    assert event.what.startswith("branch point, buckles: platform motion [0 0 1.768 0 ")
+    assert event.what.endswith("largest deformation in hinge joint")
     assert np.abs(curve.screws).max() < 1e-12
 
 
-def test_two_bars_on_torsion_springs_have_branch_points_at_both_loads():
-    """(3 - sqrt 5) k / 2L and (3 + sqrt 5) k / 2L: det [[2k - PL, -k], ..] = 0."""
+def test_two_bars_on_torsion_springs_have_two_buckling_loads():
+    """The buckling loads are (3 - sqrt 5) k / 2L and (3 + sqrt 5) k / 2L."""
     K = np.diag([np.inf, np.inf, 50.0, np.inf, np.inf, np.inf])
     foot = Frame("foot", joint_stiffness=K)
     knee = Frame("knee", "foot", [0.4, 0, 0], joint_stiffness=K)
@@ -243,8 +247,8 @@ def test_two_bars_on_torsion_springs_have_branch_points_at_both_loads():
         assert event.what.startswith("branch point, buckles")
 
 
-def test_rods_that_spin_freely_cause_no_events_on_the_path():
-    """Six Delta rods can spin; the unloaded tangent is the classical stiffness."""
+def test_spinning_rods_cause_no_critical_loads():
+    """The six rods of the Delta robot can spin about their axes."""
     posture = home_posture(load_robot("delta"))
     curve = follow_load(posture, 5, 0.0, -500.0, count=4)
     classical = platform_stiffness(posture).along(np.eye(6)[5])[0]

@@ -1,4 +1,4 @@
-"""K_C at many postures equals that at single postures; invalid input is rejected."""
+"""Tests of the platform stiffness at many postures, and of invalid input."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,10 @@ LOAD = [0.0, 0, 0, 10, 0, -50]
 
 
 def assert_same(many, row, one):
-    """Compare entries relative to sqrt(C_ii C_jj), which vary over many magnitudes."""
+    """Assert that posture ``row`` of ``many`` has the stiffness ``one``.
+
+    The entries C_ij are compared relative to sqrt(C_ii C_jj).
+    """
     C = one.compliance
     if one.free.size:
         np.testing.assert_array_equal(many.compliance[row], C)
@@ -40,7 +43,7 @@ def assert_same(many, row, one):
 
 
 def test_stiffness_does_not_depend_on_other_postures(rng):
-    """Bit-identical alone and in another order."""
+    """The results are bit-identical for one posture and for another order."""
     robot = load_robot("irsbot2")
     poses = np.full((19, 6), np.nan)
     poses[:, 0], poses[:, 2] = np.linspace(-0.3, 0.3, 19), -0.45
@@ -53,8 +56,8 @@ def test_stiffness_does_not_depend_on_other_postures(rng):
 
 
 @pytest.mark.parametrize("seed", range(30))
-def test_stiffness_of_random_robots_equals_that_of_one_posture(seed):
-    """Some robots have free motions, some rigid directions; the ranks agree."""
+def test_stiffnesses_of_random_robots_agree_with_reference_method(seed):
+    """Some of the robots have free motions or rigid directions."""
     rng = np.random.default_rng(seed)
     posture = home_posture(random_robot(rng, legs=int(rng.integers(1, 4))))
     many = platform_stiffness([posture])
@@ -62,8 +65,8 @@ def test_stiffness_of_random_robots_equals_that_of_one_posture(seed):
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_stiffness_among_many_equals_that_of_its_single_posture_at_any_point(method):
-    """Compliance, stiffness and compliance shares agree at each posture."""
+def test_stiffnesses_at_many_postures_equal_stiffness_at_each(method):
+    """Compliance, stiffness and compliance shares are compared."""
     robot = load_robot("irsbot2")
     poses = np.full((3, 6), np.nan)
     poses[:, 0], poses[:, 2] = [-0.2, 0.0, 0.25], -0.45
@@ -86,8 +89,8 @@ def test_stiffness_among_many_equals_that_of_its_single_posture_at_any_point(met
 
 
 @pytest.mark.parametrize("state", ["contact", "exact"])
-def test_tangents_of_many_postures_are_bit_identical_to_those_of_single_postures(state):
-    """Every property of the result is compared."""
+def test_contact_and_exact_stiffnesses_equal_stiffness_at_each_posture(state):
+    """The results are bit-identical."""
     clearance = Clearance(radial=2e-5, axial=1e-5, tilt=1e-3)
     gap = np.array([0, 0, 0, 1e-4, 0, 0])
     posture = home_posture(coaxial_beams(gap, clearance=clearance))
@@ -103,8 +106,8 @@ def test_tangents_of_many_postures_are_bit_identical_to_those_of_single_postures
     assert shares == {part: [s] * 2 for part, s in one.shares(UNIT[3]).items()}
 
 
-def test_load_along_a_free_motion_of_another_body_is_rejected():
-    """A couple on its rim drives a wheel that rotates freely."""
+def test_load_on_free_motion_raises_free_motion():
+    """A couple acts on a wheel that can rotate freely."""
     frames = (
         Frame("wheel", joint="revolute"),
         Frame("rim", "wheel", [0.1, 0, 0]),
@@ -127,13 +130,13 @@ def test_load_along_a_free_motion_of_another_body_is_rejected():
         ({"side": "left"}, "no side 'left'"),
     ],
 )
-def test_invalid_point_load_or_state_is_rejected(words, message):
+def test_platform_stiffness_rejects_invalid_arguments(words, message):
     with pytest.raises(ValueError, match=message):
         platform_stiffness(home_posture(load_robot("orthoglide")), **words)
 
 
 @pytest.mark.parametrize("direction", [[0] * 6, [1, 0, 0], [np.nan] * 6, "tx"])
-def test_invalid_direction_is_rejected(direction):
+def test_stiffness_along_invalid_direction_is_rejected(direction):
     stiffness = platform_stiffness(home_posture(load_robot("orthoglide")))
     for asked in (stiffness.along, stiffness.shares):
         with pytest.raises(BadInput, match="direction: found"):

@@ -1,4 +1,4 @@
-"""Natural frequencies of bodies with moments of inertia, compared with closed forms."""
+"""Tests of natural frequencies of bodies with moments of inertia."""
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ def frequencies(*frames):
 
 
 def mount(rotation, translation, **keys):
-    """A body on springs with equal stiffness about and along all axes."""
+    """Return the frequencies of a body on isotropic springs."""
     seat = Frame(
         "seat", joint_stiffness=np.diag([rotation] * 3 + [translation] * 3),
         rotation=rotation_vector(TURN),
@@ -30,8 +30,8 @@ def mount(rotation, translation, **keys):
     return frequencies(seat, Frame("body", "seat", **keys))
 
 
-def test_body_on_a_hinge_spring_oscillates_with_the_moment_about_the_hinge():
-    """omega^2 = k / (n J n + m r^2), where n is the hinge axis in body axes."""
+def test_frequency_of_hinged_body_depends_on_inertia_about_hinge():
+    """omega^2 = k / (n.J n + m r^2), where n is the hinge axis in body axes."""
     hinge = Frame("hinge", joint="revolute", joint_stiffness=only(2, 50.0))
     J = TURN @ np.diag(PRINCIPAL) @ TURN.T
     R = rotation_matrix([0.3, 1.1, -0.5])
@@ -42,8 +42,8 @@ def test_body_on_a_hinge_spring_oscillates_with_the_moment_about_the_hinge():
     np.testing.assert_allclose(frequencies(hinge, arm), expected, rtol=1e-9)
 
 
-def test_torsion_pendulum_has_the_frequency_of_the_textbook():
-    """A 3 kg disc on a massless wire: omega^2 = G I_p / (L J)."""
+def test_frequency_of_torsion_pendulum_equals_closed_form():
+    """For a disc on a massless wire, omega^2 = G I_p / (L J)."""
     length, radius, G = 1.5, 0.002, 8e10
     wire = BeamLink({"radius": radius}, 2.6 * G, 0.3, None, "euler")
     disc = 3.0 * 0.1**2 / 2
@@ -54,8 +54,8 @@ def test_torsion_pendulum_has_the_frequency_of_the_textbook():
     assert np.abs(found / expected - 1).min() < 1e-9
 
 
-def test_disc_on_a_cantilever_couples_bending_and_rotation():
-    """Deflection w and slope at the tip are coupled by K = EI [[12, -6L], ..]."""
+def test_frequencies_of_disc_on_cantilever_equal_closed_form():
+    """Deflection and slope at the tip are coupled by the stiffness of the beam."""
     length, side, E, m, J = 0.8, 0.02, 7e10, 4.0, 0.3
     EI = E * side**4 / 12
     K = EI / length**3 * np.array([[12, -6 * length], [-6 * length, 4 * length**2]])
@@ -69,19 +69,19 @@ def test_disc_on_a_cantilever_couples_bending_and_rotation():
 
 
 @pytest.mark.parametrize("mass", [0.0, 5.0])
-def test_products_of_inertia_do_not_change_the_modes_of_equal_springs(mass):
-    """omega^2 = k / principal moment, with the centre of mass at the springs."""
+def test_frequencies_depend_on_principal_moments_of_inertia(mass):
+    """omega^2 = k / J for each principal moment of inertia J."""
     J = TURN @ np.diag(PRINCIPAL) @ TURN.T
     found = mount(200.0, 3e5, mass=mass, inertia=J)
     shifts = [3e5 / mass] * 3 if mass else []
     np.testing.assert_allclose(found, hertz([*200.0 / PRINCIPAL, *shifts]), rtol=1e-9)
 
 
-def test_centre_of_mass_away_from_the_springs_couples_rotation_and_translation():
-    """Along the arm r: k_t / m and k_r / J; across it: [[k_t, k_t r], [k_t r, ..]]."""
+def test_eccentric_mass_couples_rotation_and_translation():
+    """The centre of mass is at a distance r from isotropic springs."""
     k_r, k_t, m, J, r = 200.0, 3e5, 5.0, 0.04, 0.03
-    # unknowns at the springs: x and the rotation t; kinetic energy m (x + r t)^2 + J
-    # t^2
+    # for the motion x and rotation t of the springs, the kinetic energy is
+    # (m (x' + r t')^2 + J t'^2) / 2
     M = np.array([[m, m * r], [m * r, J + m * r**2]])
     both = np.linalg.eigvals(np.linalg.solve(M, np.diag([k_t, k_r])))
     expected = hertz([k_t / m, k_r / J, *both, *both])
@@ -89,8 +89,8 @@ def test_centre_of_mass_away_from_the_springs_couples_rotation_and_translation()
     np.testing.assert_allclose(found, expected, rtol=1e-9)
 
 
-def test_two_rotors_on_a_shaft_oscillate_in_opposition():
-    """Free ends: omega^2 is 0 and k (1/J1 + 1/J2), for rotors with inertia only."""
+def test_frequency_of_two_rotors_on_shaft_equals_closed_form():
+    """For two rotors on a free shaft, omega^2 = 0 and k (1/J1 + 1/J2)."""
     k, J1, J2 = 900.0, 0.02, 0.05
     bearing = Frame("bearing", joint="revolute")
     first = Frame("first", "bearing", joint="revolute", joint_stiffness=only(2, k),
@@ -102,11 +102,12 @@ def test_two_rotors_on_a_shaft_oscillate_in_opposition():
     np.testing.assert_allclose(found, expected, rtol=1e-9)
 
 
-def test_two_coupled_bodies_on_hinges_have_the_modes_of_the_double_pendulum():
-    """Two links in a plane with springs at both hinges."""
+def test_frequencies_of_double_pendulum_equal_closed_form():
+    """Two links move in a plane against springs at both hinges."""
     k1, k2, m1, m2, l1, c1, c2, J1, J2 = 80, 30, 3, 2, 0.4, 0.25, 0.1, 0.05, 0.02
     a, b, c = J1 + m1 * c1**2 + m2 * l1**2, m2 * l1 * c2, J2 + m2 * c2**2
-    M = np.array([[a + 2 * b + c, b + c], [b + c, c]])  # relative angles, stretched out
+    # mass matrix of the straight pendulum for relative joint angles
+    M = np.array([[a + 2 * b + c, b + c], [b + c, c]])
     expected = hertz(np.linalg.eigvals(np.linalg.solve(M, np.diag([k1, k2]))))
     first = Frame("one", joint="revolute", joint_stiffness=only(2, k1))
     second = Frame("two", "one", [l1, 0, 0], joint="revolute", mass=m1,
@@ -116,8 +117,8 @@ def test_two_coupled_bodies_on_hinges_have_the_modes_of_the_double_pendulum():
     np.testing.assert_allclose(frequencies(first, second, tip), expected, rtol=1e-9)
 
 
-def test_moments_of_inertia_do_not_change_the_equilibrium_under_weight():
-    """A uniform field exerts no moment about the centre of mass."""
+def test_equilibrium_under_gravity_does_not_depend_on_inertia():
+    """Gravity exerts no moment about the centre of mass."""
     screws = []
     for J in (np.zeros((3, 3)), 7.0 * np.eye(3)):
         seat = Frame("seat", joint_stiffness=np.diag([50.0] * 3 + [1e4] * 3))

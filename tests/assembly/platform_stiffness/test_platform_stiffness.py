@@ -1,4 +1,4 @@
-"""K_C, compared with closed forms, symmetry, and differences of equilibria."""
+"""Tests of the stiffness K_C against closed forms and finite differences."""
 
 from dataclasses import replace
 
@@ -22,7 +22,7 @@ UNIT = np.eye(6)
 
 
 def assert_same_matrix(M, expected, tolerance):
-    """Scale entries by sqrt(M_ii M_jj), so that rad and m have equal weight."""
+    """Assert that two matrices agree, relative to sqrt(M_ii M_jj)."""
     size = np.sqrt(np.abs(np.diag(expected)))
     np.testing.assert_allclose(
         M / np.outer(size, size), expected / np.outer(size, size), atol=tolerance
@@ -30,7 +30,7 @@ def assert_same_matrix(M, expected, tolerance):
 
 
 def serial(*frames):
-    """A chain of frames from the base to the platform."""
+    """Return a serial chain of frames from the base to the platform."""
     chain, above = [], "base"
     for frame in frames:
         chain.append(replace(frame, parent=above))
@@ -38,8 +38,8 @@ def serial(*frames):
     return home_posture(Robot("chain", above, tuple(chain)))
 
 
-def test_cantilever_compliance_equals_the_textbook():
-    """L/EA, L/GJ, L^3/3EI + 6/5 L/GA, L^2/2EI and L/EI for a square section along x."""
+def test_cantilever_compliance_equals_beam_theory():
+    """The entries are L/EA, L/GJ, L^3/3EI + 6/5 L/GA, L^2/2EI and L/EI."""
     L, a, E = 0.8, 0.02, 70e9
     A, inertia, G, J = a**2, a**4 / 12, E / 2, 0.1406 * a**4
     section = {"area": A, "I_y": inertia, "I_z": inertia, "J": J,
@@ -53,8 +53,8 @@ def test_cantilever_compliance_equals_the_textbook():
     assert_same_matrix(C, expected, 1e-12)
 
 
-def test_compliance_of_a_serial_chain_is_the_sum_of_its_parts_transformed_to_the_tip():
-    """C is the sum of X C_i X', where X transforms each part to the tip."""
+def test_compliance_of_serial_chain_is_sum_of_link_compliances():
+    """C is the sum of X C_i X', where X transforms screws of link i to the tip."""
     rng = np.random.default_rng(1)
     frames, expected = [], np.zeros((6, 6))
     steps, springs = rng.normal(size=(3, 3)), []
@@ -71,22 +71,22 @@ def test_compliance_of_a_serial_chain_is_the_sum_of_its_parts_transformed_to_the
 
 
 @pytest.mark.parametrize("name", ["3rrr", "delta"])
-def test_stiffness_of_three_equal_legs_has_threefold_symmetry(name):
+def test_stiffness_with_three_equal_legs_has_threefold_symmetry(name):
     K = platform_stiffness(home_posture(load_robot(name))).stiffness
     turn = np.array([[-1, -np.sqrt(3), 0], [np.sqrt(3), -1, 0], [0, 0, 2]]) / 2
     X = np.kron(np.eye(2), turn)
     assert_same_matrix(X @ K @ X.T, K, 1e-9)
 
 
-def test_orthoglide_stiffness_is_isotropic_at_home():
-    """By design (Wenger and Chablat), the force stiffness is k I without coupling."""
+def test_stiffness_of_orthoglide_is_isotropic_in_home_pose():
+    """The robot is isotropic by design (Wenger and Chablat)."""
     K = platform_stiffness(home_posture(load_robot("orthoglide"))).stiffness
     assert_same_matrix(K, np.diag([K[0, 0]] * 3 + [K[3, 3]] * 3), 1e-9)
 
 
 @pytest.mark.parametrize("name", ["irsbot2", "hexapod", "four_bar", "delta", "arm6"])
 def test_displacement_under_a_unit_load_equals_the_compliance(name):
-    """The minimum-energy solution under a load w, from another solver, moves by C w."""
+    """The displacement is computed by a solver that does not use the compliance."""
     robot = load_robot(name)
     frames = tuple(replace(frame, clearance=None) for frame in robot.frames)
     posture = home_posture(replace(robot, frames=frames))
@@ -98,7 +98,7 @@ def test_displacement_under_a_unit_load_equals_the_compliance(name):
 
 
 def differences(solve, posture, load, step):
-    """(6, 6) central differences of the platform screw, and the last screw."""
+    """Return central differences of the platform screw by the load, (6, 6)."""
     columns = []
     for row in range(6):
         ahead, back = (
@@ -110,7 +110,7 @@ def differences(solve, posture, load, step):
 
 
 def as_small_motion(C, screw):
-    """Convert changes of the rotation vector to small rotations."""
+    """Return the compliance for small rotations instead of rotation vectors."""
     J = np.eye(6)
     J[:3, :3] = turn_jacobian(screw[:3])
     return J @ C @ J.T
@@ -120,11 +120,10 @@ LOAD = np.array([3.0, -5.0, 2.0, 150.0, 80.0, -200.0])
 
 
 @pytest.mark.parametrize("case", NUMBERS["cases"], ids=lambda case: case["name"])
-def test_paper_robot_tangent_equals_differences_of_its_equilibria(case):
-    """Evaluated at the full errors of the paper, with closed clearances.
+def test_stiffness_of_irsbot2_equals_finite_differences(case):
+    """The robot has the errors of the paper, and contacts in its clearances.
 
-    The cone solver stops at a gap of 1e-8 of the energy, which leaves 1e-4 in screws;
-    the exact equilibrium is solved to machine precision.
+    The cone solver has a tolerance of 1e-8 of the energy, or 1e-4 of the screws.
     """
     posture = place_robot(irsbot2_with(case), {"tx": 0.1, "tz": -0.5})
     linear, exact = solve_assembly(posture, LOAD), solve_exact(posture, LOAD)
@@ -141,7 +140,7 @@ def test_paper_robot_tangent_equals_differences_of_its_equilibria(case):
     "seed",
     [0, 1, 2, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (3, 4, 5))],
 )
-def test_random_robot_tangents_equal_differences_of_equilibria(seed):
+def test_stiffness_of_random_robots_equals_finite_differences(seed):
     rng = np.random.default_rng(seed)
     robot = random_robot(rng, legs=3)
     posture = home_posture(robot.with_errors(0.3 * robot.errors))
@@ -160,8 +159,11 @@ def test_random_robot_tangents_equal_differences_of_equilibria(seed):
 @pytest.mark.parametrize(
     "seed", [12, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (42, 65))]
 )
-def test_tangent_equals_differences_at_rotations_of_a_radian(seed):
-    """Differences are extrapolated to zero step, on the rotated platform."""
+def test_stiffness_at_large_rotations_equals_finite_differences(seed):
+    """The platform rotates by more than 0.5 rad.
+
+    The finite differences are extrapolated to a step of zero.
+    """
     rng = np.random.default_rng(seed)
     robot = random_robot(rng, legs=int(rng.integers(1, 4)))
     posture = home_posture(robot)
@@ -170,20 +172,20 @@ def test_tangent_equals_differences_at_rotations_of_a_radian(seed):
     assert by_differences(posture, load)[0] < 1e-8
 
 
-def test_compliance_at_another_point_follows_from_the_screw_transform():
+def test_compliance_at_another_point_equals_transformed_compliance():
     """w . s does not depend on the reference point, so C becomes X C X'."""
     posture = home_posture(load_robot("irsbot2"))
     at_origin, r = platform_stiffness(posture), np.array([0.1, -0.2, 0.05])
     at_point = platform_stiffness(posture, at=r)
-    X = screw_map(-r)  # the platform's axes are the base's here
+    X = screw_map(-r)  # base axes and platform axes are parallel
     assert_same_matrix(at_point.compliance, X @ at_origin.compliance @ X.T, 1e-12)
     K = np.linalg.inv(X).T @ at_origin.stiffness @ np.linalg.inv(X)
     assert_same_matrix(at_point.stiffness, K, 1e-9)
     np.testing.assert_allclose(at_point.centre, at_origin.centre, atol=1e-9)
 
 
-def test_centre_of_stiffness_is_at_the_position_of_a_single_spring():
-    """For a diagonal link stiffness and a rigid arm, the centre is at the link tip."""
+def test_centre_of_stiffness_is_at_single_spring():
+    """A rigid arm connects the spring to the platform."""
     K = np.diag([20.0, 30.0, 40.0, 1e4, 2e4, 3e4])
     spring = Frame("spring", translation=[0.3, 0.1, 0.2], link=MatrixLink(K))
     arm = Frame("arm", translation=[0.5, -0.4, 0.1])
@@ -192,8 +194,8 @@ def test_centre_of_stiffness_is_at_the_position_of_a_single_spring():
     )
 
 
-def test_eigen_stiffnesses_of_a_diagonal_spring_are_its_diagonal():
-    """Rotations are multiplied by the length, which gives k / length^2."""
+def test_eigen_stiffnesses_of_diagonal_matrix_equal_its_entries():
+    """Rotational stiffnesses are divided by the squared characteristic length."""
     K = np.diag([20.0, 30.0, 40.0, 1e4, 2e4, 3e4])
     spring = Frame("spring", translation=[0.5, 0, 0], link=MatrixLink(K))
     eigen = platform_stiffness(serial(spring)).eigen
@@ -202,7 +204,7 @@ def test_eigen_stiffnesses_of_a_diagonal_spring_are_its_diagonal():
     )
 
 
-def test_compliance_shares_sum_to_one_and_the_share_of_a_single_link_is_one():
+def test_compliance_shares_sum_to_one():
     tangent = platform_stiffness(home_posture(load_robot("irsbot2")))
     for row in range(6):
         assert sum(tangent.shares(UNIT[row]).values()) == pytest.approx(1.0, rel=1e-12)
@@ -213,8 +215,8 @@ def test_compliance_shares_sum_to_one_and_the_share_of_a_single_link_is_one():
     assert alone.shares(UNIT[4]) == {Part("beam", "link"): pytest.approx(1.0)}
 
 
-def test_compliance_along_a_free_motion_is_nan_and_the_motion_is_reported():
-    """For a slide along x on a spring, TX is free; the other entries are preserved."""
+def test_compliance_along_free_motion_is_nan():
+    """The platform slides freely along x on a spring."""
     K = np.diag([20.0, 30.0, 40.0, 1e4, 2e4, 3e4])
     spring = Frame("spring", rotation=[0, np.pi / 2, 0], joint="prismatic",
                    link=MatrixLink(K))  # fmt: skip
@@ -231,7 +233,7 @@ def test_compliance_along_a_free_motion_is_nan_and_the_motion_is_reported():
 
 
 def test_rigid_direction_has_zero_compliance_and_infinite_stiffness():
-    """A hinge with a torsion spring and a rigid arm along x couples RZ and TY."""
+    """A rigid arm along x rotates about z against a torsion spring."""
     hinge = Frame("hinge", joint="revolute", joint_stiffness=only(2, 50.0))
     tangent = platform_stiffness(serial(hinge, Frame("arm", translation=[0.4, 0, 0])))
     screw = np.array([0, 0, 1, 0, 0.4, 0])
@@ -243,8 +245,8 @@ def test_rigid_direction_has_zero_compliance_and_infinite_stiffness():
     assert tangent.eigen.condition == np.inf
 
 
-def test_tangent_of_a_column_on_a_torsion_spring_vanishes_at_buckling():
-    """A rigid bar of length L on a spring k under a dead force F: k/L^2 - F/L."""
+def test_stiffness_of_column_is_zero_at_buckling_load():
+    """The stiffness is k/L^2 - F/L for a rigid bar of length L on a spring k."""
     k, L = 50.0, 0.4
     hinge = Frame("hinge", joint="revolute", joint_stiffness=only(2, k))
     posture = serial(hinge, Frame("arm", translation=[L, 0, 0]))
@@ -260,10 +262,10 @@ def test_tangent_of_a_column_on_a_torsion_spring_vanishes_at_buckling():
 
 
 @pytest.mark.parametrize("state", ["contact", "exact"])
-def test_closed_pin_is_stiff_normal_to_its_rim_and_compliant_along_it(state):
-    """Under a force F with radial clearance c, the stiffness along the rim is F/c."""
+def test_stiffness_along_contact_rim_equals_force_over_clearance(state):
+    """A force F presses a pin against the rim of its radial clearance c."""
     force, c, k = 30.0, 1e-3, 1e5
-    K = np.diag([1e9, 1e9, 1e9, k, k, k])  # so that the arm c causes no rotation
+    K = np.diag([1e9, 1e9, 1e9, k, k, k])  # rotations are negligible
     clearance = Clearance(radial=c)
     spring = Frame("spring", link=MatrixLink(K), clearance=clearance)
     posture = serial(spring, Frame("tip"))
@@ -276,7 +278,7 @@ def test_closed_pin_is_stiff_normal_to_its_rim_and_compliant_along_it(state):
 
 
 @pytest.mark.parametrize("state", ["contact", "exact"])
-def test_platform_within_its_clearance_has_zero_stiffness(state):
+def test_stiffness_within_clearance_is_zero(state):
     K = np.diag([1e3, 1e3, 1e3, 1e5, 1e5, 1e5])
     spring = Frame("spring", link=MatrixLink(K), clearance=Clearance(axial=1e-4))
     posture = serial(spring, Frame("tip"))
@@ -287,10 +289,10 @@ def test_platform_within_its_clearance_has_zero_stiffness(state):
 
 
 @pytest.mark.parametrize("state", ["contact", "exact"])
-def test_stiffness_at_a_change_of_contact_depends_on_the_side(state):
-    """An error just takes up the clearance: rigid at the stop, otherwise a spring.
+def test_stiffness_at_change_of_contact_differs_for_loading_and_unloading(state):
+    """The error equals the clearance, so there is contact without a force.
 
-    The contact force is zero, so each applies for one direction of the load.
+    The stiffness is infinite towards the stop, and finite in the other direction.
     """
     K = np.diag([1e3, 1e3, 1e3, 1e5, 1e5, 1e5])
     frames = (
@@ -306,10 +308,10 @@ def test_stiffness_at_a_change_of_contact_depends_on_the_side(state):
     assert away.along(UNIT[5])[0] == pytest.approx(1e5)
 
 
-def test_block_pressed_on_a_table_slides_freely_and_is_rigid_normal_to_the_table(
+def test_block_on_plate_slides_freely_and_is_rigid_along_normal(
     write_file,
 ):
-    """Its drives can neither hold it within their clearances nor tilt it."""
+    """The joints of the drives have clearances, so they do not resist small motions."""
     text = """
 format = 2
 name = "block"

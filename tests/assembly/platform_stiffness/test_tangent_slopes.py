@@ -1,4 +1,4 @@
-"""Derivatives of tangent compliances: closed forms and differences of solutions."""
+"""Tests of compliance derivatives against closed forms and finite differences."""
 
 import numpy as np
 import pytest
@@ -16,15 +16,15 @@ POSE, LOAD = {"tx": 0.1, "tz": -0.45}, [0, 0, 0, 50.0, 0, -320.0]
 
 
 def torsion_bar(k, L):
-    """A rigid bar on a torsion spring."""
+    """Return a rigid bar of length L on a torsion spring k."""
     K = np.diag([np.inf, np.inf, k, np.inf, np.inf, np.inf])
     hinge = Frame("hinge", joint="revolute", joint_stiffness=K)
     return Robot("bar", "bar", (hinge, Frame("bar", "hinge", [L, 0, 0])))
 
 
 @pytest.mark.parametrize("share", [0.0, 0.5, -1.0, 1.5])
-def test_compliance_derivatives_of_a_loaded_bar_equal_their_closed_form(share):
-    """Derivatives of C = 1 / (k/L^2 - F/L) by k and L, below and beyond buckling."""
+def test_compliance_derivatives_of_loaded_bar_equal_closed_form(share):
+    """C = 1 / (k/L^2 - F/L) is differentiated by k and L."""
     k, L = 50.0, 0.4
     F = share * k / L
     paths = ["hinge.joint_stiffness.rz", "bar.translation.x"]
@@ -37,8 +37,8 @@ def test_compliance_derivatives_of_a_loaded_bar_equal_their_closed_form(share):
     assert by_L[4, 4] == pytest.approx(C**2 * (2 * k / L**3 - F / L**2), rel=1e-6)
 
 
-def test_compliance_derivative_of_a_closed_pin_by_its_clearance_is_1_over_the_load():
-    """C = c / F under the load F, so dC/dc = 1 / F, including the contact motion."""
+def test_compliance_derivative_by_pin_clearance_is_inverse_of_load():
+    """The compliance along the rim is C = c / F under the load F."""
     c, F = 1e-4, 200.0
     pin = Frame("pin", clearance=Clearance(radial=c, axial=0.0, tilt=0.0, spin=0.0))
     robot = Robot("pin", "tip", (pin, Frame("tip", "pin")))
@@ -49,8 +49,8 @@ def test_compliance_derivative_of_a_closed_pin_by_its_clearance_is_1_over_the_lo
 
 
 @pytest.mark.parametrize("state", ["contact", "exact"])
-def test_compliance_derivative_of_a_closed_ball_by_its_radius_is_1_over_the_load(state):
-    """The derivative acts in both directions across the load, and is zero along it."""
+def test_compliance_derivative_by_ball_clearance_is_inverse_of_load(state):
+    """The derivative is zero along the load, and 1 / F in both other directions."""
     ball = Frame("ball", clearance=Clearance(ball=1e-4))
     robot = Robot("ball", "tip", (ball, Frame("tip", "ball")))
     asked = TangentState(state, [0, 0, 0, 0, 0, 200.0])
@@ -69,10 +69,8 @@ def test_compliance_derivative_of_a_closed_ball_by_its_radius_is_1_over_the_load
         ("leg1.link_a.geometric_error.tx", 1e-7),
     ],
 )
-def test_compliance_derivatives_of_the_paper_robot_equal_differences_of_solutions(
-    state, path, step
-):
-    """Evaluated at full errors under load; closed clearances remain closed."""
+def test_compliance_derivatives_of_irsbot2_equal_finite_differences(state, path, step):
+    """The robot has the errors of the paper, a load, and contacts in clearances."""
     design, asked = design_of(PAPER), TangentState(state, LOAD, at=(0, 0, 0.05))
     slope = stiffness_slopes(design, [path], POSE, asked=asked)[path]
 
@@ -94,8 +92,8 @@ def test_compliance_derivatives_of_the_paper_robot_equal_differences_of_solution
     )
 
 
-def test_compliance_derivative_at_a_change_of_contact_is_nan():
-    """The gap equals the clearance, so there is contact without a force."""
+def test_compliance_derivative_at_change_of_contact_is_nan():
+    """The error equals the clearance, so there is contact without a force."""
     touching = coaxial_beams(
         [0, 0, 0, 0, 1e-4, 0], clearance=Clearance(radial=1e-4, axial=0, tilt=0, spin=0)
     )

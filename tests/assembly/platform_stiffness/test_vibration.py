@@ -1,4 +1,4 @@
-"""Natural frequencies, compared with closed forms."""
+"""Tests of natural frequencies against closed forms."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -32,9 +32,10 @@ def cantilever(pieces, axis=(1.0, 0.0, 0.0)):
 
 
 def bending(root):
-    """[Hz] a clamped-free beam, roots of cos x cosh x = -1, with its sections' turning.
+    """Return the bending frequency [Hz] of a cantilever with rotary inertia.
 
-    Rayleigh's quotient with Euler's shape, where the mass includes rho I slope^2.
+    It is Rayleigh's quotient for the mode shape of an Euler beam, whose ``root`` is a
+    solution of cos x cosh x = -1.
     """
     inertia, area = SIDE**4 / 12, SIDE**2
     speed = np.sqrt(E * inertia / (RHO * area)) / LENGTH**2
@@ -46,7 +47,7 @@ def bending(root):
     return root**2 * speed / (2 * np.pi) / np.sqrt(1 + turning)
 
 
-def test_frequency_of_a_mass_on_a_torsion_spring_equals_its_closed_form():
+def test_frequency_of_mass_on_torsion_spring_equals_closed_form():
     """omega^2 = k / (m l^2)."""
     hinge = Frame("hinge", joint="revolute", joint_stiffness=only(2, 50.0))
     arm = Frame("arm", "hinge", [0.4, 0, 0], mass=2.0, centre_of_mass=[0.1, 0, 0])
@@ -57,8 +58,8 @@ def test_frequency_of_a_mass_on_a_torsion_spring_equals_its_closed_form():
 
 
 @pytest.mark.parametrize("moment", [0.0, 0.1])
-def test_weight_lowers_the_frequency_of_a_standing_pendulum(moment):
-    """omega^2 = (k - m g l) / (m l^2 + J), with the geometric part in the tangent."""
+def test_gravity_lowers_frequency_of_inverted_pendulum(moment):
+    """omega^2 = (k - m g l) / (m l^2 + J)."""
     k, m, length, g = 50.0, 2.0, 0.4, 9.81
     hinge = Frame("hinge", joint="revolute", joint_stiffness=only(2, k))
     arm = Frame("arm", "hinge", [length, 0, 0], mass=m, inertia=moment * np.eye(3))
@@ -71,8 +72,10 @@ def test_weight_lowers_the_frequency_of_a_standing_pendulum(moment):
 @pytest.mark.parametrize(
     ("pieces", "first", "second"), [(1, 6e-3, 0.6), (4, 5e-5, 2e-3), (8, 4e-6, 2e-4)]
 )
-def test_bending_frequencies_of_a_cantilever_equal_the_textbook(pieces, first, second):
-    """Roots 1.8751 and 4.6941 are approached from above, with errors of order 1/n^4."""
+def test_bending_frequencies_of_cantilever_converge_to_closed_form(
+    pieces, first, second
+):
+    """The frequencies are too high, with errors of order 1/n^4 for n elements."""
     modes = natural_modes(cantilever(pieces), 4)
     off = modes.frequencies / np.repeat([bending(1.8751041), bending(4.6940911)], 2) - 1
     assert (off > 0).all()
@@ -81,17 +84,17 @@ def test_bending_frequencies_of_a_cantilever_equal_the_textbook(pieces, first, s
 
 
 @pytest.mark.parametrize("pieces", [1, 2, 4])
-def test_estimated_frequency_error_equals_the_error_of_the_textbook(pieces):
-    """The estimate for the second mode in one piece, 0.60, lacks higher orders of h."""
+def test_estimated_frequency_error_agrees_with_the_exact_error(pieces):
+    """With one element, the estimate for the second mode lacks higher orders."""
     modes = natural_modes(cantilever(pieces), 4)
     exact = np.repeat([bending(1.8751041), bending(4.6940911)], 2)
     errors = modes.frequencies / exact - 1
-    share = 0.5 if pieces == 1 else 0.1
-    np.testing.assert_allclose(discretisation_errors(modes), errors, rtol=share)
+    tolerance = 0.5 if pieces == 1 else 0.1
+    np.testing.assert_allclose(discretisation_errors(modes), errors, rtol=tolerance)
 
 
-def test_axial_and_torsional_frequencies_equal_the_textbook():
-    """(1/4L) sqrt(E / rho) and (1/4L) sqrt(GJ / rho I_p); 8 pieces are 0.2 % high."""
+def test_axial_and_torsional_frequencies_agree_with_closed_form():
+    """The frequencies are (1/4L) sqrt(E / rho) and (1/4L) sqrt(GJ / rho I_p)."""
     modes = natural_modes(cantilever(8), 60)
     G, J = E / 2.6, 0.140577 * SIDE**4
     twist = np.sqrt(G * J / (RHO * SIDE**4 / 6)) / (4 * LENGTH)
@@ -101,7 +104,7 @@ def test_axial_and_torsional_frequencies_equal_the_textbook():
         assert nearest < 2e-3
 
 
-def test_frequencies_do_not_depend_on_the_orientation_of_the_beam():
+def test_frequencies_do_not_depend_on_orientation_of_beam():
     R = rotation_matrix([0.3, -1.0, 0.7])
     straight = natural_modes(cantilever(3), 6).frequencies
     turned = natural_modes(cantilever(3, tuple(R[:, 0])), 6).frequencies
@@ -115,7 +118,7 @@ def test_free_motion_has_zero_frequency():
     np.testing.assert_array_equal(modes.frequencies, [0.0])
 
 
-def test_vibration_ignores_clearances_and_rejects_a_robot_without_mass():
+def test_natural_modes_ignore_clearances_and_require_a_mass():
     posture = cantilever(1)
     (tip,) = posture.robot.frames
     loose = replace(tip, name="beam", clearance=Clearance(radial=1e-4))
@@ -129,11 +132,10 @@ def test_vibration_ignores_clearances_and_rejects_a_robot_without_mass():
 
 
 @pytest.mark.slow
-def test_frequencies_of_a_meshed_bar_equal_those_of_the_beam():
-    """A round bar with L / r = 11, whose bending depends slightly on end restraint.
+def test_frequencies_of_meshed_bar_agree_with_beam():
+    """The rigid end faces of the mesh increase the frequencies by less than 2 %.
 
-    Its 12 by 12 mass moved as a whole is that of its volume, 48 facets of a circle or
-    more; ends that cannot warp make it 2 % stiffer at most.
+    The mass is compared with the mass of a cylinder.
     """
     length, radius = 0.452, 0.04
     solid = MeshLink(MESHES / "distal_plain.stl", "z=0", "z=0.452", E, 0.3, RHO)
@@ -190,8 +192,11 @@ joint = [
 """  # noqa: E501
 
 
-def test_massless_rods_that_spin_freely_do_not_change_the_frequencies(write_file):
-    """Expected: K and M of all bodies' twists, constraints by their null space."""
+def test_frequencies_of_robot_with_screw_drives_equal_reference(write_file):
+    """The reference uses stiffness and mass matrices in the twists of all bodies.
+
+    The rods are massless and can spin freely.
+    """
     modes = natural_modes(home_posture(read_robot(write_file(SCREWS_AND_RODS))), 3)
     expected = [241.53112443, 349.76392046, 970.11496002]
     np.testing.assert_allclose(modes.frequencies, expected, rtol=1e-8)
@@ -220,10 +225,10 @@ joint = [
 """  # noqa: E501
 
 
-def test_point_mass_on_six_rods_has_three_modes_and_no_spurious_modes(tmp_path):
-    """Expected: K of the six bars, condensed to the translations of the mass.
+def test_point_mass_on_six_rods_has_three_modes(tmp_path):
+    """The expected stiffness is condensed to the translations of the mass.
 
-    The two bars of a leg are springs EA/L, and their common drive is a spring along z.
+    The two bars of a leg are springs EA/L on a drive, which is a spring along z.
     """
     file = tmp_path / "robot.toml"
     file.write_text(LINEAR_DELTA)
