@@ -1,4 +1,4 @@
-"""Equilibrium with finite motions; loop closure is imposed exactly, on SE(3).
+"""Equilibrium with finite motions and exact loop closure on SE(3).
 
 Start with ``exact.py``.
 """

@@ -1,23 +1,20 @@
-r"""Minimise a quadratic energy, convex or not, with clearances confined to cones.
+r"""Minimise a quadratic energy over clearances that satisfy cone constraints.
 
-Each step towards the exact equilibrium requires the change v of the clearances u that
-minimises
+A step towards the exact equilibrium changes the clearances u by the v that minimises
 
         s . v + v . S v / 2   subject to   |u_k + v_k| <= 1,  H (u + v) = k.
 
-S can have directions of negative curvature.  Those normal to the boundaries of active
-constraints are harmless, but others occur as well.  Far from the solution, S is made
-convex, and :mod:`forcefit.assembly.solvers.conic` solves the problem.  Near the
-solution, Newton's method on the active boundaries is accurate to machine precision,
-while the conic solver reaches only half of the digits.
+S can be indefinite.  Far from the solution, S is replaced by a convex matrix, and
+:mod:`forcefit.assembly.solvers.conic` solves the problem.  Near the solution, Newton's
+method on the active constraints is accurate to machine precision.
 
 ======  ===========  =========  =====================================================
 symbol  code         shape      meaning
 ======  ===========  =========  =====================================================
-S s     ``S s``      (nu, ...)  [J] curvature and gradient of the energy at u
-u       ``start``    (nu,)      clearances in units of their cones
-H k     ``rows`` ..  (p, nu)    closures that only clearances can close
-f       ``active``   (cones,)   [J] multiplier of each cone, 0 inside
+S s     ``S s``      (nu, ...)  [J] second derivative and gradient of the energy at u
+u       ``start``    (nu,)      motions within the clearances, divided by the bounds
+H k     ``rows`` ..  (p, nu)    loop-closure equations without springs and free joints
+f       ``active``   (cones,)   [J] multiplier of each cone, 0 if inactive
 ======  ===========  =========  =====================================================
 
 Sources:
@@ -35,15 +32,13 @@ from forcefit.assembly.solvers.cones import cone_sizes
 from forcefit.assembly.solvers.conic import minimise_energy
 from forcefit.assembly.solvers.method import Method
 
-AT_BOUNDARY = 1e-5  # [-] distance from the boundary within which a cone can be active
-_STEPS = 15  # largest number of Newton steps on the active boundaries
-# [-] size of the last step at convergence, relative to the size of the cones
-_STILL = 1e-6
-# relative to the largest multiplier: a cone with a smaller negative multiplier remains
-# active
+AT_BOUNDARY = 1e-5  # [-] largest distance of an active constraint from its boundary
+_STEPS = 15  # maximum number of Newton steps
+_STILL = 1e-6  # [-] convergence tolerance on the step, relative to the clearances
+# [-] threshold of a zero multiplier, relative to the largest multiplier
 _ZERO_MULTIPLIER = 1e-11
-# [-] longest step along a boundary, relative to its radius; boundaries are curved
-_LONGEST = 0.3
+_LONGEST = 0.3  # [-] longest step along a boundary, relative to its radius
+# [-] trial values added to the curvature, relative to the largest curvature
 _SHIFTS = (
     0.0,
     1e-9,
@@ -51,9 +46,8 @@ _SHIFTS = (
     1e-7,
     1e-6,
     1e-5,
-)  # shifts of the curvature that are tried, relative to the largest curvature
-# relative to the largest curvature: smaller curvatures are replaced by this value
-_LEAST_CURVATURE = 1e-10
+)
+_LEAST_CURVATURE = 1e-10  # [-] lower bound of the curvature, relative to the largest
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,12 +55,12 @@ class ClearanceProblem:
     """Quadratic problem of a step; see the module docstring for the symbols.
 
     Attributes:
-        S: (nu, nu) symmetric curvature of the energy.
+        S: (nu, nu) symmetric second derivative of the energy.
         s: (nu,) gradient of the energy.
-        start: (nu,) clearances, within the cones.
-        group: (nu,) cone of each clearance.
-        rows: (p, nu) independent rows of the closures.
-        right: (p,) right side of the closures.
+        start: (nu,) motions within the clearances at the start.
+        group: (nu,) index of the cone to which each motion belongs.
+        rows: (p, nu) independent rows of the loop-closure equations.
+        right: (p,) right-hand side of the loop-closure equations.
     """
 
     S: NDArray
@@ -78,10 +72,7 @@ class ClearanceProblem:
 
     @cached_property
     def multipliers(self) -> tuple[NDArray, NDArray]:
-        """(cones,) [J] multipliers of the cones at the start, 0 if inactive.
-
-        The second array contains the (p,) multipliers of ``rows``.
-        """
+        """Multipliers of the cones (cones,) [J] and of ``rows`` (p,) at the start."""
         touching = cone_sizes(self.start, self.group) >= 1.0 - AT_BOUNDARY
         normals = boundary_normals(self.start, touching, self.group)
         balance = np.linalg.lstsq(np.hstack([normals, self.rows.T]), -self.s)[0]
@@ -94,45 +85,44 @@ class ClearanceProblem:
 
 
 def cone_multipliers(u: NDArray, gradient: NDArray, group: NDArray) -> NDArray:
-    """Return the (cones,) [J] cone multipliers, computed from the energy's gradient."""
+    """Return the multipliers of the cones for a given gradient, (cones,) [J]."""
     force = -np.bincount(group, weights=gradient * u)
     at_boundary = cone_sizes(u, group) >= 1.0 - AT_BOUNDARY
     return np.where(at_boundary, np.maximum(force, 0.0), 0.0)
 
 
 def boundary_normals(u: NDArray, active: NDArray, group: NDArray) -> NDArray:
-    """Return the (nu, active) normals of the boundaries of the active cones."""
+    """Return the normals to the boundaries of the active cones, (nu, active)."""
     return np.where(group[:, None] == np.flatnonzero(active), u[:, None], 0.0)
 
 
 def clearance_step(
     problem: ClearanceProblem, near: bool, method: Method = "compiled"
 ) -> tuple[NDArray, NDArray] | None:
-    """Minimise the energy over the clearances within their cones.
+    """Return the step that minimises the energy subject to the cone constraints.
 
     Args:
         problem: the quadratic problem.
-        near: whether the solution is close enough to try Newton's method first.
+        near: whether to try Newton's method first, because the solution is close.
         method: method of :func:`forcefit.assembly.solvers.conic.minimise_energy`.
 
     Returns:
-        The change (nu,) of the clearances and the multipliers (p,) of ``rows``; None if
-        no clearances within the cones satisfy the closures.
+        The step (nu,) and the multipliers (p,) of ``rows``, or None if the problem is
+        infeasible.
     """
     step = _newton(problem) if near else None
     return step or _convex(problem, method)
 
 
 def _convex(p: ClearanceProblem, method: Method) -> tuple[NDArray, NDArray] | None:
-    """Return the step for a convexified S, if possible without changing the minimum."""
+    """Return the step for a convexified S."""
     least = float(np.linalg.eigvalsh(p.S).min(initial=0.0))
     force, _ = p.multipliers
     active = force[p.group]
     if least >= 0.0 or not active.any():
         return _conic(p, p.S, p.s, method)
-    # the term f (|u_k|^2 - 1) / 2 is zero at the boundary, and its normal is constant
-    # to first order; adding the term makes S convex where needed and preserves the
-    # minimum
+    # adding f (|u_k|^2 - 1) / 2, which is zero at the boundary, makes S convex and
+    # preserves the minimum
     normals = boundary_normals(p.start, force > 0.0, p.group)
     held = 0.99 * active
     convex = p.S + np.diag(held) - 10.0 * least * normals @ normals.T
@@ -147,7 +137,7 @@ def _convex(p: ClearanceProblem, method: Method) -> tuple[NDArray, NDArray] | No
 def _conic(
     p: ClearanceProblem, S: NDArray, s: NDArray, method: Method
 ) -> tuple[NDArray, NDArray] | None:
-    """Return the step computed by the conic solver for a convexified S."""
+    """Return the step computed by the conic solver."""
     values, vectors = np.linalg.eigh(S)
     floor = _LEAST_CURVATURE * max(float(np.abs(values).max(initial=0.0)), 1e-150)
     G = np.sqrt(np.maximum(values, floor))[:, None] * vectors.T
@@ -158,7 +148,7 @@ def _conic(
 
 
 def _newton(p: ClearanceProblem) -> tuple[NDArray, NDArray] | None:
-    """Return the Newton step on the boundaries of active cones; None if it fails."""
+    """Return the step computed by Newton's method, or None if it fails."""
     force, rigid = p.multipliers
     u, active = p.start, force > 0.0
     for _ in range(_STEPS):
@@ -184,7 +174,7 @@ def _newton(p: ClearanceProblem) -> tuple[NDArray, NDArray] | None:
 def _active_step(
     p: ClearanceProblem, S: NDArray, gradient: NDArray, u: NDArray, active: NDArray
 ) -> tuple[NDArray, NDArray, NDArray] | None:
-    """Return the step, and multipliers of cones and rows; None if no minimum exists."""
+    """Return a step, cone multipliers and row multipliers, or None without minimum."""
     C = np.hstack([boundary_normals(u, active, p.group), p.rows.T])
     count, boundaries = C.shape[1], int(active.sum())
     if count > len(u):

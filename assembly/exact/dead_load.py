@@ -1,26 +1,25 @@
-r"""Dead loads under finite motions: constant forces at points fixed to moving bodies.
+r"""Dead loads: constant forces on points that move with the bodies.
 
-The work of a dead load is linear in the pose of its body, <G, T - T_nominal>, where T
-contains the first three rows of the body's transform.  For a force f at the point a of
-the body, in the body's axes, G is f [a, 1]^T.  A couple m is represented by two
-opposite forces, for which G is [m]x R_nominal / 2 and the work is m . (axis sin angle).
+The work of a dead load is <G, T - T_nominal>, where T contains the first three rows of
+the body's transform.  For a force f at the point a of the body, in the body's axes, G
+is f [a, 1]^T.  A couple m consists of two opposite forces, and G is [m]x R_nominal / 2.
+
 The weight W of a beam acts at the middle of the cubic curve between its clamped ends.
-This point is (p1 + p2) / 2 + (t1 - t2) / 12, where t are the end tangents times the
-length.
+This point is (p1 + p2) / 2 + (t1 - t2) / 12, where p are the end points, and t the end
+tangents multiplied by the length.
+
+The force f of a drive does the work f . q, where q is the motion along the joint axis.
 
 ======  =============  ==========  ==================================================
 symbol  code           shape       meaning
 ======  =============  ==========  ==================================================
-G       ``bodies`` ..  (n, 3, 4)   load on the body that reaches to each frame, before
-        its joint; and load on all parts that its joint carries
-w       ``load``       (6,)        on the platform, see :func:`.exact.solve_exact`
-M       --             (3, 3)      sum of the points times their forces
+G       ``bodies`` ..  (n, 3, 4)   load on the body between a frame and its parent
+G       ``carried``    (n, 3, 4)   load on all bodies that the frame's joint moves
+w       ``load``       (6,)        wrench on the platform, see :mod:`.exact`
+M       --             (3, 3)      sum of position times force over all loads
 ======  =============  ==========  ==================================================
 
-The force f of a drive does the work f . q, where q are the motions along the axis of
-its joint.
-
-The linear limit of these loads is :mod:`forcefit.assembly.linear.load`.
+For small motions, see :mod:`forcefit.assembly.linear.load`.
 """
 
 from dataclasses import dataclass, field
@@ -40,16 +39,15 @@ from forcefit.stiffness.screws import rotation_matrix, skew, transform
 
 @dataclass(frozen=True, eq=False)
 class DeadLoads:
-    """All dead loads on a robot that undergoes finite motions.
+    """Dead loads on all bodies of a robot.
 
     Attributes:
         load: (6,) [N m, N] wrench on the platform at its origin, base axes.
         bodies: (n, 3, 4) [N m, N] loads on the body of each frame.
-        carried: (n, 3, 4) [N m, N] loads on all parts that each frame's joint carries.
-        distributed: (n, 3, 4) [N m, N] part of ``bodies`` that is distributed along
-            beams; or zero.
-        drives: (n, 6) [N m, N] wrenches of drives along the joints' motions, in the
-            frames' axes.
+        carried: (n, 3, 4) [N m, N] loads on all bodies that each frame's joint moves.
+        distributed: (n, 3, 4) [N m, N] weights of beams, which ``bodies`` includes.
+        drives: (n, 6) [N m, N] wrenches of the drives on their joints, in the axes of
+            each frame.
     """
 
     load: NDArray
@@ -71,19 +69,18 @@ def dead_loads(
     gravity: ArrayLike | None = None,
     point: ArrayLike = (0.0, 0.0, 0.0),
 ) -> DeadLoads:
-    """Convert the given loads to dead loads.
+    """Return the dead loads on a robot.
 
     Args:
         posture: configuration of a robot of n frames.
         load: (6,) [N m, N] wrench on the platform at ``point``, base axes.
-        bodies: (n, 6) [N m, N] wrenches on each frame's body, at the frame's origin,
+        bodies: (n, 6) [N m, N] wrench on the body of each frame, at the frame's origin,
             base axes.
         gravity: (3,) [m/s^2] gravity vector in base axes.
-        point: (3,) [m] point of the platform at which the force acts, platform axes;
-            the force moves with this point.
+        point: (3,) [m] point of application on the platform, platform axes.
 
     Returns:
-        The dead loads; all zero if no load is given.
+        The dead loads.
     """
     count = len(posture.robot.frames)
     wrench = np.zeros(6) if load is None else np.array(load, dtype=float)
@@ -106,17 +103,17 @@ def dead_loads(
 def dead_loads_of_rows(
     postures: Posture, errors: NDArray, load: NDArray, gravity: NDArray, point: NDArray
 ) -> DeadLoads:
-    """Return the dead loads in each of R measurements.
+    """Return the dead loads in R measurements.
 
     Args:
         postures: R postures in one object.
-        errors: (R, n, 6) [rad, m] screws of the bodies in their unstressed shape.
+        errors: (R, n, 6) [rad, m] geometric errors of the bodies.
         load: (R, 6) [N m, N] wrenches on the platform at ``point``, base axes.
         gravity: (R, 3) [m/s^2] gravity vectors in base axes.
-        point: (3,) [m] point of the platform at which the load acts, platform axes.
+        point: (3,) [m] point of application on the platform, platform axes.
 
     Returns:
-        Loads whose arrays have a leading axis of length R.
+        Loads whose arrays have a first axis of length R.
     """
     robot = postures.robot
     on_bodies, carried = np.zeros((2, *errors.shape[:2], 3, 4))
@@ -133,7 +130,7 @@ def dead_loads_of_rows(
 def _add_weights(
     posture: Posture, errors: NDArray, g: NDArray, on_bodies: NDArray, carried: NDArray
 ) -> NDArray:
-    """Add the weights of bodies and links; return the links' weights at their tips."""
+    """Add the weights of bodies and beams, and return the weights of beams."""
     robot, nominal = posture.robot, nominally_carried(posture)
     distributed = np.zeros_like(on_bodies)
     for i, frame in enumerate(robot.frames):
@@ -149,9 +146,8 @@ def _add_weights(
         distributed[..., i, :, :] = at_tip
         on_bodies[..., i, :, :] += at_tip
         parent = robot.parents[i]
-        if parent >= 0:  # otherwise the base carries it
-            # start and tangent of the beam in the parent's frame, after the parent's
-            # joint; the beam is straight up to its tip, including the geometric error
+        if parent >= 0:  # the start of the beam moves with the parent
+            # start and tangent of the beam in the moved frame of the parent
             error = errors[..., i, :]
             off = transform(error[..., 3:], rotation_matrix(error[..., :3]))
             T = np.linalg.inv(nominal[..., parent, :, :])
@@ -165,7 +161,7 @@ def _add_weights(
 
 
 def work_of(place: Placement, loads: DeadLoads) -> float:
-    """Return the work [J] done by all loads since the nominal posture."""
+    """Return the work [J] of all loads, from the nominal posture to a placement."""
     work = 0.0
     if loads.load.any():
         work += float(loads.load @ place.platform_screw)
@@ -182,7 +178,7 @@ def work_of(place: Placement, loads: DeadLoads) -> float:
 
 
 def work_gradient(place: Placement, loads: DeadLoads) -> NDArray:
-    """Return the (N,) [J] derivatives of the work with respect to the unknowns."""
+    """Return the derivatives of the work with respect to the unknowns, (N,) [J]."""
     gradient = place.platform_rows.T @ loads.load
     if loads.beyond_platform:
         wrenches, _ = _on_unknowns(place, loads)
@@ -196,7 +192,7 @@ def curvature_of(place: Placement, multipliers: NDArray, loads: DeadLoads) -> ND
     """Return the second derivative of multipliers . residual + work.
 
     Args:
-        place: the robot's placement.
+        place: displaced robot.
         multipliers: (6 K,) multipliers of the scaled residual.
         loads: loads on the robot.
 
@@ -209,7 +205,7 @@ def curvature_of(place: Placement, multipliers: NDArray, loads: DeadLoads) -> ND
         return H
     wrenches, M = _on_unknowns(place, loads)
     turn, shift = place.moves[:3].T, place.moves[3:].T
-    # the term of exp(A) exp(B) with A and B moves a point x by a x (b x x + v_b)
+    # the bracket term of exp(A) exp(B) moves a point x by a x (b x x + v_b)
     spread = np.trace(M, axis1=1, axis2=2)[:, None, None] * np.eye(3)
     later = np.einsum("nij,nj->ni", M - spread, turn)
     later -= np.cross(wrenches[:, 3:], shift)
@@ -218,7 +214,7 @@ def curvature_of(place: Placement, multipliers: NDArray, loads: DeadLoads) -> ND
 
 
 def load_magnitudes(place: Placement, loads: DeadLoads) -> NDArray:
-    """Return the (N,) [J] sums of absolute values of the loads on each unknown."""
+    """Return the sum of the absolute loads on each unknown, (N,) [J]."""
     sizes = np.abs(place.platform_rows).T @ np.abs(loads.load)
     if loads.beyond_platform:
         wrenches, _ = _on_unknowns(place, loads)
@@ -229,7 +225,10 @@ def load_magnitudes(place: Placement, loads: DeadLoads) -> NDArray:
 
 
 def largest_wrench(place: Placement, loads: DeadLoads) -> float:
-    """Return the [N m] largest scaled wrench of the loads at the platform's origin."""
+    """Return the largest component of the loads [N m].
+
+    Forces are multiplied by the reference length.
+    """
     scale = place.model.scale
     largest = float(np.abs(loads.load / scale).max())
     if loads.beyond_platform:
@@ -242,15 +241,15 @@ def largest_wrench(place: Placement, loads: DeadLoads) -> float:
 
 
 def wrenches_on_frames(place: Placement, loads: DeadLoads) -> tuple[NDArray, NDArray]:
-    """Return the wrenches of all loads, at the platform's nominal origin, base axes.
+    """Return the resultants of all loads at the platform's nominal origin, base axes.
 
     Args:
-        place: the robot's placement.
+        place: displaced robot.
         loads: loads on the robot.
 
     Returns:
-        (n, 6) [N m, N] wrenches on each frame's body and on all parts that it carries;
-        and (n, 6) wrenches on all parts that its joint carries.
+        (n, 6) [N m, N] resultant on the body of each frame and all bodies that it
+        moves, and (n, 6) resultant on all bodies that the frame's joint moves.
     """
     robot = place.model.posture.robot
     body, joint, *_ = _on_frames(place, loads)
@@ -266,7 +265,15 @@ def wrenches_on_frames(place: Placement, loads: DeadLoads) -> tuple[NDArray, NDA
 
 
 def distributed_at_tips(place: Placement, loads: DeadLoads) -> NDArray:
-    """Return the (n, 6) [N m, N] distributed weights of links, reduced to the tips."""
+    """Return the tip wrenches that are equivalent to the weights of beams.
+
+    Args:
+        place: displaced robot.
+        loads: loads on the robot.
+
+    Returns:
+        (n, 6) [N m, N] wrenches in the axes of the tips.
+    """
     T = place.body_ends
     G = np.broadcast_to(loads.distributed, (len(T), 3, 4))
     moment, force, _ = _read(G, T, T[:, :3, 3])
@@ -276,22 +283,22 @@ def distributed_at_tips(place: Placement, loads: DeadLoads) -> NDArray:
 
 
 def _on_motions(place: Placement, loads: DeadLoads) -> NDArray:
-    """Return the (N,) [J] work of the drives per unit of each unknown."""
+    """Return the work of the drives per unit of each unknown, (N,) [J]."""
     model = place.model
     work = np.vecdot(loads.drives[model.frame], model.columns)
     return np.where(model.motion == LINK, 0.0, work)
 
 
 def drive_wrenches(posture: Posture, loads: DeadLoads, carried: NDArray) -> NDArray:
-    """Return the (..., n, 6) [N m, N] wrenches of drives on the parts they move.
+    """Return the wrenches of the drives on the bodies that they move.
 
     Args:
         posture: nominal posture.
         loads: loads on the robot.
-        carried: (..., n, 4, 4) frames after the coordinate of their joint.
+        carried: (..., n, 4, 4) frames after the motion of their joint.
 
     Returns:
-        Wrenches at the platform's nominal origin, base axes.
+        (..., n, 6) [N m, N] wrenches at the platform's nominal origin, base axes.
     """
     R, arms = carried[..., :3, :3], carried[..., :3, 3]
     moment = np.einsum("...nij,nj->...ni", R, loads.drives[:, :3])
@@ -301,7 +308,7 @@ def drive_wrenches(posture: Posture, loads: DeadLoads, carried: NDArray) -> NDAr
 
 
 def _on_unknowns(place: Placement, loads: DeadLoads) -> tuple[NDArray, NDArray]:
-    """Return (N, 6) dead loads on the parts that each unknown moves, and matrices M."""
+    """Return the loads (N, 6) on the bodies that each unknown moves, and matrices M."""
     model = place.model
     body, joint, M_body, M_joint = _on_frames(place, loads)
     link = (model.motion == LINK)[:, None]
@@ -313,7 +320,7 @@ def _on_unknowns(place: Placement, loads: DeadLoads) -> tuple[NDArray, NDArray]:
 def _on_frames(
     place: Placement, loads: DeadLoads
 ) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-    """Return dead wrenches on the parts that bodies and joints carry; matrices M."""
+    """Return the resultants of the dead loads at a placement."""
     posture = place.model.posture
     return resultants(posture, loads, place.body_ends, place.carried)
 
@@ -321,20 +328,18 @@ def _on_frames(
 def resultants(
     posture: Posture, loads: DeadLoads, body_ends: NDArray, carried: NDArray
 ) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-    """Return the sums of the dead loads over all parts that each frame carries.
-
-    The wrenches act at the platform's nominal origin.
+    """Return the resultants of the dead loads on all bodies that each frame moves.
 
     Args:
-        posture: nominal posture; all arrays can have the same leading dimensions.
+        posture: nominal posture.
         loads: loads on the robot.
         body_ends: (..., n, 4, 4) ends of the bodies in the base frame.
-        carried: (..., n, 4, 4) frames after the coordinate of their joint.
+        carried: (..., n, 4, 4) frames after the motion of their joint.
 
     Returns:
-        (..., n, 6) [N m, N] wrenches on all parts that bodies carry; the same for all
-        parts that joints carry, both in base axes; and (..., n, 3, 3) [N m] their
-        matrices M.
+        (..., n, 6) [N m, N] resultants on the bodies that each body moves (including
+        itself) and on the bodies that each joint moves, at the platform's nominal
+        origin, base axes; and (..., n, 3, 3) [N m] their matrices M.
     """
     robot, origin = posture.robot, posture.platform[..., None, :3, 3]
     below = (robot.on_path & ~np.eye(len(robot.frames), dtype=bool)).T
@@ -352,7 +357,7 @@ def resultants(
 
 
 def _read(G: NDArray, T: NDArray, origin: NDArray) -> tuple[NDArray, NDArray, NDArray]:
-    """Return moments and forces (..., n, 3) at the origin; matrices M (..., n, 9)."""
+    """Return moments (..., n, 3), forces (..., n, 3) and matrices M (..., n, 9)."""
     points = T[..., :3, :].copy()
     points[..., 3] -= origin
     moments = np.cross(points, G, axis=-2).sum(axis=-1)

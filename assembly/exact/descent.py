@@ -1,26 +1,24 @@
-r"""One step towards the exact equilibrium: expand, solve, restore, accept or damp.
+r"""One step of the iteration to the exact equilibrium.
 
-Near a placement x, the closures are linearised.  The Lagrangian
+The step consists of these operations:
 
-    L = |y|^2 / 2 - W(x) - lambda . r(x)
-
-is expanded to second order with its exact Hessian.  The Hessian contains the curvature
-of the closures, multiplied by their wrenches.  This term can exceed the stiffness of
-compliant springs, in which case Gauss-Newton steps, which omit it, make no progress.
-Springs and free motions are eliminated, and :mod:`forcefit.assembly.exact.contact_qp`
-solves the problem in the clearances.  A restoration (retraction) moves the result back
-onto the closures.  The step is accepted if it reduces the energy plus a penalty on the
-residual.  Otherwise the next attempt is damped by a proximal term, as in the
-Levenberg-Marquardt method, which measures every screw in radians and reference lengths.
+- Near a placement x, the loop-closure equations r(x) = 0 are linearised.  The
+  Lagrangian L = |y|^2 / 2 - W(x) - lambda . r(x) is expanded to second order.  Its
+  Hessian is exact, including the second derivatives of r.
+- Springs and free motions are eliminated, and
+  :mod:`forcefit.assembly.exact.contact_qp` solves the problem in the clearances.
+- A correction of the springs and free motions closes the loops again.
+- The step is accepted if it reduces the potential plus a penalty on the residual.
+  Otherwise, it is repeated with more damping, as in the Levenberg-Marquardt method.
 
 ======  =============  =============  ===============================================
 symbol  code           shape          meaning
 ======  =============  =============  ===============================================
-A r     ``rows`` ..    (6 K, N)       closures' derivative and residual, scaled
-lambda  multipliers    (6 K,)         wrenches of the closures, scaled
+A r     ``rows`` ..    (6 K, N)       scaled loop-closure residual and its derivative
+lambda  multipliers    (6 K,)         scaled wrenches in the closures
 H g     ``hessian`` .. (N, N), (N,)   second derivative of L, gradient of the energy
-B       ``basis``      (N, nu + nv)   clearances with the motions required by closures,
-                                      and motions that change no closure
+B       ``basis``      (N, nu + nv)   motions that keep all loops closed; nu of them
+                                      change clearances, and nv do not
 ======  =============  =============  ===============================================
 
 Sources:
@@ -49,23 +47,21 @@ from forcefit.assembly.solvers.conic import SolverFailed
 from forcefit.assembly.solvers.method import Method
 from forcefit.results.display import numbers
 
-CLOSED = 1e-12  # [rad, reference lengths] largest residual of a solution
-LONGEST_STEP = 1.0  # [rad, reference lengths] largest change in a step
-# [rad, reference lengths] residual that defines a small wrench
-_SMALL_RESIDUAL = 1e-9
-_LEAST_DAMPING = 1e-9  # smallest damping, relative to the largest closure wrench
-# damping after the first rejected step, relative to the largest closure wrench
-_FIRST_DAMPING = 1e-8
-_ATTEMPTS = 40  # largest number of attempts; each multiplies the damping by eight
-_RESTORATIONS = 4  # number of corrections that move a step back onto the closures
+CLOSED = 1e-12  # [rad, reference lengths] largest loop-closure residual of a solution
+LONGEST_STEP = 1.0  # [rad, reference lengths] maximum length of a step
+_SMALL_RESIDUAL = 1e-9  # [rad, reference lengths] small loop-closure residual
+_LEAST_DAMPING = 1e-9  # minimum damping, relative to the largest wrench
+_FIRST_DAMPING = 1e-8  # damping after the first rejected step, relative to the wrench
+_ATTEMPTS = 40  # maximum number of attempts
+_RESTORATIONS = 4  # maximum number of corrections that close the loops after a step
 
 
 class NotConverged(SolverFailed):
-    """Raised if no finite-motion equilibrium is found near the linear solution.
+    """Raised if no exact equilibrium is found near the linear solution.
 
     Attributes:
         problem: name of the problem.
-        status: description of the remaining residual and imbalance.
+        status: description of the residuals.
     """
 
     def __init__(self, problem: str, status: str) -> None:
@@ -75,20 +71,21 @@ class NotConverged(SolverFailed):
 
 @dataclass(frozen=True, eq=False)
 class Expansion:
-    """Problem expanded at a placement.
+    """Second-order expansion of the problem at a placement.
 
     Attributes:
         placement: placement at which the problem is expanded.
         loads: loads on the robot.
         gradient: (N,) [J] gradient of energy minus work.
         hessian: (N, N) [J] second derivative of the Lagrangian.
-        multipliers: (6 K,) multipliers of the closures.
-        unbounded: (N,) bool, True for unknowns without cones.
-        inverse: (nw, 6 K) pseudoinverse of the closure columns of these unknowns.
+        multipliers: (6 K,) multipliers of the loop-closure equations.
+        unbounded: (N,) bool, True for springs and free motions.
+        inverse: (nw, 6 K) pseudoinverse of the columns of A for springs and free
+            motions.
         basis: (N, nu + nv) matrix B, see the module docstring.
-        rigid_rows: (p, nu) closure rows without springs and free motions.
-        rigid_right: (p,) right side of these rows.
-        rigid_basis: (6 K, p) combinations of the closure rows that form these rows.
+        rigid_rows: (p, nu) loop-closure equations that contain only clearances.
+        rigid_right: (p,) right-hand side of these equations.
+        rigid_basis: (6 K, p) coefficients that form these equations from the rows of A.
     """
 
     placement: Placement
@@ -105,14 +102,14 @@ class Expansion:
 
     @property
     def small_wrench(self) -> float:
-        """[N m] scaled wrench in the stiffest spring due to a residual of 1e-9."""
+        """Scaled wrench [N m] that a residual of 1e-9 causes in the stiffest spring."""
         model = self.placement.model
         softness = np.diag(model.metric)[model.springs]  # [rad^2/J]
         return _SMALL_RESIDUAL / float(softness.min(initial=1.0))
 
     @property
     def small_energy(self) -> float:
-        """[J] energy caused by a residual of 1e-9."""
+        """Energy [J] that a residual of 1e-9 causes in the stiffest spring."""
         return _SMALL_RESIDUAL * self.small_wrench / 2
 
 
@@ -122,12 +119,12 @@ class Step:
 
     Attributes:
         placement: placement after the step.
-        gain: [J] predicted decrease of the potential, including the cost of restoring
-            the closures.
-        decrement: [J] predicted decrease of the potential without that cost.
-        length: [rad, reference lengths] size of the change.
-        rigid: (6 K,) multipliers of the closure rows that only clearances can close.
-        damping: [J/rad^2] damping of the next step; 0 if this step was not damped.
+        gain: [J] predicted decrease of the potential.
+        decrement: [J] predicted decrease of the potential if the loops were already
+            closed.
+        length: [rad, reference lengths] length of the step.
+        rigid: (6 K,) multipliers of the equations that contain only clearances.
+        damping: [J/rad^2] damping of the next step.
     """
 
     placement: Placement
@@ -139,14 +136,13 @@ class Step:
 
 
 def expand(at: Placement, loads: DeadLoads, rigid: NDArray) -> Expansion:
-    """Expand the closures to first order and the Lagrangian to second order.
+    """Return the second-order expansion of the problem at a placement.
 
     Args:
         at: placement at which the problem is expanded.
         loads: loads on the robot.
-        rigid: (6 K,) estimate of the multipliers of closures that depend only on
-            clearances.  The remaining multipliers follow from the equilibrium of
-            springs and free motions by least squares.
+        rigid: (6 K,) estimated multipliers of the equations that contain only
+            clearances.  All other multipliers are computed by least squares.
 
     Returns:
         The expansion.
@@ -160,9 +156,7 @@ def expand(at: Placement, loads: DeadLoads, rigid: NDArray) -> Expansion:
     U, S, Vt = svd(A[:, unbounded] * unit, full_matrices=True)
     tolerance = rank_tolerance(model.posture.mismatch)
     rank = int(np.sum(S > tolerance * S.max(initial=0.0)))
-    # from the singular value decomposition: left vectors of the range, divided by their
-    # singular values; left vectors of the complement; right vectors in the units of the
-    # unknowns
+    # V contains the right singular vectors in the units of the unknowns
     range_, rigid_space, V = U[:, :rank] / S[:rank], U[:, rank:], unit[:, None] * Vt.T
     inverse = V[:, :rank] @ range_.T
     multipliers = inverse.T @ gradient[unbounded]
@@ -187,7 +181,7 @@ def expand(at: Placement, loads: DeadLoads, rigid: NDArray) -> Expansion:
 
 
 def _basis(unbounded: NDArray, closing: NDArray, null_space: NDArray) -> NDArray:
-    """Return the (N, nu + nv) basis B of an expansion, see the module's docstring."""
+    """Return the basis B of the module docstring, (N, nu + nv)."""
     nu = closing.shape[1]
     basis = np.zeros((len(unbounded), nu + null_space.shape[1]))
     basis[~unbounded, :nu] = np.eye(nu)
@@ -196,7 +190,10 @@ def _basis(unbounded: NDArray, closing: NDArray, null_space: NDArray) -> NDArray
 
 
 def _independent(rows: NDArray) -> tuple[NDArray, NDArray]:
-    """Return p independent rows with the span of (m, nu) rows, and the map (m, p)."""
+    """Return an orthogonal basis (p, nu) of the rows of a matrix, and its coefficients.
+
+    The coefficients (m, p) form the basis from the m rows.
+    """
     if not rows.size:
         return np.zeros((0, rows.shape[1])), np.zeros((rows.shape[0], 0))
     U, S, _ = svd(rows, full_matrices=False)
@@ -205,13 +202,13 @@ def _independent(rows: NDArray) -> tuple[NDArray, NDArray]:
 
 
 def energy_of(at: Placement) -> float:
-    """Return the [J] elastic energy."""
+    """Return the elastic energy [J]."""
     y = at.x[at.model.springs]
     return float(y @ y) / 2
 
 
 def potential(at: Placement, loads: DeadLoads) -> float:
-    """Return the [J] elastic energy minus the work of the loads."""
+    """Return the elastic energy minus the work of the loads [J]."""
     return energy_of(at) - work_of(at, loads)
 
 
@@ -222,9 +219,9 @@ def advance(
     """Return a step that reduces the potential plus the penalty.
 
     Args:
-        local: the expanded problem.
-        penalty: [N m] factor on the norm of the scaled residual, above the multipliers.
-        damping: [J/rad^2] damping of the last step.
+        local: expansion of the problem.
+        penalty: [N m] factor on the norm of the scaled residual.
+        damping: [J/rad^2] damping of the previous step.
         near: whether to try Newton's method for the clearances.
         method: method of :func:`forcefit.assembly.exact.contact_qp.clearance_step`.
 
@@ -232,7 +229,7 @@ def advance(
         The step.
 
     Raises:
-        NotConverged: no step, however short, reduces potential plus penalty.
+        NotConverged: no step reduces the potential plus the penalty.
     """
     start = local.placement
     penalised = penalty * float(np.linalg.norm(start.residual))
@@ -241,10 +238,10 @@ def advance(
     least = max(least, pull)
     before = potential(start, local.loads) + penalised
     noise = 1e-13 * (abs(before) + abs(energy_of(start)))
-    # round-off in angles and positions, multiplied by the forces that act on them
+    # round-off in rotations and positions, multiplied by the forces
     noise += 1e-14 * (penalty + pull)
     for attempt in range(_ATTEMPTS):
-        # a rejected Newton step is repeated by the conic solver before it is damped
+        # after a rejected Newton step, the conic solver is used once without damping
         newton = near and attempt != 1
         step = _solve(local, damping + _LEAST_DAMPING * least, newton, method)
         if step is not None and step.length <= LONGEST_STEP:
@@ -260,7 +257,7 @@ def advance(
             damping = max(8.0 * damping, _FIRST_DAMPING * least)
     raise NotConverged(
         problem_name(start, local.loads),
-        "no step decreases the energy; the closures are open by "
+        "no step decreases the energy, and the loop-closure residual is "
         f"{start.largest_gap:.2g} rad or m",
     )
 
@@ -272,7 +269,7 @@ def problem_name(at: Placement, loads: DeadLoads) -> str:
 
 
 def _solve(local: Expansion, damping: float, near: bool, method: Method) -> Step | None:
-    """Return the step to the minimum of the expansion; None if no minimum exists."""
+    """Return the step to the minimum of the expansion, or None if it has none."""
     at, model = local.placement, local.placement.model
     normal = np.zeros(len(at.x))
     normal[local.unbounded] = -local.inverse @ at.residual
@@ -297,8 +294,8 @@ def _solve(local: Expansion, damping: float, near: bool, method: Method) -> Step
     step = clearance_step(problem, near, method)
     if step is None:
         status = (
-            "the closures stay open: neither a spring nor a clearance within "
-            "its bounds can close them"
+            "the loops cannot be closed by deformations of springs and by motions "
+            "within the clearances"
         )
         raise NotConverged(problem_name(at, local.loads), status)
     u, rigid = step
@@ -315,7 +312,7 @@ def _solve(local: Expansion, damping: float, near: bool, method: Method) -> Step
 
 
 def _restored(local: Expansion, change: NDArray) -> Placement:
-    """Return the placement after a step, moved back onto the closures."""
+    """Return the placement after a step and a correction that closes the loops."""
     model = local.placement.model
     x = local.placement.x + change
     x[model.bounded] = into_cones(x[model.bounded], model.joints.group)

@@ -1,6 +1,6 @@
-"""Properties of an equilibrium: imbalance, stability, active clearances.
+"""Force residual, stability and contacts of an equilibrium.
 
-All properties are computed from the expansion at the equilibrium, see
+They are computed from the expansion at the equilibrium, see
 :func:`forcefit.assembly.exact.descent.expand`.
 """
 
@@ -17,31 +17,29 @@ from forcefit.assembly.exact.dead_load import load_magnitudes
 from forcefit.assembly.exact.descent import Expansion
 from forcefit.assembly.solvers.cones import cone_sizes
 
-# [-] round-off in an angle, relative to the residual that counts as small
-_ANGLE_ROUNDING = 1e-5
+_ANGLE_ROUNDING = 1e-5  # [-] round-off in an angle, relative to a residual of 1e-9
 
 
 def imbalance(local: Expansion) -> float:
-    """Return the relative imbalance of forces at a placement.
+    """Return the relative force residual at a placement.
 
     Args:
         local: expansion at the placement.
 
     Returns:
-        [-] largest unbalanced generalised force on any unknown.  Each force is divided
-        by the sum of the forces on that unknown, or by the forces due to a residual of
-        1e-9 in the closures or the unknown, whichever is larger.
+        [-] largest generalised force residual of all unknowns.  It is divided by the
+        sum of the absolute forces on the unknown, or by the force that a loop-closure
+        residual of 1e-9 causes if that force is larger.
     """
     at, A, model = local.placement, local.placement.rows, local.placement.model
     unbalanced = local.gradient - A.T @ local.multipliers
     wrench = float(np.linalg.norm(local.multipliers)) + local.small_wrench
     loads = load_magnitudes(at, local.loads)
     acting = np.linalg.norm(A, axis=0) * wrench + np.abs(local.gradient) + loads
-    # in an open chain, the forces on unloaded parts are only round-off
+    # in an open chain, the forces on unloaded bodies are round-off
     unit = np.sqrt(np.diag(model.metric))
     acting = np.maximum(acting, local.small_wrench * unit)
-    # a clearance inside its cone carries no force; at the boundary, its force is normal
-    # to the boundary
+    # a contact force is normal to the boundary of its cone
     u, group = at.x[model.bounded], model.joints.group
     force = cone_multipliers(u, unbalanced[model.bounded], group)
     unbalanced[model.bounded] += force[group] * u
@@ -52,16 +50,15 @@ def imbalance(local: Expansion) -> float:
 
 
 def least_curvature(local: Expansion) -> float:
-    """Return the smallest curvature of the potential, as a measure of stability.
+    """Return the smallest curvature of the potential, a measure of stability.
 
     Args:
         local: expansion at the equilibrium.
 
     Returns:
-        [J/rad^2] smallest second derivative of the potential along motions that
-        preserve closures and active constraints, per squared rad and reference length
-        of all screws.  It is positive at a strict minimum, and inf if no motion is
-        possible.
+        [J/rad^2] smallest second derivative of the potential along the admissible
+        motions, with translations in reference lengths.  It is positive at a strict
+        minimum, and inf if no motion is possible.
     """
     D, H = tangent_space(local)
     if not D.shape[1]:
@@ -75,14 +72,15 @@ def tangent_space(
 ) -> tuple[NDArray, NDArray]:
     """Return the admissible motions at an equilibrium and their curvature.
 
+    Admissible motions keep all loops closed and all contacts in contact.
+
     Args:
         local: expansion at the equilibrium.
-        hold_touching: whether to also fix clearances that touch their bound without a
-            force.
+        hold_touching: whether contacts without a force also remain in contact.
 
     Returns:
-        (N, k) basis of the motions that preserve closures and active clearances, and
-        (k, k) [J] second derivative of the potential in this basis.
+        (N, k) basis of the admissible motions, and (k, k) [J] second derivative of the
+        potential in this basis.
     """
     at, model = local.placement, local.placement.model
     u, group = at.x[model.bounded], model.joints.group
@@ -99,15 +97,15 @@ def tangent_space(
 
 
 def curvature_modes(D: NDArray, H: NDArray, units: NDArray) -> tuple[NDArray, NDArray]:
-    """Return the eigenmodes, which diagonalise the second derivative.
+    """Return the eigenvalues and eigenmodes of the second derivative.
 
     Args:
         D: (N, k) basis of motions.
         H: (k, k) [J] second derivative of the potential in this basis.
-        units: (N,) scale of the unknowns in which the modes are orthonormal.
+        units: (N,) scale of the unknowns.  The scaled modes are orthonormal.
 
     Returns:
-        (k,) [J] second derivatives, smallest first, and (N, k) motions.
+        (k,) [J] eigenvalues in ascending order, and (N, k) modes.
     """
     Q, R = np.linalg.qr(D / units[:, None])
     back = np.linalg.inv(R)
@@ -117,14 +115,14 @@ def curvature_modes(D: NDArray, H: NDArray, units: NDArray) -> tuple[NDArray, ND
 
 
 def active_clearances(local: Expansion) -> tuple[NDArray, NDArray]:
-    """Return the clearances that carry a force at an equilibrium.
+    """Return the clearances with a contact force at an equilibrium.
 
     Args:
         local: expansion at the equilibrium.
 
     Returns:
-        (cones,) bool, and (cones,) [J] products of the force on each bound and the
-        bound.
+        (cones,) bool, True for clearances with a contact force, and (cones,) [J]
+        product of contact force and clearance.
     """
     at, model = local.placement, local.placement.model
     u, group = at.x[model.bounded], model.joints.group

@@ -1,14 +1,14 @@
-r"""Minimum-energy assembly with finite motions; loop closure is imposed on SE(3).
+r"""Minimum-energy assembly with finite motions and loop closure on SE(3).
 
-Springs, clearance cones and geometric errors are those of the linear virtual-joint
-model (:mod:`forcefit.assembly.linear.energy`).  Only the closures differ, because
-finite motions are composed as in :mod:`forcefit.assembly.exact.finite_robot`.  The
-elastic energy minus the work of the loads is minimised,
+Springs, clearances and geometric errors are those of the linear virtual-joint model
+(:mod:`forcefit.assembly.linear.energy`), but motions are finite
+(:mod:`forcefit.assembly.exact.finite_robot`).  The elastic energy minus the work of the
+loads is minimised,
 
     minimise  |y|^2 / 2 - w . x_p(y, u, q) - W(y, u, q)
     subject to  r(y, u, q) = 0,   |u_k| <= 1 for each cone k.
 
-The iteration starts from the linear solution and takes the steps described in
+The iteration starts from the linear solution.  Its steps are described in
 :mod:`forcefit.assembly.exact.descent`.
 
 ======  ====================  ========  ==============================================
@@ -16,12 +16,12 @@ symbol  code                  shape     meaning
 ======  ====================  ========  ==============================================
 x_p     ``platform_screw``    (6,)      rotation vector of R R_nominal^T and shift of
                                         the platform's origin, base axes
-w       ``load``              (6,)      dead force; moment whose work is m . theta
-W       ``loads``             J         work of weights and of loads on bodies
-r       ``closure_residual``  (6 K,)    logarithms of the open closures
+w       ``load``              (6,)      dead force, and moment m with the work m . theta
+W       ``loads``             [J]       work of weights and of loads on bodies
+r       ``closure_residual``  (6 K,)    logarithm of the gap in each loop
 ======  ====================  ========  ==============================================
 
-The problem is not convex, so the solution is a local minimum; see ``docs/exact.md``.
+The solution is a local minimum, because the problem is not convex.
 """
 
 from collections.abc import Callable
@@ -79,25 +79,19 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-# largest number of steps; usually 3 to 5 suffice, but motions of metres need 80
-_STEPS = 160
-# predicted decrease of the potential, relative to its scale, below which Newton's
-# method is tried
-_NEAR = 1e-2
-# largest relative decrease of the potential predicted at the last step
-_DECREMENT = 1e-14
-# number of steps after which an equilibrium is accepted although clearances still move
+_STEPS = 160  # maximum number of steps
+_NEAR = 1e-2  # [-] largest predicted decrease at which Newton's method is tried
+_DECREMENT = 1e-14  # [-] convergence tolerance on the predicted relative decrease
+# number of steps after which the length of the step is no longer required to converge
 _RESTLESS = 100
-_STILL = 1e-9  # [rad, reference lengths] size of a last step without damping
-# [-] largest accepted relative imbalance of a solution; usually it is 1e-12
-_STATIONARY = 1e-7
-# [J] energies below this are round-off; without errors they are about 1e-48 J
-_ROUNDING = 1e-30
+_STILL = 1e-9  # [rad, reference lengths] convergence tolerance on the step
+_STATIONARY = 1e-7  # [-] largest accepted relative force residual
+_ROUNDING = 1e-30  # [J] round-off of the energy
 
 
 @dataclass(frozen=True, eq=False)
 class LinearisationError:
-    """Linearisation error: linear minus exact result.
+    """Difference between the linear and the exact result.
 
     Attributes:
         rotation: (3,) [rad] difference of the platform's rotation.
@@ -116,21 +110,18 @@ class LinearisationError:
 class ExactAssembly:
     """Equilibrium of a manipulator assembled with finite motions.
 
-    The solution is stationary, closed and within the cones, up to the reported
-    residuals.  The sign of ``least_curvature`` shows whether the equilibrium is a local
-    minimum.  A lower minimum may exist elsewhere.
+    The equilibrium is a local minimum if ``least_curvature`` is positive.  A lower
+    minimum may exist elsewhere.
 
     Attributes:
-        whole: the robot's nominal configuration, with uncut beams.
-        cut: the robot with its beams cut into pieces, and the map to its frames.
+        whole: the robot's nominal configuration, with each beam as one link.
+        cut: the robot with beams divided into elements, and the map between both.
         linear: solution of the linear model, from which the iteration starts.
-        expansion: expansion of the problem at the solution, with the multipliers of the
-            scaled closures.
-        stationarity: [-] largest relative imbalance over all unknowns.
+        expansion: expansion of the problem at the solution.
+        stationarity: [-] largest relative force residual of all unknowns.
         iterations: number of steps.
-        method: method used for all cone programs: ``"compiled"``, which falls back on
-            Clarabel if a solution cannot be certified; or ``"reference"``, which uses
-            only numpy and Clarabel.
+        method: method for all cone programs, ``"compiled"`` or ``"reference"`` (numpy
+            and Clarabel).
     """
 
     whole: Posture
@@ -145,7 +136,7 @@ class ExactAssembly:
     plot = show
 
     def _figures(self) -> Figures:
-        """Return the numbers that ``assembly solve --state exact`` prints."""
+        """Return the quantities that are shown in the short representation."""
         return {
             **forced_lines(self),
             "certificate": f"closure residual {self.closure_residual():.1e}, "
@@ -154,13 +145,13 @@ class ExactAssembly:
         }
 
     def to_xarray(self) -> "xarray.Dataset":
-        """Return the results by frame and closure; see ``assembly.model.tables``."""
+        """Return an xarray data set with the results of all frames and closures."""
         from forcefit.assembly.model.tables import assembly_dataset
 
         return assembly_dataset(self)
 
     def to_pandas(self) -> "pandas.DataFrame":
-        """Return a table with one row per frame, by variable and component."""
+        """Return a pandas table with a row for each frame."""
         from forcefit.assembly.model.tables import frame_table
 
         return frame_table(self.to_xarray(), "frame")
@@ -172,7 +163,7 @@ class ExactAssembly:
 
     @property
     def load(self) -> NDArray:
-        """(6,) [N m, N] wrench on the platform at its origin, base axes."""
+        """Wrench on the platform at its origin, base axes, (6,) [N m, N]."""
         return self.linear.load
 
     @property
@@ -182,12 +173,12 @@ class ExactAssembly:
 
     @property
     def multipliers(self) -> NDArray:
-        """(6 closures,) multipliers of the scaled closures."""
+        """Multipliers of the scaled loop-closure equations, (6 closures,)."""
         return self.expansion.multipliers
 
     @cached_property
     def least_curvature(self) -> float:
-        """[J/rad^2] smallest second derivative of the potential; positive if stable."""
+        """Smallest curvature of the potential [J/rad^2]; positive if stable."""
         return least_curvature(self.expansion)
 
     @property
@@ -197,32 +188,31 @@ class ExactAssembly:
 
     @cached_property
     def energy(self) -> float:
-        """[J] elastic energy; 0 if the closure residual alone could cause it."""
+        """Elastic energy [J], or 0 if it does not exceed the round-off."""
         energy, residual = energy_of(self.placement), self.closure_residual()
         differs = differs_from_zero(energy, 0.0, self.multipliers, residual)
         return energy if differs else 0.0
 
     @property
     def potential(self) -> float:
-        """[J] energy minus the work of the loads."""
+        """Elastic energy minus the work of the loads [J]."""
         return potential(self.placement, self.loads)
 
     @property
     def platform_screw(self) -> NDArray:
-        """(6,) rotation vector of R R_nominal^T and shift of the origin, base axes."""
+        """Rotation vector of R R_nominal^T and shift of the origin, base axes, (6,)."""
         return self.placement.platform_screw
 
     @property
     def transforms(self) -> NDArray:
-        """(n, 4, 4) frames in the base frame, before the coordinate of their joint."""
+        """Frames in the base frame, before the motion of their joint, (n, 4, 4)."""
         return self.placement.transforms[self.cut.last]
 
     @cached_property
     def link_screws(self) -> NDArray:
-        """(n, 6) [rad, m] deformations of the bodies, as logarithms.
+        """Deformation of each body, (n, 6) [rad, m].
 
-        For a beam cut into pieces, the deformation is the screw of its end relative to
-        its base.
+        The deformation of a beam is the screw of its tip relative to its base.
         """
         screws = self.placement.screws[LINK, self.cut.last]
         pieces = np.bincount(self.cut.owner)
@@ -240,50 +230,49 @@ class ExactAssembly:
 
     @property
     def joint_screws(self) -> NDArray:
-        """(n, 6) [rad, m] deformations of the joints, as logarithms."""
+        """Elastic deformation of each joint, (n, 6) [rad, m]."""
         return self.placement.screws[SPRING, self.cut.last]
 
     @cached_property
     def clearance_screws(self) -> NDArray:
-        """(n, 6) [rad, m] clearances and motions of passive joints."""
+        """Motion within the clearance and motion of passive joints, (n, 6) [rad, m]."""
         screws = self.placement.screws[CLEARANCE, self.cut.last]
         own = self.placement.own[self.cut.last, None]
         return screws + own * own_screws(self.posture.robot)
 
     @cached_property
     def closure_wrenches(self) -> NDArray:
-        """(closures, 6) [N m, N] wrench of each closure's second chain on its first.
+        """Wrench of the second chain of each closure on the first chain.
 
-        The wrenches act at the platform's nominal origin, in base axes.
+        Shape (closures, 6) [N m, N], at the platform's nominal origin, base axes.
         """
         return self.multipliers.reshape(-1, 6) * self.placement.model.scale
 
     @property
     def wrenches(self) -> NDArray:
-        """(n, 6) [N m, N] wrench of each link's spring: K_E times its deformation.
+        """Wrench of each link, K_E times its deformation, (n, 6) [N m, N].
 
-        The wrench acts at the displaced frame's origin, in the frame's axes.
+        The reference point is the origin of the displaced frame; axes of the frame.
         """
         return self._through[0]
 
     @property
     def tip_wrenches(self) -> NDArray:
-        """(n, 6) [N m, N] wrench that the next part exerts on each body's tip."""
+        """Wrench of the next body on the tip of each body, (n, 6) [N m, N]."""
         own = distributed_at_tips(self.placement, self.loads)
         return self.wrenches - own[self.cut.last]
 
     @property
     def joint_wrenches(self) -> NDArray:
-        """(n, 6) [N m, N] wrench through each joint.
+        """Wrench in each joint, (n, 6) [N m, N].
 
-        The difference from :attr:`tip_wrenches` equals the loads that act on the body
-        at the frame.
+        It differs from :attr:`tip_wrenches` by the loads on the body of the frame.
         """
         return self._through[1]
 
     @cached_property
     def _through(self) -> NDArray:
-        """(2, n, 6) [N m, N] wrenches through bodies and joints."""
+        """Wrenches in bodies and joints, (2, n, 6) [N m, N]."""
         robot, T = self.cut.robot, self.placement.transforms
         closing = closure_signs(robot).T @ self.closure_wrenches
         of_loads = wrenches_on_frames(self.placement, self.loads)
@@ -293,19 +282,19 @@ class ExactAssembly:
 
     @cached_property
     def linearisation_error(self) -> LinearisationError:
-        """Linear minus exact platform screw and energy."""
+        """Difference between the linear and the exact result."""
         screw = self.linear.platform_screw - self.platform_screw
         energy = self.linear.energy - self.energy
-        # inside an assembly zone both energies vanish up to round-off
+        # inside an assembly zone, both energies are round-off
         scale = max(self.energy, 1e-6 * self.linear.energy_without_clearance, _ROUNDING)
         return LinearisationError(screw[:3], screw[3:], energy, energy / scale)
 
     def closure_residual(self) -> float:
-        """Return the largest closure residual in rad, or m / reference length."""
+        """Return the largest loop-closure residual [rad, reference lengths]."""
         return float(np.abs(self.placement.residual).max(initial=0.0))
 
     def clearance_excess(self) -> float:
-        """Return the largest relative excess [-] of a clearance over its cone."""
+        """Return the largest relative amount [-] by which a clearance is exceeded."""
         robot = self.posture.robot
         bounded = clearance_components(robot, self.clearance_screws)
         return float(clearance_excess(bounded, clearance_bounds(robot)))
@@ -322,7 +311,7 @@ def solve_exact(
     progress: Callable[[int, int], None] = lambda done, most: None,
     method: Method = "compiled",
 ) -> ExactAssembly:
-    """Close a manipulator with minimum energy and finite motions.
+    """Compute the equilibrium of a manipulator with finite motions.
 
     The iteration starts from the solution of the linear model.
 
@@ -330,34 +319,32 @@ def solve_exact(
         posture: configuration of the robot, with its errors, clearances, links and
             joint springs.
         load: (6,) [N m, N] wrench on the platform at ``point``, base axes; or a mapping
-            of components such as ``{"fz": -50}``.  The force is a dead load; the work
-            of the moment is its product with the rotation vector.
-        start: linear solution for the same posture and loads; computed by default.
-        bodies: (n, 6) [N m, N] dead loads on the bodies of all frames, each at its
-            frame's origin, base axes; moments are couples of dead forces.
-        gravity: (3,) [m/s^2] gravity vector in base axes; for links see
-            :mod:`forcefit.assembly.exact.dead_load`.
-        point: (3,) [m] point of the platform, in platform axes; the force moves with
-            it.
+            of components such as ``{"fz": -50}``.  The force is a dead load.  The work
+            of the moment is its scalar product with the rotation vector.
+        start: linear solution for the same posture and loads.  By default, it is
+            computed.
+        bodies: (n, 6) [N m, N] dead loads on the body of each frame, at the origin of
+            the frame, base axes.
+        gravity: (3,) [m/s^2] gravity vector in base axes.
+        point: (3,) [m] point of application of ``load``, in platform axes.
         near: equilibrium of the same posture under another load, used as the initial
             guess.
-        progress: function called with the number of completed steps and the largest
+        progress: function called with the number of completed steps and the maximum
             number of steps.
-        method: method for the linear solution and for every step: ``"compiled"``, which
-            falls back on Clarabel if a solution cannot be certified; or
-            ``"reference"``, which uses only numpy and Clarabel.
+        method: method for the linear solution and for each step, ``"compiled"`` or
+            ``"reference"`` (numpy and Clarabel).
 
     Returns:
-        The assembled manipulator.
+        The equilibrium.
 
     Raises:
-        CannotAssemble: the linear model, which provides the initial guess, has no
-            solution.
-        FreeMotion: a load acts along a motion without stiffness.
-        NotConverged: no equilibrium was found near the linear solution; a subclass of
-            :class:`SolverFailed`.
-        ValueError: ``start`` belongs to another posture or other loads; or the method
-            is unknown, or is ``"reference"`` while ``start`` or ``near`` is compiled.
+        CannotAssemble: the linear model has no solution.
+        FreeMotion: a load acts on a motion without stiffness.
+        NotConverged: no equilibrium was found near the linear solution.  The class is
+            derived from :class:`SolverFailed`.
+        ValueError: ``start`` belongs to another posture or other loads, the method is
+            unknown, or the method is ``"reference"`` and ``start`` or ``near`` was
+            computed by the compiled method.
     """
     check_method(method)
     if method == "reference":
@@ -371,8 +358,8 @@ def solve_exact(
     ):
         raise ValueError(
             "solve_exact: start: found the linear solution of another posture "
-            "or load, expected that of this posture and load; omit start "
-            "to have it computed"
+            "or load, expected the solution for this posture and load; omit start, "
+            "and it is computed"
         )
     placed = posture
     if cut.robot is not posture.robot:
@@ -390,19 +377,18 @@ def solve_exact(
 
     assembly = search(start.joints)
     if assembly.clearance_excess() > 1e-9 and has_bounded_motion(posture.robot):
-        # an omitted motion limit of a passive joint is active: solve again with all
-        # limits
+        # solve again with the motion limits of passive joints, because one is exceeded
         assembly = search(virtual_joints(cut.robot, bounded_motion=True))
     return assembly
 
 
 def _refuse_compiled(*starts: Assembly | ExactAssembly | None) -> None:
-    """Raise ValueError if the reference method would start from a compiled solution."""
+    """Raise ValueError if a start of the reference method is a compiled solution."""
     if any(start is not None and start.method != "reference" for start in starts):
         raise ValueError(
             "solve_exact: start or near: found a solution of the compiled "
-            "kernels, expected one of method 'reference'; omit it to have "
-            "it computed"
+            "method, expected a solution of method 'reference'; omit it, and it is "
+            "computed"
         )
 
 
@@ -415,7 +401,7 @@ def _search(
     joints: VirtualJoints, linear: Assembly, loads: DeadLoads, first: NDArray | None,
     progress: Callable[[int, int], None], method: Method,
 ) -> tuple[Expansion, float, int]:  # fmt: skip
-    """Iterate to an equilibrium; return its expansion, imbalance and step count."""
+    """Return the expansion at an equilibrium, its force residual and step count."""
     model = FiniteRobot(linear.posture, joints)
     current = place(model, _first_guess(model, linear) if first is None else first)
     rigid = np.zeros(len(current.residual))
@@ -437,13 +423,14 @@ def _search(
     unbalanced = imbalance(expand(current, loads, rigid))
     raise NotConverged(
         problem_name(current, loads),
-        f"after {_STEPS} steps closures are open by {current.largest_gap:.2g} and "
-        f"forces out of balance by {unbalanced:.2g}, relative",
+        f"after {_STEPS} steps, the relative loop-closure residual is "
+        f"{current.largest_gap:.2g} and the relative force residual is "
+        f"{unbalanced:.2g}",
     )
 
 
 def _first_guess(model: FiniteRobot, linear: Assembly) -> NDArray:
-    """Return the (N,) linear solution, with clearances projected onto the cones."""
+    """Return the linear solution with clearances projected onto their cones, (N,)."""
     motions = np.hstack([model.joints.cones, model.joints.free])
     screws = clearance_components(linear.posture.robot, linear.clearance_screws)
     moved = motions.T @ screws.ravel() / np.sum(motions**2, axis=0)
@@ -455,7 +442,7 @@ def _first_guess(model: FiniteRobot, linear: Assembly) -> NDArray:
 
 
 def _energy_scale(at: Placement, linear: Assembly, loads: DeadLoads) -> float:
-    """Return a typical energy [J] of the problem, as a scale for tolerances."""
+    """Return a typical energy of the problem [J], for tolerances."""
     return max(
         energy_of(at), abs(work_of(at, loads)), 1e-3 * linear.energy_without_clearance
     )

@@ -1,18 +1,18 @@
-r"""Robot displaced by finite screws, with derivatives of its closures up to order two.
+r"""Robot displaced by finite screws, with first and second derivatives.
 
 ======  =================  ==========  =============================================
 symbol  code               shape       meaning
 ======  =================  ==========  =============================================
 x       ``x``              (N,)        unknowns: springs y, clearances u, motions q
-r       ``residual``       (6 K,)      scaled logarithms of the open closures
+r       ``residual``       (6 K,)      scaled logarithm of the gap in each loop
 A       ``rows``           (6 K, N)    derivative of r
 P       ``platform_rows``  (6, N)      derivative of the platform screw
-V       ``moves``          (6, N)      small motion that each unknown makes
+V       ``moves``          (6, N)      small motion due to each unknown
 ======  =================  ==========  =============================================
 
-To second order, the logarithm of a product of motions exp(V_1 h_1) exp(V_2 h_2) ... is
-the sum of V_i h_i plus half of the brackets [V_i h_i, V_j h_j] of all ordered pairs.
-The second derivative consists of these brackets and the curvature of each exponential.
+To second order, the logarithm of a product exp(V_1 h_1) exp(V_2 h_2) ... is the sum of
+all V_i h_i plus half the sum of the Lie brackets [V_i h_i, V_j h_j] with i < j.  The
+second derivative consists of these brackets and the curvature of each exponential.
 
 Sources:
     Selig (2005), Geometric Fundamentals of Robotics, chapter 4 (brackets of screws,
@@ -40,10 +40,10 @@ from forcefit.stiffness.screws import rotation_vector, screw_map, skew
 
 @dataclass(frozen=True, eq=False)
 class Placement:
-    """Robot displaced by finite screws; its closures can be open.
+    """Robot displaced by finite screws.  Its loops can be open.
 
     Attributes:
-        model: the prepared robot.
+        model: the robot with its unknowns.
         x: (N,) values of the unknowns.
     """
 
@@ -52,7 +52,7 @@ class Placement:
 
     @cached_property
     def screws(self) -> NDArray:
-        """(3, n, 6) screws of link, clearance and joint spring at each frame."""
+        """Screws of link, clearance and joint spring at each frame, (3, n, 6)."""
         m = self.model
         s = np.zeros((4, len(m.posture.robot.frames), 6))
         np.add.at(s, (m.motion, m.frame), self.x[:, None] * m.columns)
@@ -60,7 +60,7 @@ class Placement:
 
     @cached_property
     def own(self) -> NDArray:
-        """(n,) [rad or m] additional motion of passive joints."""
+        """Displacement of passive joints from the nominal posture, (n,) [rad or m]."""
         m = self.model
         rows = m.motion == OWN
         axes = np.array([frame.own_axis for frame in m.posture.robot.frames])
@@ -71,7 +71,7 @@ class Placement:
 
     @cached_property
     def _poses(self) -> NDArray:
-        """(5, n, 4, 4) poses before each motion of a frame, and after the last one."""
+        """Poses before each motion at a frame and after the last one, (5, n, 4, 4)."""
         robot = self.model.posture.robot
         link, clearance, spring = exponential(self.screws)
         local = [
@@ -90,36 +90,36 @@ class Placement:
 
     @property
     def body_ends(self) -> NDArray:
-        """(n, 4, 4) ends of the bodies, before clearance and springs of the joint."""
+        """Ends of the bodies, before the motions in the joint, (n, 4, 4)."""
         return self._poses[1]
 
     @cached_property
     def carried(self) -> NDArray:
-        """(n, 4, 4) frames after the coordinate of their joint."""
+        """Frames after the motion of their joint, (n, 4, 4)."""
         posture = self.model.posture
         return self.transforms @ along_own(posture.robot, posture.coordinates)
 
     @property
     def transforms(self) -> NDArray:
-        """(n, 4, 4) frames in the base frame, before the coordinate of their joint."""
+        """Frames in the base frame, before the motion of their joint, (n, 4, 4)."""
         return self._poses[4]
 
     @property
     def platform(self) -> NDArray:
-        """(4, 4) pose of the platform."""
+        """Pose of the platform, (4, 4)."""
         robot = self.model.posture.robot
         return self.transforms[robot.index(robot.platform)]
 
     @cached_property
     def platform_screw(self) -> NDArray:
-        """(6,) rotation vector of R R_nominal^T and shift of the origin, base axes."""
+        """Rotation vector of R R_nominal^T and shift of the origin, base axes, (6,)."""
         nominal = self.model.posture.platform
         turn = rotation_vector(self.platform[:3, :3] @ nominal[:3, :3].T)
         return np.concatenate([turn, self.platform[:3, 3] - nominal[:3, 3]])
 
     @cached_property
     def _open(self) -> NDArray:
-        """(K, 4, 4) motion by which each closure is open, at the platform's origin."""
+        """Transform of the gap in each loop, at the platform's origin, (K, 4, 4)."""
         first, second = self.transforms[self.model.closed_frames.T]
         G = first @ self.model.nominal_closures @ inverse(second)
         origin = self.model.posture.platform[:3, 3]
@@ -128,22 +128,25 @@ class Placement:
 
     @cached_property
     def _open_screws(self) -> NDArray:
-        """(K, 6) [rad, m] screws by which the closures are open (logarithms)."""
+        """Logarithm of the gap in each loop, (K, 6) [rad, m]."""
         return logarithm(self._open)
 
     @cached_property
     def residual(self) -> NDArray:
-        """(6 K,) residual of the closures: [rad], translations per reference length."""
+        """Loop-closure residual, (6 K,) [rad, reference lengths]."""
         return (self._open_screws * self.model.scale).ravel()
 
     @cached_property
     def largest_gap(self) -> float:
-        """[rad, reference lengths] largest component of the residual."""
+        """Largest component of the residual [rad, reference lengths]."""
         return float(np.abs(self.residual).max(initial=0.0))
 
     @cached_property
     def _readings(self) -> NDArray:
-        """(N, 6, 6) maps from each unknown's screw to the platform's origin."""
+        """Matrices that transform screws to the platform's origin, (N, 6, 6).
+
+        There is a matrix for each unknown, from the axes of its frame to base axes.
+        """
         m = self.model
         before = self._poses[m.motion, m.frame]
         offset = before[:, :3, 3] - m.posture.platform[:3, 3]
@@ -151,7 +154,10 @@ class Placement:
 
     @cached_property
     def moves(self) -> NDArray:
-        """(6, N) small motion due to each unknown, at the platform's nominal origin."""
+        """Small motion due to each unknown, (6, N).
+
+        The reference point is the nominal origin of the platform; base axes.
+        """
         m = self.model
         sprung = np.concatenate([left_jacobian(self.screws), self._identity])
         local = sprung[m.motion, m.frame] @ m.columns[:, :, None]
@@ -159,12 +165,12 @@ class Placement:
 
     @property
     def _identity(self) -> NDArray:
-        """(1, n, 6, 6) identities: joint motions are linear in their coordinate."""
+        """Identity matrices for the motions of the joints, (1, n, 6, 6)."""
         return np.broadcast_to(np.eye(6), (1, len(self.own), 6, 6))
 
     @cached_property
     def rows(self) -> NDArray:
-        """(6 K, N) derivative of the residual."""
+        """Derivative of the residual, (6 K, N)."""
         first, second = self.model.chains
         G = self._open
         back = screw_map(G[:, :3, 3], G[:, :3, :3])
@@ -176,13 +182,13 @@ class Placement:
 
     @cached_property
     def _at_origin(self) -> NDArray:
-        """(6, N) motions of the platform, at its current origin."""
+        """Small motion of the platform at its displaced origin, (6, N)."""
         away = self.model.posture.platform[:3, 3] - self.platform[:3, 3]
         return screw_map(away) @ (self.moves * self.model.on_platform)
 
     @cached_property
     def platform_rows(self) -> NDArray:
-        """(6, N) derivative of the platform screw."""
+        """Derivative of the platform screw, (6, N)."""
         W = self._at_origin
         turn = np.linalg.solve(turn_jacobian(self.platform_screw[:3]), W[:3])
         return np.concatenate([turn, W[3:]])
@@ -190,8 +196,8 @@ class Placement:
     def curvature(self, multipliers: NDArray, load: NDArray) -> NDArray:
         """Return the Hessian of multipliers . residual + load . platform screw.
 
-        The result is exact if the closures hold; otherwise its error is of the order of
-        the residual.
+        The result is exact if all loops are closed.  Otherwise, its error is
+        proportional to the residual.
 
         Args:
             multipliers: (6 K,) multipliers of the scaled residual.
@@ -214,10 +220,10 @@ class Placement:
         return H + self.exponential_curvature(through)
 
     def exponential_curvature(self, through: NDArray) -> NDArray:
-        """Return the curvature due to the individual exponentials.
+        """Return the second derivative of each exponential, multiplied by a wrench.
 
         Args:
-            through: (N, 6) wrench on all parts that each unknown moves, at the
+            through: (N, 6) wrench on all bodies that each unknown moves, at the
                 platform's nominal origin, base axes.
 
         Returns:
@@ -233,24 +239,22 @@ class Placement:
         return (rows @ m.columns.T) * m.same_motion
 
     def load_wrench(self, load: NDArray) -> NDArray:
-        """Return the (6,) equivalent wrench of a load at the nominal origin."""
+        """Return the equivalent wrench of a load at the nominal origin, (6,)."""
         moment = np.linalg.solve(turn_jacobian(self.platform_screw[:3]).T, load[:3])
         arm = self.platform_screw[3:]
         return np.concatenate([moment + np.cross(arm, load[3:]), load[3:]])
 
     def _load_curvature(self, load: NDArray) -> NDArray:
-        """Return the load's curvature without the bracket terms of its wrench."""
+        """Return the curvature of the load's work without its bracket terms."""
         W, turn = self._at_origin, self.platform_screw[:3]
         order = self.model._order
         V = self.moves * self.model.on_platform
         later = np.sign(order - order[:, None])
         H = (V.T @ bracket_form(self.load_wrench(load)) @ V) * later / 2
-        # to second order, a rotation w also moves the origin, translated by v, by w x v
-        # / 2
+        # to second order, a screw (w, v) moves the origin by v + w x v / 2
         of_force = -W[:3].T @ skew(load[3:]) @ W[3:]
         H += (of_force + of_force.T) / 2
-        # exp(turn + h) = exp(J h + D(h, h) / 2) exp(turn), for a given rotation
-        # exp(turn) and a small rotation h after it
+        # exp(turn + h) = exp(J h + D(h, h) / 2) exp(turn) for a small h
         along, zero = np.linalg.solve(turn_jacobian(turn), W[:3]), np.zeros(3)
         moment = np.linalg.solve(turn_jacobian(turn).T, load[:3])
         form = second_form(np.append(turn, zero), np.append(moment, zero))
@@ -258,13 +262,13 @@ class Placement:
 
 
 def place(model: FiniteRobot, x: NDArray) -> Placement:
-    """Place a robot that is moved by finite screws.
+    """Return a robot displaced by finite screws.
 
     Args:
-        model: robot with its unknowns.
+        model: the robot with its unknowns.
         x: (N,) values of the unknowns.
 
     Returns:
-        The placement, which evaluates the positions of all frames on demand.
+        The displaced robot.
     """
     return Placement(model, np.array(x, dtype=float))

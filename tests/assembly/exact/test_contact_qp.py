@@ -1,4 +1,4 @@
-"""Minimum of a quadratic energy within cones: optimality conditions."""
+"""Tests of the minimum of a quadratic energy with cone constraints."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from scipy.optimize import minimize
 
 from forcefit.assembly.exact.contact_qp import ClearanceProblem, clearance_step
 
-GROUP = np.array([0, 0, 1, 2, 2, 2])  # cones of two, one and three clearances
+GROUP = np.array([0, 0, 1, 2, 2, 2])  # three cones of dimension 2, 1 and 3
 seeds = st.integers(0, 10**6)
 
 
@@ -17,7 +17,7 @@ def sizes(u):
 
 
 def problem(rng, rows):
-    """A convex problem in which only some cones are active at the minimum."""
+    """Return a random convex problem."""
     A = rng.normal(size=(6, 6))
     inside = rng.normal(size=6)
     inside *= rng.uniform(0.2, 0.7, 3)[GROUP] / sizes(inside)[GROUP]
@@ -34,7 +34,7 @@ def energy(p, u):
 
 
 def least_by_slsqp(p):
-    """The step from a start point within all cones."""
+    """Return the minimum energy that SciPy's SLSQP method finds."""
     within = {"type": "ineq", "fun": lambda u: 1 - sizes(u) ** 2}
     closed = {"type": "eq", "fun": lambda u: p.rows @ u - p.right}
     scale = np.abs(p.S).max()
@@ -46,7 +46,7 @@ def least_by_slsqp(p):
 
 
 def unbalanced(p, step):
-    """Relative violation of balance, bounds and closures at the end of a step."""
+    """Return the largest violation of the optimality conditions after a step."""
     v, rigid = step
     u = p.start + v
     gradient = p.s + p.S @ v - p.rows.T @ rigid
@@ -62,7 +62,7 @@ def unbalanced(p, step):
 
 @given(seeds, st.integers(0, 2))
 @settings(max_examples=15, deadline=None)
-def test_energy_after_a_convex_clearance_step_equals_that_of_scipy_slsqp(seed, rows):
+def test_energy_after_clearance_step_agrees_with_slsqp(seed, rows):
     p = problem(np.random.default_rng(seed), rows)
     step = clearance_step(p, near=False)
     assert unbalanced(p, step) < 1e-5
@@ -71,8 +71,8 @@ def test_energy_after_a_convex_clearance_step_equals_that_of_scipy_slsqp(seed, r
 
 
 @pytest.mark.parametrize("units", [1e-9, 1.0, 1e6])
-def test_negative_curvature_leads_to_the_bound_in_the_direction_of_the_force(units):
-    """Energy -v^2 about the middle of an interval, with a small force to one side."""
+def test_clearance_step_with_negative_curvature_ends_at_bound(units):
+    """The energy is concave, with a small force to one side of an interval."""
     group = np.array([0])
     p = ClearanceProblem(
         -units * np.eye(1), np.array([-1e-3 * units]), np.zeros(1), group,

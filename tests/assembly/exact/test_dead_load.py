@@ -1,4 +1,4 @@
-"""Weights and body loads under finite motions: closed forms, balance, limits."""
+"""Tests of weights and loads on bodies under finite motions."""
 
 from dataclasses import replace
 
@@ -25,7 +25,7 @@ G = 9.81
 
 
 def heavy(robot, rng):
-    """The same robot with random masses, whose links are beams with a density."""
+    """Return a robot with random masses and with beams that have a density."""
     frames = []
     for frame in robot.frames:
         link = frame.link
@@ -39,14 +39,17 @@ def heavy(robot, rng):
 
 
 def on_a_hinge(stiffness, *frames):
-    """Rigid bodies on an elastic hinge about z."""
+    """Return a chain of rigid bodies on an elastic hinge about z."""
     hinge = Frame("hinge", joint="revolute", joint_stiffness=only(2, stiffness))
     return home_posture(Robot("arm", frames[-1].name, (hinge, *frames)))
 
 
 @pytest.mark.parametrize("stiffness", [3.0, 30.0])
-def test_arm_with_a_mass_rests_where_its_moments_balance(stiffness):
-    """k a + m g (x cos a - y sin a) = 0 for a mass at (x, y) from the hinge."""
+def test_equilibrium_of_arm_with_mass_equals_closed_form(stiffness):
+    """In equilibrium, k a + m g (x cos a - y sin a) = 0.
+
+    The mass m is at the point (x, y) relative to the hinge.
+    """
     arm = Frame("arm", "hinge", [0.4, 0, 0], mass=2.0, centre_of_mass=[0.1, 0.2, 0])
     x, y, weight = 0.5, 0.2, 2.0 * G
 
@@ -63,8 +66,8 @@ def test_arm_with_a_mass_rests_where_its_moments_balance(stiffness):
     assert answer.joint_wrenches[0, 2] == pytest.approx(stiffness * angle, rel=1e-9)
 
 
-def test_weight_of_a_displaced_beam_acts_at_the_displaced_middle():
-    """The middle of the beam is half its length behind the displaced end."""
+def test_weight_of_displaced_beam_acts_at_its_centre():
+    """The beam has a geometric error, which displaces its centre of mass."""
     beam = BeamLink({"radius": 0.02}, 1e16, 0.3, density=8000.0)
     turn, off = 0.3, np.array([0.01, 0.05])
     tip = Frame("tip", "hinge", [0.6, 0, 0], link=beam,
@@ -79,8 +82,8 @@ def test_weight_of_a_displaced_beam_acts_at_the_displaced_middle():
     assert found * np.sqrt(5.0) == pytest.approx([-weight * x], rel=1e-9)
 
 
-def test_couple_on_a_body_balances_as_two_dead_forces():
-    """k a = m cos a, since the work of a couple m is m sin a."""
+def test_couple_on_body_acts_as_two_dead_forces():
+    """In equilibrium, k a = m cos a, because the work of the couple m is m sin a."""
     posture = on_a_hinge(10.0, Frame("arm", "hinge", [0.5, 0, 0]))
     angle = brentq(lambda a: 10.0 * a - 9.0 * np.cos(a), 0.0, 1.5)
     bodies = np.zeros((2, 6))
@@ -89,7 +92,7 @@ def test_couple_on_a_body_balances_as_two_dead_forces():
     assert answer.joint_screws[0, 2] == pytest.approx(angle, abs=1e-9)
 
 
-def test_force_on_the_platform_body_equals_a_platform_load():
+def test_force_on_platform_body_has_effect_of_platform_load():
     posture = on_a_hinge(10.0, Frame("arm", "hinge", [0.5, 0, 0]))
     force = [0, 0, 0, 3.0, -20.0, 0]
     one = solve_exact(posture, force)
@@ -100,8 +103,8 @@ def test_force_on_the_platform_body_equals_a_platform_load():
     assert one.potential == pytest.approx(other.potential, rel=1e-12)
 
 
-def test_base_reactions_balance_the_whole_weight():
-    """Forces and moments of a closed loop on its base balance in the deformed state."""
+def test_base_reactions_equal_total_weight():
+    """Forces and moments on the base are computed in the deformed state."""
     rng = np.random.default_rng(3)
     robot = with_bodies(random_robot(rng, legs=3), rng)
     g = np.array([1.0, -2.0, -G])
@@ -111,7 +114,7 @@ def test_base_reactions_balance_the_whole_weight():
         p = (answer.placement.body_ends[i] @ [*frame.centre_of_mass, 1.0])[:3]
         total += frame.mass * np.concatenate([np.cross(p, g), g])
         if robot.parents[i] < 0:
-            # the joint's wrench, and what pulls the body itself
+            # the wrench of the link, transformed to the base frame
             T = answer.transforms[i]
             in_base = np.kron(np.eye(2), T[:3, :3]) @ answer.wrenches[i]
             balance += screw_map(-T[:3, 3]).T @ in_base
@@ -120,7 +123,7 @@ def test_base_reactions_balance_the_whole_weight():
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3, 5])
-def test_rotating_robot_and_gravity_together_rotates_the_solution(seed):
+def test_rotation_of_robot_and_gravity_rotates_the_solution(seed):
     rng = np.random.default_rng(seed)
     robot = heavy(random_robot(rng, legs=2), rng)
     R = rotation_matrix(rng.normal(size=3))
@@ -143,10 +146,10 @@ def test_rotating_robot_and_gravity_together_rotates_the_solution(seed):
 
 @pytest.mark.exudyn
 @pytest.mark.parametrize("gravity", [[0, 0, -9.81], [300.0, -200.0, -500.0]])
-def test_exact_solution_with_weight_equals_the_multibody_simulation(gravity):
-    """Bodies of a kilogram or two off their frames' origins, links as springs, at 60 g
-    too.  Poses agree as without weight, see ``test_exact``. Under a load the energy
-    alone is not minimal: it differs by the work of the weight on the pose difference.
+def test_exact_solution_with_gravity_agrees_with_simulation(gravity):
+    """The robot has bodies of up to 2 kg and links that are springs.
+
+    The poses agree to 1e-8 m, and the energies to the work of the weight on 1e-8 m.
     """
     robot = without_clearance(irsbot2_with(NUMBERS["cases"][1]))
     robot = with_bodies(robot, np.random.default_rng(4), heaviest=2, off=0.05)

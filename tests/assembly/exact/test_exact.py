@@ -1,4 +1,4 @@
-"""Exact equilibria, compared with closed forms at large rotations and simulation."""
+"""Tests of the exact equilibrium against closed forms and simulations."""
 
 from dataclasses import replace
 
@@ -23,19 +23,24 @@ from forcefit.validation.multibody.simulation import (
 from tests.robots_for_tests import NUMBERS, coaxial_beams, irsbot2_with, small_clearance
 
 CASES = {case["name"]: case for case in NUMBERS["cases"]}
-A, B, D = 0.3, 0.25, 0.4  # [m] sides of the triangle of two hinged bars
-ALPHA = np.arccos((A**2 + D**2 - B**2) / (2 * A * D))  # at the origin
-BETA = np.pi - np.arccos((B**2 + D**2 - A**2) / (2 * B * D))  # at (D, 0), from x
-K_ONE, K_TWO, K_BAR = 40.0, 70.0, 9e4  # [N m/rad], [N m/rad], [N/m]
+A, B, D = 0.3, 0.25, 0.4  # [m] lengths of two bars, and distance between their hinges
+ALPHA = np.arccos((A**2 + D**2 - B**2) / (2 * A * D))  # angle of bar one to the x axis
+# angle of bar two to the x axis
+BETA = np.pi - np.arccos((B**2 + D**2 - A**2) / (2 * B * D))
+# stiffnesses of both hinges [N m/rad] and of bar two [N/m]
+K_ONE, K_TWO, K_BAR = 40.0, 70.0, 9e4
 
 
 def only(row, value):
-    """K_B of a joint that is elastic in one direction and rigid in all others."""
+    """Return the stiffness of a joint that is compliant in one direction only."""
     return np.diag([value if k == row else np.inf for k in range(6)])
 
 
 def two_bars(longer, clearance=None, stretch=False):
-    """Two bars on elastic hinges, joined by a pin; the second bar is too long."""
+    """Return two bars on elastic hinges, connected by a pin.
+
+    Bar two is too long by ``longer`` [m].
+    """
     soft = only(3, K_BAR) if stretch else None
     frames = (
         Frame("one", rotation=[0, 0, ALPHA], joint="revolute",
@@ -53,26 +58,26 @@ def two_bars(longer, clearance=None, stretch=False):
 
 
 def triangle(length):
-    """Rotations of both bars for a given length of bar two, by the law of cosines."""
+    """Return the rotations of both bars for a given length of bar two."""
     one = np.arccos((A**2 + D**2 - length**2) / (2 * A * D)) - ALPHA
     two = np.pi - np.arccos((length**2 + D**2 - A**2) / (2 * length * D)) - BETA
     return np.array([one, two])
 
 
 def pendulum(stiffness, length):
-    """A rigid bar upright along x on an elastic hinge."""
+    """Return a rigid bar along x on an elastic hinge."""
     hinge = Frame("hinge", joint="revolute", joint_stiffness=only(2, stiffness))
     return home_posture(
         Robot("bar", "tip", (hinge, Frame("tip", "hinge", [length, 0, 0])))
     )
 
 
-# Closed forms at large turns
+# Comparison with closed forms at large rotations
 
 
 @pytest.mark.parametrize("longer", [1e-4, 0.05, 0.12])
-def test_two_bars_close_by_the_law_of_cosines(longer):
-    """Both rotations equal those of the triangle, up to 0.4 rad."""
+def test_rotations_of_two_bars_equal_law_of_cosines(longer):
+    """The law of cosines determines the rotations of both bars."""
     one, two = triangle(B + longer)
     answer = solve_exact(two_bars(longer))
     assert abs(one) > 0.2 or longer < 0.1
@@ -85,8 +90,8 @@ def test_two_bars_close_by_the_law_of_cosines(longer):
     assert np.abs(answer.platform_screw[:3] - turned).max() < 1e-12
 
 
-def test_linearisation_error_is_the_linear_minus_the_exact_solution():
-    """The linear model uses the slopes of the triangle at home."""
+def test_linearisation_error_equals_closed_form():
+    """Both solutions are known in closed form."""
     longer, step = 0.06, 1e-6
     slopes = (triangle(B + step) - triangle(B - step)) / (2 * step)
     energy = (np.array([K_ONE, K_TWO]) @ (slopes * longer) ** 2) / 2
@@ -99,15 +104,15 @@ def test_linearisation_error_is_the_linear_minus_the_exact_solution():
 
 
 def bar_force(e, longer):
-    """dE/de of the stretched bar, from the rotations of the triangle."""
+    """Return dE/de, where e is the elongation of bar two."""
     length, step = B + longer + e, 1e-6
     slope = (triangle(length + step) - triangle(length - step)) / (2 * step)
     return K_BAR * e + np.array([K_ONE, K_TWO]) * triangle(length) @ slope
 
 
 @pytest.mark.parametrize("longer", [0.05, 0.12])
-def test_energy_of_an_elastic_bar_equals_its_closed_form(longer):
-    """Solution of one scalar equation; differences of 1e-6 are accurate to 1e-10."""
+def test_energy_of_elastic_bar_equals_closed_form(longer):
+    """The elongation of the bar is the solution of a scalar equation."""
     e = brentq(bar_force, -longer, longer, args=(longer,), xtol=1e-15)
     one, two = triangle(B + longer + e)
     answer = solve_exact(two_bars(longer, stretch=True))
@@ -120,11 +125,10 @@ def test_energy_of_an_elastic_bar_equals_its_closed_form(longer):
 
 
 @pytest.mark.parametrize(("longer", "bound"), [(0.12, 0.1), (-0.1, 0.4)])
-def test_passive_joint_stops_exactly_at_its_bound(longer, bound):
-    """The bar deforms until the pin reaches its bound.
+def test_passive_joint_stops_at_its_motion_limit(longer, bound):
+    """The bar deforms because the rotation of the pin is limited.
 
-    The second bound exceeds the pin rotation of the linear model, 0.352 rad, and is
-    reached only by finite motions, 0.497 rad.
+    The second limit is not reached in the linear model, but with finite motions.
     """
     free = solve_exact(two_bars(longer, stretch=True))
 
@@ -142,15 +146,15 @@ def test_passive_joint_stops_exactly_at_its_bound(longer, bound):
 
 
 def pin_gap(one, two, longer):
-    """Vector from the end of bar two to the end of bar one."""
+    """Return the vector from the end of bar two to the end of bar one."""
     first = A * np.array([np.cos(ALPHA + one), np.sin(ALPHA + one)])
     second = (B + longer) * np.array([np.cos(BETA + two), np.sin(BETA + two)])
     return first - second - [D, 0]
 
 
 @pytest.mark.parametrize("longer", [0.02, 0.06])
-def test_pin_with_clearance_rests_on_its_rim_at_minimum_energy(longer):
-    """Minimum of k angle^2 / 2 with the bar ends at most one clearance apart."""
+def test_pin_with_clearance_touches_rim_at_minimum_energy(longer):
+    """The energy is minimal under the condition that the pin touches the rim."""
     clearance = 5e-3
 
     def balance(z):
@@ -178,28 +182,28 @@ def test_pin_with_clearance_rests_on_its_rim_at_minimum_energy(longer):
     )
 
 
-def test_error_within_the_clearance_stores_no_energy():
-    """The bar is 4 mm too long, the clearance is 5 mm."""
+def test_error_within_clearance_causes_no_energy():
+    """The bar is too long by 4 mm, and the clearance is 5 mm."""
     answer = solve_exact(two_bars(4e-3, Clearance(radial=5e-3)))
-    assert energy_of(answer.placement) < 1e-12  # [J], of 0.04 J without clearance
-    assert answer.energy == 0.0  # 1e-31 J is round-off
+    assert energy_of(answer.placement) < 1e-12  # [J]; 0.04 J without clearance
+    assert answer.energy == 0.0
     assert answer.closure_residual() < 1e-12
     assert answer.clearance_excess() == 0.0
 
 
-def test_tilt_clearance_closes_axes_that_are_not_parallel():
-    """Axes 0.1 rad apart require 0.1 rad of tilt for any rotation of the bars."""
+def test_pin_tilts_within_clearance_if_axes_are_not_parallel():
+    """The axes of the hinges are at an angle of 0.1 rad, which the pin must tilt."""
     posture = two_bars(0.06, Clearance(tilt=0.2))
     errors = posture.robot.errors.copy()
-    errors[4, 0] = 0.1  # about bar two, which no spring and no pin can undo
+    errors[4, 0] = 0.1  # twist of bar two, which no joint can compensate
     answer = solve_exact(replace(posture, robot=posture.robot.with_errors(errors)))
     assert np.hypot(*answer.clearance_screws[1, :2]) == pytest.approx(0.1, rel=1e-12)
     assert answer.joint_screws[0, 2] == pytest.approx(triangle(B + 0.06)[0], rel=1e-11)
     assert answer.closure_residual() < 1e-12
 
 
-def test_load_passes_through_closed_clearances_of_rigid_parts():
-    """Clearance far moves by 0.2 mm, near by 0.5 + 0.2 mm; 5 N pass through far."""
+def test_load_on_rigid_loop_closes_the_smaller_clearance():
+    """The load is transmitted by the clearance of 0.2 mm, which closes first."""
     frames = (
         Frame("near", clearance=Clearance(axial=1e-3)),
         Frame("tip", "near", [0.1, 0, 0], [0.5, 0.2, -0.3]),
@@ -216,8 +220,8 @@ def test_load_passes_through_closed_clearances_of_rigid_parts():
 
 
 @pytest.mark.parametrize(("force", "side"), [(30.0, 1.0), (10.0, -8.0), (0.0, 25.0)])
-def test_pendulum_under_a_dead_load_rests_where_its_moments_balance(force, side):
-    """k a = L (P sin a + F cos a); with k = 10 and P L = 15 it buckles to 1.5 rad."""
+def test_pendulum_under_dead_load_equals_closed_form(force, side):
+    """In equilibrium, k a = L (P sin a + F cos a)."""
     stiffness, length = 10.0, 0.5
 
     def balance(a):
@@ -234,24 +238,24 @@ def test_pendulum_under_a_dead_load_rests_where_its_moments_balance(force, side)
     assert answer.least_curvature == pytest.approx(curvature, rel=1e-7)
 
 
-def test_pendulum_rotates_by_moment_over_stiffness():
-    """k a = M, by definition of the work of the moment, also at 0.8 rad."""
+def test_rotation_of_pendulum_equals_moment_over_stiffness():
+    """The rotation is moment / stiffness = 0.8 rad."""
     answer = solve_exact(pendulum(10.0, 0.5), [0, 0, 8.0, 0, 0, 0])
     assert answer.joint_screws[0, 2] == pytest.approx(0.8, rel=1e-12)
     assert answer.platform_screw[:3] == pytest.approx([0, 0, 0.8], abs=1e-12)
 
 
-def test_unstable_equilibrium_has_a_negative_smallest_curvature():
-    """Upright under P L = 15 N m with k = 10 N m/rad: curvature k - P L = -5."""
+def test_unstable_equilibrium_has_negative_curvature():
+    """The upright bar has the curvature k - P L = -5 N m/rad."""
     answer = solve_exact(pendulum(10.0, 0.5), [0, 0, 0, -30.0, 0, 0])
     assert answer.joint_screws[0, 2] == 0.0
     assert answer.least_curvature == pytest.approx(-5.0, rel=1e-12)
 
 
-# What cannot be solved
+# Problems without a solution
 
 
-def test_rigid_parts_that_cannot_close_are_rejected():
+def test_rigid_loop_that_cannot_close_raises_cannot_assemble():
     robot = coaxial_beams([0, 0, 0, 1e-3, 0, 0], clearance=small_clearance())
     rigid = robot.with_links({"one": None, "two": None})
     with pytest.raises(CannotAssemble):
@@ -259,21 +263,21 @@ def test_rigid_parts_that_cannot_close_are_rejected():
 
 
 @pytest.mark.parametrize("load", [None, [0, 0, 0, 1, 0, 0]])
-def test_start_from_the_solution_of_another_problem_is_rejected(load):
+def test_solution_of_another_problem_is_rejected_as_start(load):
     posture = two_bars(0.01)
     start = solve_assembly(posture if load else two_bars(0.02))
     with pytest.raises(ValueError, match="start: found the linear solution of another"):
         solve_exact(posture, load, start)
 
 
-def test_too_few_steps_raise_an_error_of_no_convergence_with_both_residuals(
+def test_too_few_steps_raise_not_converged(
     monkeypatch,
 ):
     monkeypatch.setattr(exact, "_STEPS", 1)
     posture = place_robot(irsbot2_with(CASES["literal"]), pose={"tz": -0.5})
     message = (
-        r"exact equilibrium of irsbot2: after 1 steps closures are open by \S+ and "
-        r"forces out of balance by \S+, relative"
+        r"exact equilibrium of irsbot2: after 1 steps, the relative loop-closure "
+        r"residual is \S+ and the relative force residual is \S+"
     )
     with pytest.raises(NotConverged, match=message) as caught:
         solve_exact(posture)
@@ -281,12 +285,12 @@ def test_too_few_steps_raise_an_error_of_no_convergence_with_both_residuals(
     assert caught.value.problem == "exact equilibrium of irsbot2"
 
 
-# The paper's robot at its full errors
+# IRSBot-2 with the errors of the paper
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_exact_solution_of_the_paper_robot_converges_at_full_errors(case):
-    """Points in the middle, in flat energy valleys, and at the workspace boundary."""
+def test_exact_solution_of_irsbot2_converges(case):
+    """The points are inside and at the boundary of the workspace."""
     places = [(0, -0.5), (-0.525, -0.1), (0.35, -0.075), (-0.6, 0), (0.025, -0.6)]
     poses = np.full((len(places), 6), np.nan)
     poses[:, [0, 2]] = places
@@ -297,11 +301,11 @@ def test_exact_solution_of_the_paper_robot_converges_at_full_errors(case):
         assert answer.clearance_excess() < 1e-12
         assert answer.least_curvature > 0
         shift = np.linalg.norm(answer.linearisation_error.translation)
-        assert 1e-6 < shift < 1e-3  # [m]; the paper's target is 20e-6
+        assert 1e-6 < shift < 1e-3  # [m]
 
 
 def as_springs(robot, **options):
-    """Multibody model whose links are springs with the stiffness of the robot."""
+    """Return a multibody model in which all links are springs."""
     stiffness = {
         frame.name: np.linalg.inv(link_compliance(frame))
         for frame in robot.frames
@@ -313,12 +317,11 @@ def as_springs(robot, **options):
 @pytest.mark.exudyn
 @pytest.mark.parametrize("place", [(0, -0.5), (-0.15, -0.6)])
 @pytest.mark.parametrize("case", CASES)
-def test_exact_solution_equals_the_multibody_simulation_at_full_errors(case, place):
-    """Without clearances, links as springs: 1e-8 m and 1e-9 of the energy.
+def test_exact_solution_agrees_with_simulation(case, place):
+    """All links are springs, and clearances are omitted.
 
-    The simulation applies K s half-way between a spring's ends, which is its energy's
-    gradient to s^2 / 24 only: 1e-5 of the wrench in hinges turned by 2e-2 rad, and up
-    to 1e-7 rad of the soft ones.
+    The force law of the springs in the simulation has a relative error of s^2 / 24 for
+    a rotation of s rad, which explains the tolerances of rotations and wrenches.
     """
     robot = without_clearance(irsbot2_with(CASES[case]))
     posture = place_robot(robot, pose=dict(zip(("tx", "tz"), place, strict=True)))
@@ -337,8 +340,8 @@ def test_exact_solution_equals_the_multibody_simulation_at_full_errors(case, pla
 @pytest.mark.slow
 @pytest.mark.exudyn
 @pytest.mark.parametrize("case", CASES)
-def test_exact_solution_with_clearances_equals_the_multibody_simulation(case):
-    """Twice the energy of the deforming contacts is added, to first order."""
+def test_exact_solution_with_clearances_agrees_with_simulation(case):
+    """To first order, contact deformation lowers the energy by twice its own energy."""
     robot = irsbot2_with(CASES[case])
     posture = place_robot(robot, pose={"tx": 0.1, "tz": -0.4})
     answer = solve_exact(posture)

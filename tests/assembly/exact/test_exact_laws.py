@@ -1,4 +1,4 @@
-"""Properties of the exact equilibrium: limits, invariance, and wrench balance."""
+"""Tests of general properties of the exact equilibrium."""
 
 from dataclasses import replace
 
@@ -21,12 +21,12 @@ from tests.robots_for_tests import NUMBERS, irsbot2_with, random_robot
 CASES = {case["name"]: case for case in NUMBERS["cases"]}
 
 
-# Laws
-
-
 @pytest.mark.parametrize("case", CASES)
-def test_linear_model_error_is_of_second_order_in_the_errors(case):
-    """For errors scaled by s, the pose differs by s^2 and the relative energy by s."""
+def test_linearisation_error_is_of_second_order(case):
+    """The error of the pose is proportional to s^2 for geometric errors times s.
+
+    The relative error of the energy is proportional to s.
+    """
     robot = without_clearance(irsbot2_with(CASES[case]))
     posture = place_robot(robot, pose={"tx": 0.1, "tz": -0.45})
     turns, shifts, energies = [], [], []
@@ -42,8 +42,8 @@ def test_linear_model_error_is_of_second_order_in_the_errors(case):
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3, 5])
-def test_energy_derivative_with_respect_to_an_error_equals_the_wrench(seed):
-    """dE / d(delta l) = -force for the first body, by differences of solutions."""
+def test_energy_derivative_by_geometric_error_equals_force(seed):
+    """The derivative is computed by differences of solutions."""
     rng = np.random.default_rng(seed)
     robot, step = random_robot(rng, legs=3), 1e-6
     answer = solve_exact(home_posture(robot))
@@ -58,13 +58,13 @@ def test_energy_derivative_with_respect_to_an_error_equals_the_wrench(seed):
                 home_posture(robot.with_errors(errors))
             ).energy
     found = (energies[:, 0] - energies[:, 1]) / (2 * step)
-    # only a change of active cones causes a kink; round-off is 1e-14 J / step
+    # the second term is the round-off of the energy divided by the step
     assert np.abs(found - expected).max() < 1e-5 * np.abs(through[:, 3:]).max() + 1e-7
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
-def test_exact_solution_converges_along_flat_energy_valleys(seed):
-    """Delta rods spin by radians under a load while the energy changes by 1e-6."""
+def test_exact_solution_converges_if_rods_can_spin(seed):
+    """The rods of the Delta robot spin, which hardly changes the energy."""
     rng = np.random.default_rng(seed)
     robot = delta()
     errors = 1e-4 * rng.uniform(-1, 1, robot.errors.shape)
@@ -82,13 +82,8 @@ def test_exact_solution_converges_along_flat_energy_valleys(seed):
         ("five_bar", 0, 0.01),
     ],
 )  # fmt: skip
-def test_platform_displacement_equals_the_potential_derivative_by_castigliano(
-    name, component, value
-):
-    """Castigliano's theorem, also if symmetry leaves touching clearances unloaded.
-
-    They carry forces of the size of round-off, and their motion is undetermined.
-    """
+def test_platform_displacement_satisfies_castigliano_theorem(name, component, value):
+    """The theorem also applies if some contacts have no force because of symmetry."""
     posture = home_posture(load_robot(name))
     unit, step = np.eye(6)[component], 1e-3
     low, middle, high = (
@@ -97,12 +92,12 @@ def test_platform_displacement_equals_the_potential_derivative_by_castigliano(
     )
     assert middle.stationarity < 1e-7
     slope = (high.potential - low.potential) / (2 * step * value)
-    # the third derivative times the square of the step
+    # the tolerance is the error of the central difference
     assert -slope == pytest.approx(middle.platform_screw[component], rel=1e-5)
 
 
 def loaded_arm(pieces=1):
-    """The six-axis arm with errors in all components of all frames, 50 N at its tip."""
+    """Return the equilibrium of the six-axis arm with random errors under a load."""
     robot = load_robot("arm6")
     rng = np.random.default_rng(2)
     errors = rng.uniform(-1, 1, (len(robot.frames), 6)) * [*[2e-2] * 3, *[1e-3] * 3]
@@ -116,8 +111,8 @@ def loaded_arm(pieces=1):
     return solve_exact(posture, [1.0, -2.0, 0.5, 20.0, 30.0, -40.0])
 
 
-def test_beam_in_pieces_bends_from_its_displaced_position():
-    """Links rotated by 0.02 rad bend slightly, so one piece and several agree."""
+def test_beam_with_two_elements_agrees_with_one_element():
+    """The deformations are small, so one beam element per link is sufficient."""
     whole, cut = loaded_arm(), loaded_arm(pieces=2)
     assert len(cut.placement.transforms) > len(whole.placement.transforms)
     for name in ("link_screws", "wrenches"):
@@ -128,8 +123,8 @@ def test_beam_in_pieces_bends_from_its_displaced_position():
             assert other[:, part] == pytest.approx(one[:, part], abs=2e-2 * size)
 
 
-def test_start_from_a_nearby_solution_leads_to_the_same_equilibrium():
-    """The load is 1 % larger; the solution of another robot is not used as a start."""
+def test_start_from_nearby_solution_finds_same_equilibrium():
+    """The load is increased by 1 %.  A solution of another robot is ignored."""
     posture = loaded_arm().posture
     load = np.array([1.0, -2.0, 0.5, 20.0, 30.0, -40.0])
     before = solve_exact(posture, load)
@@ -144,8 +139,8 @@ def test_start_from_a_nearby_solution_leads_to_the_same_equilibrium():
 
 
 @pytest.mark.parametrize("point", [(0.2, 0.0, 0.0), (-0.1, 0.3, 0.0)])
-def test_force_at_a_platform_point_moves_with_the_platform(point):
-    """k a = r x F, where r = L + point is rotated by a; also in the linear solution."""
+def test_force_at_platform_point_moves_with_platform(point):
+    """In equilibrium, k a = r x F, where r is the rotated point of application."""
     k, L, force = 10.0, 0.5, np.array([4.0, 9.0])
     posture = pendulum(k, L)
     x, y = L + point[0], point[1]
@@ -162,7 +157,7 @@ def test_force_at_a_platform_point_moves_with_the_platform(point):
     R = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     work = force @ ((R - np.eye(2)) @ [x, y])
     assert answer.potential == pytest.approx(k * angle**2 / 2 - work, rel=1e-9)
-    # the linear model has the same force, and its moment about the origin
+    # in the linear model, the load is the force and its moment about the origin
     moment = point[0] * force[1] - point[1] * force[0]
     start = solve_assembly(posture, [0, 0, moment, *force, 0])
     assert answer.linear.load == pytest.approx(start.load, abs=1e-12)
@@ -172,11 +167,10 @@ def test_force_at_a_platform_point_moves_with_the_platform(point):
 
 @pytest.mark.parametrize("pieces", [1, 3, 5])
 @pytest.mark.parametrize("radius", [0.01, 0.03])
-def test_exact_solution_balances_loads_from_nanonewtons_to_newtons(pieces, radius):
-    """Displacements are proportional to loads down to nanonewtons.
+def test_displacement_is_proportional_to_small_loads(pieces, radius):
+    """Displacements are proportional to loads between 1e-9 N and 1 N.
 
-    The energy change of a step is then below the round-off of the work of the load, but
-    the step is still accepted.
+    For small loads, the change of the energy in a step is below its round-off.
     """
     link = BeamLink({"radius": radius}, 7e10, 0.3, pieces=pieces)
     arm = Frame("arm", translation=[0.5, 0.1, 0.2], rotation=[0, 0, 0.4], link=link)
@@ -196,22 +190,22 @@ def test_exact_solution_balances_loads_from_nanonewtons_to_newtons(pieces, radiu
                 )
 
 
-def test_robot_without_errors_has_zero_displacement_and_energy():
+def test_robot_without_errors_has_no_displacement():
     robot = hexapod()
     answer = solve_exact(home_posture(robot.with_errors(0 * robot.errors)))
     assert answer.energy == 0.0
     assert np.abs(answer.platform_screw).max() < 1e-12
 
 
-def test_closures_open_by_rounded_file_numbers_store_no_energy():
-    """Crank lengths rounded to six digits leave closures open by up to 1e-6 m."""
+def test_rounded_lengths_cause_no_energy():
+    """Crank lengths with six digits cause gaps of up to 1e-6 m in the loops."""
     posture = home_posture(parallelograms(digits=6))
     assert posture.mismatch > 1e-9
     assert solve_exact(posture).energy == 0.0
 
 
-def test_contact_force_equals_the_energy_derivative_by_the_clearance():
-    """In a closed chain, force times clearance is -c dE/dc, by central differences."""
+def test_contact_force_equals_energy_derivative_by_clearance():
+    """The product of force and clearance c is -c dE/dc."""
     clearance, step = 5e-3, 1e-6
     low, here, high = (
         solve_exact(two_bars(0.06, Clearance(radial=c)))

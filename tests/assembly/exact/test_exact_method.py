@@ -1,4 +1,4 @@
-"""Solvers with the reference method, which uses only NumPy and Clarabel."""
+"""Tests of the reference method, which uses only NumPy and Clarabel."""
 
 from dataclasses import replace
 
@@ -26,7 +26,7 @@ LOADS = (0.0, 30.0, 60.0)
 
 
 def beams():
-    """Two beams forced together by more than their clearance, with a mass."""
+    """Return two beams with a gap that exceeds their clearance, and with masses."""
     gap = np.array([0, 0, 0, 1e-4, 0, 0])
     robot = coaxial_beams(gap, clearance=Clearance(radial=2e-5))
     frames = tuple(replace(frame, mass=1.0) for frame in robot.frames)
@@ -68,7 +68,7 @@ QUESTIONS = {
 
 @pytest.fixture
 def nothing_compiled(monkeypatch):
-    """Make every C++ function raise an error when called."""
+    """Return a function that makes all C++ functions raise an error."""
 
     class Refused:
         def __getattr__(self, name):
@@ -91,13 +91,13 @@ def test_reference_method_calls_no_compiled_function(question, nothing_compiled)
 
 
 @pytest.mark.parametrize("question", QUESTIONS)
-def test_unknown_method_name_is_rejected(question):
+def test_unknown_method_is_rejected(question):
     with pytest.raises(ValueError, match="is 'numpy', expected 'compiled' or 'ref"):
         QUESTIONS[question](beams(), "numpy")
 
 
 @pytest.mark.parametrize("start", ["start", "near"])
-def test_reference_method_rejects_a_compiled_start(start):
+def test_reference_method_rejects_compiled_start(start):
     posture = beams()
     compiled, reference = (
         {
@@ -115,21 +115,21 @@ def test_reference_method_rejects_a_compiled_start(start):
 
 
 @pytest.mark.parametrize("name", sorted(BUILT_IN))
-def test_both_methods_satisfy_the_equilibrium_conditions(name):
-    """Both are closed, within the cones and balanced; their energies agree."""
+def test_both_methods_satisfy_equilibrium_conditions(name):
+    """The energies of both solutions are equal."""
     posture = home_posture(BUILT_IN[name]())
     one, other = (solve_exact(posture, LOAD, method=method) for method in METHODS)
     for found in (one, other):
         assert found.closure_residual() < 1e-10
         assert found.stationarity < 1e-7
         assert found.clearance_excess() < 1e-9
-    # the orthoglide has two minima 1.4e-8 rad apart, with other clearances touching
+    # the orthoglide has two minima with different contacts
     if name != "orthoglide":
         assert one.energy == pytest.approx(other.energy, rel=GAP)
 
 
 @pytest.mark.parametrize("state", ["contact", "exact"])
-def test_both_methods_compute_the_same_deflection_curve_through_contact(state):
+def test_both_methods_compute_same_deflection_curve(state):
     one, other = (
         deflection_curve(beams(), 4, LOADS, state=state, method=method)
         for method in METHODS
@@ -139,7 +139,7 @@ def test_both_methods_compute_the_same_deflection_curve_through_contact(state):
     np.testing.assert_allclose(one.stiffness, other.stiffness, rtol=1e-6)
 
 
-def test_both_methods_find_the_same_modes_and_stiffness():
+def test_both_methods_compute_same_modes_and_stiffness():
     one, other = (
         natural_modes(beams(), load=LOAD, state="exact", method=method)
         for method in METHODS

@@ -1,4 +1,4 @@
-"""Finite motions: exponentials, closures and potential, and their derivatives."""
+"""Tests of finite motions and their derivatives."""
 
 import numpy as np
 import pytest
@@ -23,8 +23,8 @@ from tests.robots_for_tests import random_robot
 
 
 @pytest.mark.parametrize("size", [1e-7, 1e-2, 0.5, 1.5])
-def test_finite_motion_equals_the_matrix_exponential_of_its_screw(rng, size):
-    """Equal to SciPy's matrix exponential to machine precision."""
+def test_exponential_of_screw_equals_matrix_exponential(rng, size):
+    """SciPy's matrix exponential is the reference."""
     s = size * rng.normal(size=6)
     generator = np.zeros((4, 4))
     x, y, z = s[:3]
@@ -36,8 +36,8 @@ def test_finite_motion_equals_the_matrix_exponential_of_its_screw(rng, size):
 
 
 @pytest.mark.parametrize("size", [1e-4, 0.1, 1.0])
-def test_left_jacobian_equals_its_power_series(rng, size):
-    """J = integral of Ad(exp(t s)), the series of ad^n / (n + 1)!."""
+def test_left_jacobian_equals_power_series(rng, size):
+    """J is the sum of ad^n / (n + 1)!."""
     s = size * rng.normal(size=6)
     J, term = np.eye(6), np.eye(6)
     for n in range(1, 40):
@@ -47,11 +47,8 @@ def test_left_jacobian_equals_its_power_series(rng, size):
 
 
 @pytest.mark.parametrize("size", [0.02, 0.3, 1.5, 3.0])
-def test_second_form_equals_differences_of_the_exponential(rng, size):
-    """Compared with central differences, which are accurate to 1e-8, for any rotation.
-
-    log(exp(s + h) exp(-s)) = J h + D(h, h) / 2 + O(h^3): the even part is D.
-    """
+def test_second_form_equals_finite_differences(rng, size):
+    """The second form D satisfies log(exp(s + h) exp(-s)) = J h + D(h, h) / 2."""
     s = size * np.ones(6) / np.sqrt(3)
     w, h = rng.normal(size=(2, 6))
     step = 2e-4
@@ -67,19 +64,19 @@ def test_second_form_equals_differences_of_the_exponential(rng, size):
     assert abs(h @ form @ h - expected) < (10 * rounding + 1e-7) * scale
 
 
-# Closures of a robot
+# Derivatives of the loop-closure residual
 
 
 def moved_unknowns(posture, rng, size):
-    """A finite robot whose unknowns have a given size in rad and reference lengths."""
+    """Return a robot, random unknowns of a given size, and a random direction."""
     model = FiniteRobot(posture, virtual_joints(posture.robot))
     x, h = rng.normal(size=(2, len(model.frame))) / np.sqrt(np.diag(model.metric))
     return model, size * x, h
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_closure_and_platform_rows_equal_central_differences(seed):
-    """Central differences of 1e-5: error 1e-10 of third derivatives of order 1."""
+def test_closure_and_platform_derivatives_equal_finite_differences(seed):
+    """The derivatives are compared with central differences."""
     rng = np.random.default_rng(seed)
     model, x, h = moved_unknowns(home_posture(random_robot(rng, legs=3)), rng, 0.05)
     here, step = place(model, x), 1e-5
@@ -91,7 +88,7 @@ def test_closure_and_platform_rows_equal_central_differences(seed):
 
 
 def expansion(seed):
-    """A closed placement far from home, under loads of all kinds."""
+    """Return an expansion at a random placement under random loads, and a direction."""
     rng = np.random.default_rng(seed)
     posture = home_posture(heavy(random_robot(rng, 3, 3), rng))
     model, x, h = moved_unknowns(posture, rng, 0.1)
@@ -105,8 +102,8 @@ def expansion(seed):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_expansion_derivatives_equal_central_differences(seed):
-    """Central differences of 1e-5, at fixed multipliers and basis."""
+def test_gradient_and_hessian_equal_finite_differences(seed):
+    """The multipliers are constant in the central differences."""
     local, h = expansion(seed)
     model, x, step = local.placement.model, local.placement.x, 1e-5
     ahead, behind = place(model, x + step * h), place(model, x - step * h)

@@ -1,14 +1,14 @@
-"""Links in pieces, compared with published large deflections of other programs.
+"""Tests of beams with several elements against published large deflections.
 
 Sources:
-    Dowell, Traybar (1975), the Princeton beam; values after Obrezkov et al., Nonlinear
-    Dynamics (2022), ANSYS beam elements and solids.
-    Bathe, Bolourchi (1979), the curved cantilever; values of kynema, 12 nodes.
-    Wang, Sprague, Jonkman et al., Wind Energy 20 (2017), twisted and composite beams by
-    Legendre spectral elements; values of kynema, 12 and more nodes.
-    Nachbagauer, Pechstein, Irschik, Gerstmayr (2011), the plane cantilever.
-    Bauchau et al., Multibody System Dynamics 37 (2016), the four-bar with a tilted
-    hinge; quasi-static, by Exudyn's geometrically exact beams, 64 elements a bar.
+    Dowell, Traybar (1975), Princeton beam.  Values by ANSYS from Obrezkov et al.,
+    Nonlinear Dynamics (2022).
+    Bathe, Bolourchi (1979), curved cantilever.  Values by kynema.
+    Wang, Sprague, Jonkman et al., Wind Energy 20 (2017), twisted and composite beams.
+    Values by kynema.
+    Nachbagauer, Pechstein, Irschik, Gerstmayr (2011), plane cantilever.
+    Bauchau et al., Multibody System Dynamics 37 (2016), four-bar with a tilted hinge.
+    Values by Exudyn with 64 beam elements per bar.
 """
 
 from dataclasses import replace
@@ -27,7 +27,7 @@ from forcefit.stiffness.screws import screw_map
 from forcefit.validation.multibody.simulation import SimulationModel, simulate_assembly
 
 ANGLES = np.radians([0, 15, 30, 45, 60, 75, 90])
-# [m] along the height and across, ANSYS beam elements, at 8.896 N and 13.345 N
+# tip deflections [m] along the height and the width for both forces [N]
 PRINCETON = {
     8.896: (
         [1.071417630e-2, 1.061328706e-2, 1.011169630e-2, 8.837226265e-3,
@@ -42,7 +42,7 @@ PRINCETON = {
          0.200677707],
     ),
 }  # fmt: skip
-# crank angle [rad], displacement of C [mm], hinge tilted about the coupler
+# crank angle [rad] and displacement of hinge C [mm]
 BAUCHAU = [
     (0.1, 11.97876, -0.59939, 0.01638),
     (0.3, 35.45846, -5.35851, -0.07994),
@@ -55,18 +55,18 @@ BAUCHAU = [
 
 
 def cantilever(length, link):
-    """A single beam along x, clamped at the base."""
+    """Return a beam along x that is clamped at the base."""
     tip = Frame("tip", translation=[length, 0, 0], link=link)
     return home_posture(Robot("cantilever", "tip", (tip,)))
 
 
 def tip_moved(posture, load):
-    """(3,) [m] of the platform's origin."""
+    """Return the displacement of the platform's origin, (3,) [m]."""
     return solve_exact(posture, load).platform_screw[3:]
 
 
-def test_beam_in_pieces_equals_the_whole_beam_for_small_motions():
-    """The stiffness and the compliance share of each link are equal."""
+def test_compliance_does_not_depend_on_number_of_beam_elements():
+    """The compliance and the shares of all links are compared."""
     robot = load_robot("delta")
     links = {f.name: replace(f.link, pieces=3) for f in robot.frames if f.link}
     cut = place_robot(robot.with_links(links), {"tx": 0.1})
@@ -74,7 +74,7 @@ def test_beam_in_pieces_equals_the_whole_beam_for_small_motions():
     pieces = platform_stiffness(cut, "exact", [0] * 5 + [10])
     size = np.sqrt(np.diag(whole.compliance))
     difference = (pieces.compliance - whole.compliance) / np.outer(size, size)
-    assert np.abs(difference).max() < 1e-5  # the load bends the rods a little
+    assert np.abs(difference).max() < 1e-5  # the load deforms the rods
     one, other = (s.shares([0, 0, 0, 0, 1, 0]) for s in (whole, pieces))
     assert set(one) == set(other)
     for part, share in one.items():
@@ -83,11 +83,10 @@ def test_beam_in_pieces_equals_the_whole_beam_for_small_motions():
 
 
 @pytest.mark.parametrize("force", PRINCETON)
-def test_princeton_beam_deflection_equals_published_ansys_beams(force):
-    """8 pieces agree to 1.5 % along and 0.3 % across; linear beams to 9 and 20 %.
+def test_princeton_beam_deflection_agrees_with_ansys(force):
+    """Eight elements agree to 1.5 % along the height and 0.3 % along the width.
 
-    The published solids differ from the published beams by up to 2.7 % across and 4 %
-    along the height, so that no beam can be within 1 % of both.
+    The linear model has errors of 9 and 20 %.
     """
     height, width = 12.3777e-3, 3.2024e-3
     link = BeamLink({"width": width, "height": height}, 71.7e9, 0.31, up=(0, 1, 0))
@@ -104,7 +103,7 @@ def test_princeton_beam_deflection_equals_published_ansys_beams(force):
     assert linear / across[-1] - 1 == pytest.approx(off, abs=0.006)
 
 
-# [m] of a solid with large rotations: python -m benchmarks.evidence.princeton_solids
+# tip deflections [m] of a solid, computed by benchmarks.evidence.princeton_solids
 SOLID = {
     (8.896, 15): (0.0106000, 0.0419811), (8.896, 45): (0.0088268, 0.1087360),
     (13.345, 45): (0.0151716, 0.1561285), (13.345, 75): (0.0062418, 0.1956991),
@@ -112,8 +111,8 @@ SOLID = {
 
 
 @pytest.mark.slow
-def test_princeton_beam_with_a_root_that_cannot_warp_equals_the_solid():
-    """8 pieces: to 0.6 %; with free warping 1.5 % along the height."""
+def test_princeton_beam_without_warping_at_root_agrees_with_solid():
+    """The deflections agree to 0.6 % if warping is prevented at the clamped end."""
     root = root_link()
     for (force, degrees), solid in SOLID.items():
         moved = in_pieces(force, np.radians(degrees), root)
@@ -123,7 +122,7 @@ def test_princeton_beam_with_a_root_that_cannot_warp_equals_the_solid():
 
 
 def curved_cantilever(chords, pieces):
-    """45 degrees of a circle of 100 in in chords, EI = GJ, clamped along x."""
+    """Return an arc of 45 degrees with a radius of 100 in, divided into chords."""
     section = {"area": 1.0, "I_y": 1 / 12, "I_z": 1 / 12, "J": 1 / 6,
                "shear_y": 5 / 6, "shear_z": 5 / 6}  # fmt: skip
     link = BeamLink(section, 1e7, 0.0, up=(0, 0, 1), pieces=pieces)
@@ -139,13 +138,13 @@ def curved_cantilever(chords, pieces):
     return home_posture(Robot("bend", frames[-1].name, frames))
 
 
-ACROSS = [0, 0, 0, 0, 0, 600.0]  # lb
+ACROSS = [0, 0, 0, 0, 0, 600.0]  # [lb] force normal to the plane of the arc
 
 
-def test_curved_cantilever_out_of_plane_deflection_equals_literature():
-    """Published values differ among themselves by 1 %: Bathe and Bolourchi, kynema.
+def test_curved_cantilever_deflection_agrees_with_literature():
+    """The values of the two publications differ by 1 %.
 
-    The error falls with the square of the chords.
+    The error is inversely proportional to the squared number of chords.
     """
     tips = [tip_moved(curved_cantilever(n, 1), ACROSS) for n in (8, 16, 32)]
     off = [np.linalg.norm(one - two) for one, two in zip(tips, tips[1:], strict=False)]
@@ -156,8 +155,8 @@ def test_curved_cantilever_out_of_plane_deflection_equals_literature():
 
 
 @pytest.mark.exudyn
-def test_curved_cantilever_deflection_equals_geometrically_exact_beams():
-    """Extrapolated pieces agree to 1e-4 with Exudyn, 4 elements per chord."""
+def test_curved_cantilever_deflection_agrees_with_exudyn():
+    """The result is extrapolated to an infinite number of elements."""
     simulated = simulate_assembly(curved_cantilever(8, 1), load=ACROSS)
     tips = [tip_moved(curved_cantilever(8, n), ACROSS) for n in (2, 4)]
     tip = (4 * tips[1] - tips[0]) / 3
@@ -165,7 +164,7 @@ def test_curved_cantilever_deflection_equals_geometrically_exact_beams():
 
 
 def twisted_beam(count):
-    """A 10 m beam along x in pieces, twisted by 90 degrees from root to tip."""
+    """Return a beam along x that is twisted by 90 degrees over its length of 10 m."""
     E, nu = 200e9, 0.3
     G = E / (2 * (1 + nu))
     shear = 8.2604167e9 / (G * 0.125)
@@ -180,8 +179,8 @@ def twisted_beam(count):
     return home_posture(Robot("twisted", frames[-1].name, tuple(frames)))
 
 
-def test_twisted_beam_deflection_equals_literature():
-    """Extrapolation gives six digits; the published solid is off by 0.2 to 0.6 %."""
+def test_twisted_beam_deflection_agrees_with_literature():
+    """Six digits agree with the published beam elements after extrapolation."""
     load = [0, 0, 0, 0, 0, -4e6]
     tips = [tip_moved(twisted_beam(n), load) for n in (8, 16, 32)]
     rate = np.linalg.norm(tips[0] - tips[1]) / np.linalg.norm(tips[1] - tips[2])
@@ -192,7 +191,7 @@ def test_twisted_beam_deflection_equals_literature():
 
 
 def composite_beam(count):
-    """10 in along x whose section couples twist and bending; each piece its K_E."""
+    """Return a beam of 10 in along x whose section couples torsion and bending."""
     section = np.diag([0.0, 0, 0, 1368.17e3, 88.56e3, 38.78e3])
     section[:3, :3] = [
         [16.96e3, 17.61e3, -0.351e3], [17.61e3, 59.12e3, -0.37e3],
@@ -200,7 +199,7 @@ def composite_beam(count):
     ]  # fmt: skip
     length, C = 10 / count, np.zeros((6, 6))
     for place, weight in zip(*np.polynomial.legendre.leggauss(3), strict=True):
-        # of what is strained at s, the tip sees the motion at a distance length - s
+        # transforms the deformation at a point of the beam to the tip
         to_tip = screw_map([-length * (1 - place) / 2, 0, 0])
         C += weight * length / 2 * to_tip @ np.linalg.inv(section) @ to_tip.T
     link = MatrixLink(np.linalg.inv((C + C.T) / 2))
@@ -211,18 +210,17 @@ def composite_beam(count):
     return home_posture(Robot("composite", frames[-1].name, frames))
 
 
-def test_composite_beam_deflection_equals_literature():
-    """A transverse force of 150 lb; six digits agree after extrapolation."""
+def test_composite_beam_deflection_agrees_with_literature():
+    """Six digits agree after extrapolation."""
     tips = [tip_moved(composite_beam(n), [0, 0, 0, 0, 0, 150.0]) for n in (16, 32)]
     published = [-9.02726627566e-2, -6.47488486259e-2, 1.22973648292]
     np.testing.assert_allclose((4 * tips[1] - tips[0]) / 3, published, rtol=1e-6)
 
 
-def test_plane_cantilever_deflection_equals_literature():
-    """ux 0.15097, uy 0.71057 m; the error falls with the square of the pieces.
+def test_plane_cantilever_deflection_agrees_with_literature():
+    """The error is inversely proportional to the squared number of elements.
 
-    The beam is stiff across its plane, like the published planar model; otherwise this
-    load would exceed the lateral buckling load.
+    The beam is very stiff in torsion and lateral bending, which prevents buckling.
     """
     width, height, nu = 0.1, 0.5, 0.3
     shear = 10 * (1 + nu) / (12 + 11 * nu)
@@ -240,11 +238,8 @@ def test_plane_cantilever_deflection_equals_literature():
 
 
 @pytest.mark.parametrize("angle", [1.0, 3.0])
-def test_beam_under_an_end_moment_bends_to_a_circular_arc(angle):
-    """The tip is at (L sin a / a, L (1 - cos a) / a), a = M L / EI, up to half a turn.
-
-    The moment's work m . theta is its own in a plane, up to a turn of pi.
-    """
+def test_beam_under_end_moment_bends_to_circular_arc(angle):
+    """The tip is at (L sin a / a, L (1 - cos a) / a) with a = M L / EI."""
     length, stiffness = 10.0, 1e4
     link = BeamLink({"width": 1.0, "height": 1.0}, 12 * stiffness, 0.0, theory="euler")
     load = [0, 0, angle * stiffness / length, 0, 0, 0]
@@ -259,12 +254,10 @@ def test_beam_under_an_end_moment_bends_to_a_circular_arc(angle):
 
 
 @pytest.mark.parametrize("pieces", [4, 8, 16])
-def test_column_in_pieces_buckles_at_the_euler_load(pieces):
-    """The smallest eigenvalue of K vanishes at pi^2 EI / 4 L^2 for a clamped column.
+def test_column_of_beam_elements_buckles_at_euler_load(pieces):
+    """At the Euler load pi^2 EI / 4 L^2 of a clamped column, the stiffness is zero.
 
-    Pieces buckle earlier by pi^2 / 24 n^2: half of it as rigid bars on springs do,
-    whose load is (sin x / x)^2 of Euler's with x = pi / 4 n, half for the deflection of
-    each spring, as by a shear stiffness of 12 EI n^2 / L^2 (Engesser).
+    With n elements, the buckling load is lower by the fraction pi^2 / 24 n^2.
     """
     length, width, E = 1.0, 0.02, 70e9
     link = BeamLink({"width": width, "height": width}, E, 0.3, pieces=pieces)
@@ -278,13 +271,13 @@ def test_column_in_pieces_buckles_at_the_euler_load(pieces):
 
     critical = brentq(stiffness, 0.9 * euler, 1.1 * euler, rtol=1e-10)
     off = critical / euler - 1
-    shortened = euler / (E * width**2)  # a shorter column is stronger: 8e-5
+    shortened = euler / (E * width**2)  # axial compression of the column
     left = off + np.pi**2 / (24 * pieces**2)
     assert abs(left) < 1.1 * shortened + 0.35 / pieces**4
 
 
 def bauchau(pieces):
-    """The parallelogram whose hinge C is tilted by 5 degrees about the coupler."""
+    """Return a four-bar mechanism whose hinge C is tilted by 5 degrees."""
     E, nu = 207e9, 0.3
     G = E / (2 * (1 + nu))
 
@@ -312,10 +305,8 @@ def bauchau(pieces):
 @pytest.mark.parametrize(
     ("pieces", "in_plane", "across"), [(1, 7e-3, 5e-3), (16, 1e-4, 1e-3)]
 )
-def test_four_bar_with_a_tilted_hinge_has_the_published_deflections(
-    pieces, in_plane, across
-):
-    """16 pieces agree to 1e-4 in the plane and 0.1 % across it, unlike one per bar."""
+def test_four_bar_with_tilted_hinge_has_published_deflections(pieces, in_plane, across):
+    """With 16 elements, deflections agree to 1e-4 in plane and 0.1 % out of plane."""
     robot = bauchau(pieces)
     for angle, *published in BAUCHAU:
         posture = place_robot(robot, joints={"crank": -angle})
@@ -328,8 +319,8 @@ def test_four_bar_with_a_tilted_hinge_has_the_published_deflections(
 
 @pytest.mark.exudyn
 @pytest.mark.parametrize("row", BAUCHAU)
-def test_multibody_simulation_of_the_tilted_four_bar_has_published_deflections(row):
-    """The model has 8 elements per bar and agrees to 1e-4 in plane, 0.1 % across."""
+def test_simulated_four_bar_with_tilted_hinge_has_published_deflections(row):
+    """Deflections agree to 1e-4 in plane and 0.1 % out of plane."""
     angle, *published = row
     posture = place_robot(bauchau(1), joints={"crank": -angle})
     model = SimulationModel(links="beam", elements=8)

@@ -1,4 +1,4 @@
-"""Results do not depend on which end of the tree is its root."""
+"""Tests with the base and the platform of a robot exchanged."""
 
 from dataclasses import dataclass
 
@@ -17,7 +17,14 @@ from forcefit.stiffness.screws import (
 
 @dataclass
 class Body:
-    """Body from one joint to the next: its transform, and error and K at its end."""
+    """Body between two joints.
+
+    Attributes:
+        T: transform from its start to its end.
+        error: geometric error at its end.
+        K: stiffness at its end.
+        joint: arguments of the joint at its end.
+    """
 
     T: np.ndarray
     error: np.ndarray
@@ -25,7 +32,7 @@ class Body:
     joint: dict
 
     def reversed(self, joint):
-        """The same body described from its end, with the joint at its start."""
+        """Return the body with start and end exchanged."""
         back = screw_map(self.T[:3, 3], self.T[:3, :3])
         C = back @ np.linalg.inv(self.K) @ back.T
         C = (C + C.T) / 2
@@ -33,7 +40,7 @@ class Body:
 
 
 def random_legs(rng):
-    """Two legs of three bodies from the base to a platform, and the platform."""
+    """Return two legs with three bodies each, and the pose of the platform."""
     legs, platform = [], transform([0.4, 0.1, 0.3], rotation_matrix([0.3, -0.2, 0.5]))
     for _ in range(2):
         leg, here = [], np.eye(4)
@@ -63,7 +70,7 @@ def body(rng, T, kind):
 
 
 def robot_of(legs):
-    """The robot from its base; the first leg's end is the platform."""
+    """Return the robot with these legs.  The end of the first leg is the platform."""
     frames, ends = [], []
     for name, leg in zip("ab", legs, strict=True):
         above = "base"
@@ -78,7 +85,7 @@ def robot_of(legs):
 
 
 def from_the_platform(legs):
-    """Every leg reversed: bodies are inverted, and joints move to their other end."""
+    """Return the legs with base and platform exchanged."""
     turned = []
     for leg in legs:
         joints = [{}, *(one.joint for one in leg)]
@@ -87,7 +94,7 @@ def from_the_platform(legs):
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_solution_does_not_depend_on_the_root_of_the_tree(seed):
+def test_solution_does_not_depend_on_choice_of_base(seed):
     legs, platform = random_legs(np.random.default_rng(seed))
     one = solve_assembly(home_posture(robot_of(legs)))
     other = solve_assembly(home_posture(robot_of(from_the_platform(legs))))
@@ -96,12 +103,12 @@ def test_solution_does_not_depend_on_the_root_of_the_tree(seed):
     assert other.energy_without_clearance == pytest.approx(
         one.energy_without_clearance, rel=1e-9
     )
-    # the old base's error seen from the platform is the platform's, turned round
+    # the base moves relative to the platform by the inverse motion
     R, p = platform[:3, :3], platform[:3, 3]
     expected = -screw_map(R.T @ p, R.T) @ one.platform_screw
     size = np.abs(expected).reshape(2, 3).max(axis=1).repeat(3)
     assert np.all(np.abs(other.platform_screw - expected) < 1e-5 * size)
-    # what a body carries: its other end, and the other side exerts it
+    # the wrench of each body acts at its other end, with the opposite sign
     for name in "ab":
         for k, this in enumerate(legs["ab".index(name)]):
             here = one.wrenches[one.posture.robot.index(f"{name}{k}")]
@@ -112,8 +119,8 @@ def test_solution_does_not_depend_on_the_root_of_the_tree(seed):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_exact_energy_depends_on_the_root_by_second_order_only(seed):
-    """Errors before and after a rotation differ by second-order terms only."""
+def test_exact_energy_depends_on_choice_of_base_by_second_order(seed):
+    """Errors before and after a rotation differ by second-order terms."""
     legs, _ = random_legs(np.random.default_rng(seed))
     off = []
     for s in (1.0, 0.5):

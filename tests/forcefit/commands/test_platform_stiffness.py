@@ -128,7 +128,7 @@ def test_load_without_an_equilibrium_has_exit_status_1(run):
     answer = json.loads(out)
     assert status == 1
     assert answer["status"] == "solver failed"
-    assert "out of balance" in answer["reason"]
+    assert "force residual" in answer["reason"]
 
 
 def test_stiffness_reports_a_platform_far_from_its_nominal_pose(run):
