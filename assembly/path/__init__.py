@@ -1,5 +1,5 @@
-"""Errors of a robot that moves along a path, inertial effects included.
+"""Errors of a robot along a path, including inertial effects.
 
-The drives follow the path exactly.  Start with
+The drives follow the path without control errors.  Start with
 :func:`forcefit.assembly.path.path_errors.path_errors`.
 """

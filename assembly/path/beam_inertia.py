@@ -1,16 +1,16 @@
-r"""Inertial loads and weight of a moving beam, as wrenches at its ends and sections.
+r"""Inertial loads and weight of a moving beam.
 
-A beam moves almost as a rigid body, so its load per length is linear along the beam,
-q(x) = rho A (g - a(x)), and its moment per length is constant, m = -rho (J alpha +
-omega x J omega). At the tip of a cantilever, this load causes the same deflection as
+A beam moves approximately as a rigid body.  Its load per length is linear along the
+beam, q(x) = rho A (g - a(x)).  Its moment per length is constant, m = -rho (J alpha +
+omega x J omega).  At the tip of a cantilever, this load causes the same deflection as
 
     F_x = Q_0 / 2 + Q_1 / 3                M_x = m_x L / 2
     F_y = Q_0 / 2 + Q_1 (7/20 + phi/3) / (1 + phi) + m_z / (1 + phi)
     M_z = Q_0 L / 12 + Q_1 L / 8 - L (F_y - m_z) / 2 + ..
 
 and so on, where Q_0 = q(0) L, Q_1 = (q(L) - q(0)) L and phi = 12 E I / (k G A L^2). For
-phi = 0 this is the consistent mass matrix times the rigid accelerations of both ends.
-The remainder of the load acts at the base.
+phi = 0, it is the product of the consistent mass matrix and the accelerations of both
+ends.  The rest of the load acts at the base.
 
 ======  =======================================================  ==============
 symbol  meaning                                                  unit
@@ -38,13 +38,13 @@ from forcefit.stiffness.beam.beam import section_axes
 from forcefit.stiffness.beam.beam_stress import peak_beam_stress, section_stress
 from forcefit.stiffness.beam.sections import declared_section
 
-_ALONG = 33  # number of sections, between which a parabola is off by at most 1e-3
+_ALONG = 33  # number of sections; a parabolic moment is accurate to 1e-3
 _FEW = 34  # number of fibres used to locate the section with the largest stress
 
 
 @dataclass(frozen=True, eq=False)
 class BeamData:
-    """Properties of a beam with a density, as required to compute its loads.
+    """Properties of a beam with a density.
 
     Attributes:
         length: [m] length of the beam.
@@ -82,13 +82,13 @@ class BeamLoad:
         return replace(self, q0=self.q0[which], q1=self.q1[which], m=self.m[which])
 
     def at_tip(self) -> NDArray:
-        """Return the equivalent wrench (k, 6) [N m, N] at the tip, section axes."""
+        """Return the equivalent wrench at the tip, section axes, (k, 6) [N m, N]."""
         L, phi = self.data.length, self.data.shear
         Q0, Q1, m = self.q0 * L, self.q1 * L, self.m
         wrench = np.zeros((len(Q0), 6))
         wrench[:, 0] = m[:, 0] * L / 2
         wrench[:, 3] = Q0[:, 0] / 2 + Q1[:, 0] / 3
-        # a moment about z bends the beam towards y, a moment about y away from z
+        # a positive moment about z bends the beam towards y, but about y away from z
         for plane, across, about, sign in ((0, 1, 2, 1.0), (1, 2, 1, -1.0)):
             p = phi[plane]
             of_increase = Q1[:, across] * (7 / 20 + p / 3) / (1 + p)
@@ -100,13 +100,13 @@ class BeamLoad:
         return wrench
 
     def at_base(self, tip: NDArray) -> NDArray:
-        """Return the wrench (k, 6) [N m, N] at the base: total load minus tip wrench.
+        """Return the equivalent wrench at the base.
 
         Args:
             tip: equivalent wrench at the tip, from :meth:`at_tip`.
 
         Returns:
-            The wrench at the base, in the section's axes.
+            (k, 6) [N m, N] total load minus tip wrench, in section axes.
         """
         L = self.data.length
         x = np.array([1.0, 0.0, 0.0])
@@ -116,14 +116,14 @@ class BeamLoad:
         return np.concatenate([moment, force - tip[:, 3:]], axis=1)
 
     def on_sections(self, tip: NDArray, count: int = _ALONG) -> NDArray:
-        """Compute the wrenches that sections transmit, from the base to the tip.
+        """Return the internal wrenches at sections from the base to the tip.
 
         Args:
-            tip: (k, 6) [N m, N] wrench transmitted at the tip, section's axes.
+            tip: (k, 6) [N m, N] internal wrench at the tip, section axes.
             count: number of equally spaced sections.
 
         Returns:
-            (k, count, 6) [N m, N] wrenches of the outer part on the inner part.
+            (k, count, 6) [N m, N] wrenches, positive as at the tip.
         """
         L, x = self.data.length, np.array([1.0, 0.0, 0.0])
         s = L * np.linspace(1, 0, count)[:, None]  # distance from the tip
@@ -136,7 +136,7 @@ class BeamLoad:
 
 @lru_cache(maxsize=256)
 def beam_data(frame: Frame) -> BeamData | None:
-    """Return the beam data of a frame, or None without a beam or a density."""
+    """Return the data of a frame's beam, or None without a beam or a density."""
     link = frame.link
     if not isinstance(link, BeamLink) or not link.density:
         return None
@@ -146,8 +146,7 @@ def beam_data(frame: Frame) -> BeamData | None:
     second = np.array([section.I_y + section.I_z, section.I_y, section.I_z])
     turned = np.kron(np.eye(2), axes)
     C = turned.T @ link_compliance(frame) @ turned
-    # a force deflects the tip by L^3 / 3 E I + L / k G A, a moment rotates it by
-    # L / E I
+    # compliances L^3 / 3 E I + L / k G A for a force and L / E I for a moment
     bending, turning = np.diag(C)[[4, 5]], np.diag(C)[[2, 1]]
     shear = 12 * (bending - turning * length**2 / 3) / (turning * length**2)
     return BeamData(
@@ -156,7 +155,7 @@ def beam_data(frame: Frame) -> BeamData | None:
 
 
 def beam_load(motion: Motion, body: int, gravity: NDArray) -> BeamLoad | None:
-    """Compute the inertial load and weight of a body's beam.
+    """Return the inertial load and the weight of a beam.
 
     Args:
         motion: motion at k points.
@@ -189,16 +188,18 @@ def beam_load(motion: Motion, body: int, gravity: NDArray) -> BeamLoad | None:
 
 
 def beam_stress(frame: Frame, load: BeamLoad, tip: NDArray) -> NDArray:
-    """Compute the largest von Mises stress along a beam under its distributed load.
+    """Return the largest von Mises stress of a beam under its distributed load.
+
+    A subset of the fibres is evaluated at 33 sections, and all fibres at the section
+    with the largest stress.
 
     Args:
-        frame: frame of the beam, which has a declared cross-section.
+        frame: frame of a beam with a declared cross-section.
         load: distributed load at k points of the path.
-        tip: (k, 6) [N m, N] wrench transmitted at the tip, in the frame's axes.
+        tip: (k, 6) [N m, N] internal wrench at the tip, in the frame's axes.
 
     Returns:
-        (k,) [Pa] stress. A tenth of the fibres is evaluated at 33 sections, then all
-        fibres at the section with the largest stress.
+        (k,) [Pa] stress.
     """
     assert isinstance(frame.link, BeamLink)
     R = load.data.axes

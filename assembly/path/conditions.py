@@ -1,10 +1,8 @@
-"""Conditions at the instants of a path: loads and effects in the robot file.
+"""Loads on a robot, and effects in its robot file, along a path.
 
 At each instant, the effects change errors, springs, masses, loads and gravity as in
-``forcefit assembly solve``. Errors of the measuring device do not affect the pose
-error. Two kinds of effects are rejected, because a path does not supply their inputs:
-effects that depend on the direction of approach, and functions that depend on earlier
-readings of a campaign.
+``forcefit assembly solve``.  Effects that depend on the direction of approach or on
+earlier measurements are not supported.
 """
 
 from collections.abc import Mapping
@@ -40,10 +38,9 @@ class Equilibria:
     """Minimum-energy solutions of a robot with n frames at k instants of a path.
 
     Attributes:
-        assembly: solutions of all instants.
-        wrenches: (k, n, 6) [N m, N] wrenches of the links' springs; NaN without a
-            solution.
-        joint_wrenches: (k, n, 6) [N m, N] wrenches transmitted by the joints.
+        assembly: solutions at all instants.
+        wrenches: (k, n, 6) [N m, N] wrenches in the links; NaN without a solution.
+        joint_wrenches: (k, n, 6) [N m, N] wrenches in the joints.
     """
 
     assembly: Assembly
@@ -52,23 +49,22 @@ class Equilibria:
 
 
 def check_effects(robot: Robot, under: Covariates) -> None:
-    """Reject effects that cannot be computed along a path.
+    """Raise BadInput for effects that are not supported along a path.
 
     Args:
         robot: robot with the effects in its file.
         under: values of covariates by name.
 
     Raises:
-        BadInput: an effect depends on the direction of approach, on earlier readings of
-            a campaign or on finite motions; or a covariate is unknown or missing.
+        BadInput: an effect depends on the direction of approach, on earlier
+            measurements or on finite motions, or a covariate is unknown or missing.
     """
     session = str(under.get("session"))
     for name in (*robot.effects, *robot.session_effects.get(session, ())):
         if "approach" in LIBRARY[name].needs:
             raise BadInput(
-                f'{robot.name}: effect "{name}" depends on the side from which a '
-                "position is approached; a path has no such side, because its drives "
-                "reverse; expected a robot without this effect"
+                f'{robot.name}: effect "{name}" depends on the direction of approach, '
+                "which a path does not define; expected a robot without this effect"
             )
     for function in robot.functions:
         if function.session not in (None, session):
@@ -77,15 +73,15 @@ def check_effects(robot: Robot, under: Covariates) -> None:
         if form is not None and form.remembers:
             raise BadInput(
                 f'{robot.name}: the function "{function.title}" has the form '
-                f'"{function.form}", which depends on earlier rows of a campaign; a '
-                "path has no such rows; expected a robot without this function"
+                f'"{function.form}", which depends on earlier rows of a campaign and '
+                "is not supported along a path; expected a robot without this function"
             )
     approached = covariates_of(robot, [session]).get("approach")
     if approached is not None:
         raise BadInput(
-            f'{robot.name}: the function "{approached}" depends on the side from which '
-            "a position is approached; a path has no such side, because its drives "
-            "reverse; expected a robot without this function"
+            f'{robot.name}: the function "{approached}" depends on the direction of '
+            "approach, which a path does not define; expected a robot without this "
+            "function"
         )
     check_covariates(robot, under)
 
@@ -94,20 +90,20 @@ def path_conditions(
     robot: Robot, postures: Posture, times: NDArray, load: ArrayLike | None,
     gravity: ArrayLike | None, under: Covariates,
 ) -> Conditions:  # fmt: skip
-    """Apply the effects in the robot file, and return the conditions at k instants.
+    """Return the conditions at k instants, with the effects in the robot file.
 
     Args:
         robot: robot with the effects in its file.
         postures: k postures of this robot.
-        times: (k,) [s] instants.  The covariate ``time`` at an instant is the instant
-            plus the value in ``under``.
+        times: (k,) [s] instants.  The covariate ``time`` is the sum of the instant and
+            the value in ``under``.
         load: (6,) [N m, N] constant load on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] gravity in base axes; None for no gravity.
         under: values of covariates by name.
 
     Returns:
-        Conditions with k rows. Their robot includes the effects in its springs,
-        clearances and masses, and an elastic foundation as an additional frame.
+        Conditions with k rows.  The effects change the springs, clearances and masses
+        of their robot.  An elastic foundation is an additional frame.
     """
     covariates: dict[str, ArrayLike] = dict(under)
     if "time" in covariates:
@@ -121,14 +117,14 @@ def path_conditions(
 
 
 def equilibria(conditions: Conditions, loads: InertialLoads) -> Equilibria:
-    """Solve problem (22), the minimum energy, under loads on the bodies.
+    """Solve problem (22) at k instants under loads on the bodies.
 
     Args:
         conditions: conditions at k instants.
         loads: d'Alembert loads and weight at each instant.
 
     Returns:
-        The solutions. Instants with nonlinear compliances are solved one by one.
+        The solutions.
     """
     if not (conditions.laws or conditions.yields):
         found = solve_assembly(
@@ -159,7 +155,7 @@ def _equilibrium(
 def equilibrium_of_row(
     conditions: Conditions, loads: InertialLoads, i: int
 ) -> Assembly:
-    """Solve problem (22), the minimum energy, at one instant under loads on the bodies.
+    """Solve problem (22) at one instant under loads on the bodies.
 
     Args:
         conditions: conditions at k instants.
@@ -171,7 +167,7 @@ def equilibrium_of_row(
 
     Raises:
         CannotAssemble: a loop cannot be closed.
-        FreeMotion: a load acts along a motion without stiffness.
+        FreeMotion: a load acts on a motion without stiffness.
         SolverFailed: the solver failed, or contacts did not converge.
     """
     # the loads on the bodies include the weight

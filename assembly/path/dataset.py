@@ -1,4 +1,4 @@
-"""Errors along a path as labelled arrays over time."""
+"""Errors along a path as an xarray data set over time."""
 
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
@@ -18,15 +18,15 @@ if TYPE_CHECKING:
 
 
 def path_dataset(errors: "PathErrors", command: str = "") -> "xarray.Dataset":
-    """Convert the errors along a path to a data set.
+    """Return the errors along a path as a data set.
 
     Args:
         errors: errors along a path.
-        command: command line for the provenance; empty if there is none.
+        command: command line for the provenance, or an empty string.
 
     Returns:
-        Data set over ``time``, with the unit and meaning of every variable. Robot,
-        profile and program are its attributes.
+        Data set over ``time`` with the unit and meaning of each variable.  Its
+        attributes include the robot, the profile and the program.
     """
     import xarray
 

@@ -1,12 +1,10 @@
-"""Rates and accelerations of idle motions, which are not constrained.
+"""Velocities and accelerations of idle motions.
 
-An idle motion, such as the spin of a rod between two ball joints, is prevented neither
-by drives nor by platform or closures. No force acts along it, so its momentum stays
-zero on a path that starts from rest: a round rod has no angular momentum about its
-axis, and its kinetic energy is minimal. The acceleration of an idle motion follows from
-the condition that the loads do no work on it. Both rules are exact if the inertia does
-not depend on the idle motion, for example if a body's mass is rotationally symmetric
-about its spin axis.
+An idle motion, such as the spin of a rod between two ball joints, moves neither a drive
+nor the platform.  No force acts along it.  Its momentum is therefore zero along a path
+that starts from rest, and its acceleration is such that the loads do no work on it.
+This is exact if the inertia does not depend on the idle motion, for example for a rod
+that is rotationally symmetric about its axis.
 """
 
 from dataclasses import dataclass, replace
@@ -18,18 +16,18 @@ from forcefit.assembly.kinematics.nominal import motion_screws, size_of
 from forcefit.assembly.path.inertial_loads import InertialLoads, inertial_loads
 from forcefit.assembly.path.motion import Motion, carries_matrix, idle_rates
 
-_MASSLESS = 1e-12  # inertias below this fraction of the largest inertia count as zero
-_ROUNDING = 1e-20  # fraction of mass x (longest arm)^2: squared arm error 1e-10
+_MASSLESS = 1e-12  # [-] threshold of a zero inertia, relative to the largest inertia
+_ROUNDING = 1e-20  # [-] round-off of an inertia, relative to mass x (longest arm)^2
 
 
 @dataclass(frozen=True, eq=False)
 class IdleMotions:
-    """The d idle motions of a robot of n frames at k points of a path.
+    """Idle motions of a robot along a path.
 
     Attributes:
-        joints: (k, n, d) [rad or m] joint rates per unit of each idle motion.
+        joints: (k, n, d) [rad or m] rates of n joints in d idle motions at k points.
         bodies: d twists (k, n, 6) of the bodies, at the base's origin.
-        parts: d twists (k, n, 6) of the parts that the joints carry.
+        parts: d twists (k, n, 6) of the bodies that each joint moves.
         inverse: (k, d, d) pseudoinverse of the inertia of the idle motions.
     """
 
@@ -40,10 +38,10 @@ class IdleMotions:
 
 
 def idle_motions(motion: Motion) -> IdleMotions | None:
-    """Return the idle motions of a robot along a path, or None if there are none.
+    """Return the idle motions of a robot along a path, or None.
 
     Args:
-        motion: motion at k points, of which only postures and equations are used.
+        motion: motion at k points.  Its velocities are not used.
     """
     if not motion.free:
         return None
@@ -62,14 +60,14 @@ def idle_motions(motion: Motion) -> IdleMotions | None:
 
 
 def momentum_free_rates(motion: Motion, idle: IdleMotions) -> NDArray:
-    """Compute joint rates for which the momentum along idle motions is zero.
+    """Return changes of the joint rates that make the momentum of idle motions zero.
 
     Args:
         motion: motion at k points with arbitrary rates of the idle motions.
         idle: idle motions of the robot.
 
     Returns:
-        (k, n) [rad/s or m/s] rates to add to the rates of the motion.
+        (k, n) [rad/s or m/s] changes of the joint rates.
     """
     momentum = _momentum(motion, idle, motion.twists)
     amounts = -idle.inverse @ momentum[..., None]
@@ -79,7 +77,7 @@ def momentum_free_rates(motion: Motion, idle: IdleMotions) -> NDArray:
 def with_idle_accelerations(
     motion: Motion, idle: IdleMotions, gravity: NDArray
 ) -> Motion:
-    """Return a motion with the accelerations of idle motions under the loads.
+    """Return a motion that includes the accelerations of idle motions.
 
     Args:
         motion: motion at k points.
@@ -96,14 +94,14 @@ def with_idle_accelerations(
 
 
 def _momentum(motion: Motion, idle: IdleMotions, twists: NDArray) -> NDArray:
-    """Compute the momentum (k, d) [kg m^2/s or kg m/s] of twists along idle motions."""
-    # inertial loads of bodies at rest are linear in the accelerations
+    """Return the momentum along each idle motion, (k, d) [kg m^2/s or kg m/s]."""
+    # without velocities, the inertial loads are linear in the accelerations
     still = replace(motion, twists=np.zeros_like(twists), accelerations=twists)
     return -_work(motion, idle, inertial_loads(still))
 
 
 def _work(motion: Motion, idle: IdleMotions, loads: InertialLoads) -> NDArray:
-    """Compute the power (k, d) of loads per unit rate of each idle motion."""
+    """Return the power of loads per unit rate of each idle motion, (k, d)."""
     p = motion.postures.transforms[..., :3, 3]
     return np.stack([
         _power(loads.bodies, body, p) + _power(loads.carried, part, p)
@@ -112,16 +110,15 @@ def _work(motion: Motion, idle: IdleMotions, loads: InertialLoads) -> NDArray:
 
 
 def _inverse(inertia: NDArray, least: NDArray) -> NDArray:
-    """Return the pseudoinverse (k, d, d) of symmetric matrices.
+    """Return the pseudoinverses of symmetric matrices.
 
     Args:
         inertia: (k, d, d) inertia of the idle motions.
-        least: (k,) eigenvalues up to this value count as 0. Without this limit, the
-            inertia of a massless spin, or of one with all mass on its axis, would be
-            mere round-off, and its acceleration arbitrarily large.
+        least: (k,) threshold of a zero eigenvalue, which is the round-off of the
+            inertia.
 
     Returns:
-        The pseudoinverses.
+        (k, d, d) pseudoinverses.
     """
     values, vectors = np.linalg.eigh(inertia)
     least = np.maximum(least, _MASSLESS * values[:, -1])[:, None]
@@ -130,7 +127,7 @@ def _inverse(inertia: NDArray, least: NDArray) -> NDArray:
 
 
 def _largest_inertia(motion: Motion, bodies: list[NDArray]) -> NDArray:
-    """Return the inertia (k,) that results if all mass moves like the fastest body."""
+    """Return the inertia if the whole mass moved with the fastest body, (k,)."""
     along = np.zeros_like(motion.twists)
     along[..., 3] = 1.0
     still = replace(motion, twists=np.zeros_like(along), accelerations=along)
@@ -142,7 +139,7 @@ def _largest_inertia(motion: Motion, bodies: list[NDArray]) -> NDArray:
 
 
 def _power(wrenches: NDArray, twists: NDArray, points: NDArray) -> NDArray:
-    """Compute the power (k,) of wrenches (k, n, 6) at points on twists at the base."""
+    """Return the power of wrenches (k, n, 6), summed over all bodies, (k,)."""
     velocity = twists[..., 3:] + np.cross(twists[..., :3], points)
     power = np.sum(wrenches[..., :3] * twists[..., :3], axis=(1, 2))
     return power + np.sum(wrenches[..., 3:] * velocity, axis=(1, 2))

@@ -6,10 +6,9 @@ origin O, are
     F = m (g - a_c),        M = c x F - (I alpha + omega x I omega)
 
 The inertia of a beam with a density is distributed along the beam
-(:mod:`forcefit.assembly.path.beam_inertia`). The inertia of a mesh link follows from
-its consistent mass matrix (:mod:`forcefit.assembly.path.mesh_inertia`).  The part of
-the load at the link's start acts on the body that carries the link. If the whole load
-acted at the tip instead, a beam would deflect up to 1.5 times too much.
+(:mod:`forcefit.assembly.path.beam_inertia`).  The inertia of a mesh link follows from
+its mass matrix (:mod:`forcefit.assembly.path.mesh_inertia`).  These loads act at both
+ends of the link.  The load at the start of the link acts on the previous body.
 """
 
 from dataclasses import dataclass
@@ -29,10 +28,10 @@ class InertialLoads:
 
     Attributes:
         bodies: (k, n, 6) [N m, N] loads on each body, at its frame's origin.
-        carried: (k, n, 6) [N m, N] loads on the part that each frame's joint carries,
-            at the same point.
-        at_tips: (k, n, 6) [N m, N] part of ``bodies`` due to distributed loads of the
-            links, at the frames in their axes.
+        carried: (k, n, 6) [N m, N] loads on the body that each frame's joint moves, at
+            the frame's origin.
+        at_tips: (k, n, 6) [N m, N] loads of links with a density, which ``bodies``
+            includes, in the axes of the frames.
         beams: distributed loads of beams, by frame index.
     """
 
@@ -43,7 +42,7 @@ class InertialLoads:
 
 
 def inertial_loads(motion: Motion, gravity: ArrayLike | None = None) -> InertialLoads:
-    """Compute the loads due to the bodies' accelerations and weight.
+    """Return the loads due to the accelerations and weights of all bodies.
 
     Args:
         motion: motion of a robot of n frames at k points.
@@ -53,7 +52,7 @@ def inertial_loads(motion: Motion, gravity: ArrayLike | None = None) -> Inertial
         The loads on all bodies.
 
     Raises:
-        BadInput: a mesh link was not solved when the robot was loaded.
+        BadInput: the finite-element model of a mesh link was not solved.
     """
     robot, T = motion.postures.robot, motion.postures.transforms
     g = np.zeros(3) if gravity is None else np.asarray(gravity, dtype=float)
@@ -77,7 +76,7 @@ def inertial_loads(motion: Motion, gravity: ArrayLike | None = None) -> Inertial
         at_tips[:, i] = tip
         bodies[:, i] += _turned(R, tip)
         parent = robot.parents[i]
-        if parent >= 0:  # without a parent, the base carries the load
+        if parent >= 0:  # otherwise, the load acts on the base
             start = T[:, i, :3, 3] - R @ span
             arm = start - T[:, parent, :3, 3]
             wrench = _turned(R, base)
@@ -87,7 +86,7 @@ def inertial_loads(motion: Motion, gravity: ArrayLike | None = None) -> Inertial
 
 
 def _of_rigid_body(motion: Motion, i: int, gravity: NDArray) -> NDArray:
-    """Compute the load (k, 6) [N m, N] of a body's rigid mass at its frame."""
+    """Return the load of a rigid body at its frame's origin, (k, 6) [N m, N]."""
     frame, T = motion.postures.robot.frames[i], motion.postures.transforms[:, i]
     R, p = T[:, :3, :3], T[:, :3, 3]
     c = R @ frame.centre_of_mass
@@ -100,6 +99,6 @@ def _of_rigid_body(motion: Motion, i: int, gravity: NDArray) -> NDArray:
 
 
 def _turned(R: NDArray, wrenches: NDArray) -> NDArray:
-    """Express wrenches (k, 6) in axes rotated by one or by k rotations."""
+    """Return wrenches (k, 6) in rotated axes."""
     halves = wrenches.reshape(len(wrenches), 2, 3)
     return (halves @ np.swapaxes(R, -1, -2)).reshape(len(wrenches), 6)

@@ -1,9 +1,9 @@
-"""Inertial loads and weight of a moving mesh link, as wrenches at its two ends.
+"""Inertial loads and weight of a moving mesh link.
 
-The consistent mass matrix of the link's finite elements is condensed to the motions of
-its two interfaces and multiplied by the accelerations of both ends. If mass lies away
-from the line between the ends, the resulting force and moment may differ from those of
-the rigid link; this difference is divided between both ends.
+The mass matrix of the finite elements is condensed to the motions of both ends of the
+link and multiplied by their accelerations.  The resultant may differ from that of the
+rigid link if its centre of mass is not between the ends.  Half of the difference is
+added at each end.
 """
 
 import numpy as np
@@ -17,7 +17,7 @@ from forcefit.stiffness.screws import skew
 def mesh_end_wrenches(
     motion: Motion, body: int, gravity: NDArray
 ) -> tuple[NDArray, NDArray, NDArray]:
-    """Compute the inertial load and weight of a body's mesh link at its ends.
+    """Return the inertial load and the weight of a mesh link as wrenches at its ends.
 
     Args:
         motion: motion at k points.
@@ -25,11 +25,11 @@ def mesh_end_wrenches(
         gravity: (3,) [m/s^2] gravity in base axes.
 
     Returns:
-        (k, 6) [N m, N] wrenches at the tip, which is the frame's origin, and at the
-        base, in the frame's axes; and the vector (3,) [m] from base to tip.
+        (k, 6) [N m, N] wrenches at the tip (the frame's origin) and at the base, in the
+        frame's axes; and the vector (3,) [m] from base to tip.
 
     Raises:
-        BadInput: the link was not solved when the robot was loaded.
+        BadInput: the finite-element model of the link was not solved.
     """
     M, span = mesh_link_mass(motion.postures.robot.frames[body])
     T = motion.postures.transforms[:, body]
@@ -47,7 +47,7 @@ def mesh_end_wrenches(
         for point in (tip, tip - R @ span)
     )
     e = span / np.linalg.norm(span)
-    # angular accelerations of both ends in the rigid acceleration field of the link
+    # angular accelerations that agree with the slope of the acceleration along the axis
     slope = alpha + np.cross(e, omega) * (omega @ e)[:, None]
     wrenches = -np.hstack([slope, at_base, slope, at_tip]) @ M.T
     base, tip = wrenches[:, :6], wrenches[:, 6:]
@@ -58,7 +58,7 @@ def mesh_end_wrenches(
 
 
 def _at_tip(wrenches: NDArray, span: NDArray) -> NDArray:
-    """Express base wrenches (k, 6) at the tip."""
+    """Return base wrenches (k, 6) with the tip as reference point."""
     read = wrenches.copy()
     read[:, :3] -= np.cross(span, wrenches[:, 3:])
     return read
@@ -67,7 +67,7 @@ def _at_tip(wrenches: NDArray, span: NDArray) -> NDArray:
 def _rigid(
     M: NDArray, span: NDArray, omega: NDArray, alpha: NDArray, at_tip: NDArray
 ) -> NDArray:
-    """Compute the (k, 6) wrench of the rigid link's inertia and weight at its tip.
+    """Return the inertial load and the weight of the rigid link at its tip.
 
     Args:
         M: (12, 12) mass matrix.
@@ -77,7 +77,7 @@ def _rigid(
         at_tip: (k, 3) [m/s^2] acceleration of the tip minus gravity.
 
     Returns:
-        The wrench [N m, N].
+        (k, 6) [N m, N] wrench.
     """
     ends = np.eye(12, 6)
     ends[6:] = np.eye(6)
@@ -85,6 +85,7 @@ def _rigid(
     rigid = ends.T @ M @ ends
     wrench = -np.hstack([alpha, at_tip]) @ rigid
     wrench[:, :3] -= np.cross(omega, omega @ rigid[:3, :3])
-    first = np.array([rigid[2, 4], rigid[0, 5], rigid[1, 3]])  # mass times centre
+    # mass times vector from the tip to the centre of mass
+    first = np.array([rigid[2, 4], rigid[0, 5], rigid[1, 3]])
     wrench[:, 3:] -= np.cross(omega, np.cross(omega, first))
     return wrench

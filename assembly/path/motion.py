@@ -1,4 +1,4 @@
-r"""Velocities and accelerations of all bodies while the platform follows a path.
+r"""Velocities and accelerations of all bodies of a robot along a path.
 
 ======  ======================  ============  =====================================
 symbol  code                    shape         meaning
@@ -6,18 +6,17 @@ symbol  code                    shape         meaning
 S_j     ``screws``              (k, n, 6)     unit motion of joint j, base axes
 q', q'' ``rates``               (k, n)        rates and second derivatives of the
                                               joint coordinates
-V_j     ``twists``              (k, n, 6)     [omega, v] of body j, v of the point
-                                              of the body at the base's origin
+V_j     ``twists``              (k, n, 6)     twist [omega, v] of body j, with v at
+                                              the origin of the base
 A_j     ``accelerations``       (k, n, 6)     derivative of V_j with time
 ======  ======================  ============  =====================================
 
-With V = sum S_j q'_j over the joints that carry a body, its derivative is A = sum S_j
-q''_j + [V_j, S_j] q'_j.  At a closure, the two frames have equal V and A. Together with
-the equations for the prescribed pose components, these equations are linear in q' and
-then in q'', with the same matrix. If closures and path leave a rate undetermined, for
-example the spin of a rod between two ball joints, the minimum-norm solution is used.
-:mod:`forcefit.assembly.path.idle_motions` adds the rates determined by the inertia of
-the bodies. Poses are not differentiated by finite differences.
+The twist of a body is V = sum S_j q'_j over the joints that move it, and its derivative
+is A = sum S_j q''_j + [V_j, S_j] q'_j.  Both frames of a closure have the same V and A.
+These equations and those of the prescribed pose components are linear in q' and in q'',
+with the same matrix.  The minimum-norm solution is used if a rate is undetermined, for
+example the spin of a rod between two ball joints.  Such motions are then corrected by
+:mod:`forcefit.assembly.path.idle_motions`.
 
 Sources:
     Featherstone (2008), Rigid Body Dynamics Algorithms, chapters 2 and 8 (spatial
@@ -35,12 +34,12 @@ from forcefit.assembly.kinematics.posture import POSE, Posture, pose_components
 from forcefit.assembly.kinematics.se3 import bracket, stumpff, turn_jacobian
 from forcefit.assembly.model.robot import Robot
 
-# relative size below which a singular value of closures and path counts as zero, as in
+# [-] threshold of a zero singular value, relative to the largest, as in
 # forcefit.assembly.kinematics.closure_rates
 _SINGULAR = 1e-6
-# threshold for a zero singular value, as a multiple of the closures' nominal error
+# [-] threshold of a zero singular value, relative to the nominal loop-closure error
 _NOISE = 30.0
-_PRESCRIBED = 1e-4  # largest relative error of a prescribed velocity
+_PRESCRIBED = 1e-4  # [-] largest relative error of a prescribed velocity
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,10 +52,10 @@ class Motion:
         second_rates: (k, n) [rad/s^2 or m/s^2] second derivatives.
         twists: (k, n, 6) [rad/s, m/s] twists of the bodies, at the base's origin.
         accelerations: (k, n, 6) [rad/s^2, m/s^2] time derivatives of the twists.
-        free: largest number of joint motions prescribed neither by path nor by
-            closures.
-        equations: (k, 6 closures + c, n) closures and prescribed pose components per
-            unit joint rate.
+        free: largest number of joint motions that neither the path nor the loop
+            closures prescribe.
+        equations: (k, 6 closures + c, n) coefficients of the joint rates in the
+            equations of loop closures and of c prescribed components.
     """
 
     postures: Posture
@@ -68,11 +67,11 @@ class Motion:
     equations: NDArray
 
     def acceleration_of(self, body: int, points: NDArray) -> NDArray:
-        """Compute the acceleration of points of a body.
+        """Return the acceleration of a point of a body.
 
         Args:
             body: index of the body's frame.
-            points: (k, 3) [m] points in base axes.
+            points: (k, 3) [m] position of the point at k instants, base axes.
 
         Returns:
             (k, 3) [m/s^2] accelerations in base axes.
@@ -83,10 +82,10 @@ class Motion:
 
 
 class NotFollowed(Exception):
-    """The robot cannot follow the path at some of its points.
+    """Raised if the robot cannot follow a path.
 
     Attributes:
-        row: index of the first such point.
+        row: index of the first point at which this is impossible.
     """
 
     def __init__(self, row: int) -> None:
@@ -104,17 +103,17 @@ def follow_path(
         postures: k postures on the path.
         names: c prescribed components of one kind, ``tx`` .. or ``q.<frame>``. If joint
             coordinates are prescribed, unnamed drives do not move.
-        path: (k, c) components [m or rad], their first and their second derivatives.
-        idle: (k, n) [rad/s or m/s] joint rates prescribed neither by closures nor by
-            path (:func:`forcefit.assembly.path.idle_motions.momentum_free_rates`),
-            added to the minimum-norm solution.
+        path: (k, c) components [m or rad], first derivatives and second derivatives.
+        idle: (k, n) [rad/s or m/s] joint rates of idle motions, which are added to the
+            minimum-norm solution, see
+            :func:`forcefit.assembly.path.idle_motions.momentum_free_rates`.
 
     Returns:
         The motion.
 
     Raises:
-        NotFollowed: the platform cannot reach the prescribed velocity or acceleration
-            at a singular posture.
+        NotFollowed: the prescribed velocity or acceleration is impossible because the
+            posture is singular.
     """
     robot = postures.robot
     if names[0] not in POSE:
@@ -152,7 +151,7 @@ def follow_path(
 def _with_all_drives(
     robot: Robot, names: tuple[str, ...], path: tuple[NDArray, NDArray, NDArray]
 ) -> tuple[tuple[str, ...], tuple[NDArray, NDArray, NDArray]]:
-    """Add the unnamed drives, which do not move, to a joint path."""
+    """Return a path of joint coordinates with the missing drives, which do not move."""
     drives = [f"q.{f.name}" for f in robot.frames if f.actuated]
     still = [name for name in drives if name not in names]
     zero = np.zeros((len(path[0]), len(still)))
@@ -161,24 +160,24 @@ def _with_all_drives(
 
 
 def _units(robot: Robot) -> NDArray:
-    """Return the unit (n,) of each joint coordinate: 1 rad, or the robot's size."""
+    """Return the unit of each joint coordinate, 1 rad or the robot's size, (n,)."""
     slides = np.array([f.joint == "prismatic" for f in robot.frames])
     return np.where(slides, size_of(robot), 1.0)
 
 
 def carries_matrix(robot: Robot) -> NDArray:
-    """Return an (n, n) matrix, 1 where the column's joint carries the row's body."""
+    """Return a matrix whose entry (i, j) is 1 if joint j moves body i, (n, n)."""
     return robot.on_path - np.eye(len(robot.frames))
 
 
 def _closures(robot: Robot) -> NDArray:
-    """Return the indices (closures, 2) of the frames that each closure joins."""
+    """Return the indices of the two frames of each closure, (closures, 2)."""
     pairs = [[robot.index(name) for name in pair] for pair in robot.closures]
     return np.array(pairs, dtype=int).reshape(-1, 2)
 
 
 def _of_closures(robot: Robot, bodies: NDArray) -> NDArray:
-    """Return the screw differences (k, 6 closures) between each closure's frames."""
+    """Return the screw of the first frame minus that of the second, (k, 6 closures)."""
     pairs = _closures(robot)
     first, second = bodies[:, pairs[:, 0]], bodies[:, pairs[:, 1]]
     return (first - second).reshape(len(bodies), 6 * len(pairs))
@@ -187,12 +186,11 @@ def _of_closures(robot: Robot, bodies: NDArray) -> NDArray:
 def _equations(
     postures: Posture, names: tuple[str, ...], values: NDArray, S: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Return closures and prescribed pose components per unit joint rate.
+    """Return the equations of loop closures and prescribed components.
 
     Returns:
-        (k, 6 closures + c, n) matrix, with translational closure rows divided by the
-        robot's size; and (6 closures,) factors, which are this size for translational
-        rows and 1 for rotational rows.
+        (k, 6 closures + c, n) coefficients of the joint rates, with translations in
+        closures divided by the robot's size; and (6 closures,) these divisors.
     """
     robot = postures.robot
     carries = carries_matrix(robot)
@@ -214,7 +212,7 @@ def _equations(
 
 
 def _rotations(postures: Posture, names: tuple[str, ...], values: NDArray) -> NDArray:
-    """Return the platform's rotation vectors (k, 3) [rad] as defined by the path."""
+    """Return the rotation vectors of the platform along the path, (k, 3) [rad]."""
     turn = pose_components(postures.platform)[:, 3:]
     for k, name in enumerate(names):
         if name[0] == "r":
@@ -223,7 +221,7 @@ def _rotations(postures: Posture, names: tuple[str, ...], values: NDArray) -> ND
 
 
 def _of_pose(postures: Posture, names: tuple[str, ...], values: NDArray) -> NDArray:
-    """Return the rates (k, c, 6) of the pose components per unit twist."""
+    """Return the rates of the pose components per unit twist, (k, c, 6)."""
     rates = np.zeros((len(values), 6, 6))
     p = postures.platform[:, :3, 3]
     rates[:, :3, 3:] = np.eye(3)
@@ -239,7 +237,7 @@ def _second_of_pose(
     postures: Posture, names: tuple[str, ...], values: NDArray, twists: NDArray,
     drift: NDArray,
 ) -> NDArray:  # fmt: skip
-    """Return second derivatives (k, c) of prescribed components for q'' = 0."""
+    """Return the second derivatives of prescribed components for q'' = 0, (k, c)."""
     if names[0] not in POSE:
         return np.zeros_like(values)
     row = postures.robot.index(postures.robot.platform)
@@ -258,9 +256,9 @@ def _second_of_pose(
 
 
 def _turning_of_jacobian(turn: NDArray, rate: NDArray) -> NDArray:
-    """Return J' r' (k, 3), with J of :func:`turn_jacobian` along r(t).
+    """Return J' r', where J is the :func:`turn_jacobian` of r(t), (k, 3).
 
-    For a rotation vector r, J r' = r' + c_2 r x r' + c_3 r x (r x r'). The time
+    For a rotation vector r, J r' = r' + c_2 r x r' + c_3 r x (r x r').  The time
     derivative of c_k is (k c_(k+2) - c_(k+1)) r.r'.
     """
     _, _, _, c3, c4, c5 = (c[..., 0] for c in stumpff(turn))
@@ -272,21 +270,21 @@ def _turning_of_jacobian(turn: NDArray, rate: NDArray) -> NDArray:
 
 
 def _inverse(values: NDArray, mismatch: Any) -> NDArray:
-    """Return inverse singular values (k, m); 0 where a singular value counts as 0."""
+    """Return inverse singular values, 0 below the threshold, (k, m)."""
     least = np.maximum(_SINGULAR, _NOISE * np.broadcast_to(mismatch, len(values)))
     kept = values > least[:, None] * values[:, :1]
     return np.where(kept, 1 / np.where(kept, values, 1.0), 0.0)
 
 
 def idle_rates(motion: Motion) -> NDArray:
-    """Find joint motions that neither drives nor closures nor the platform prevent.
+    """Return joint motions that move neither a drive nor the platform.
 
     Args:
         motion: motion of a robot of n frames at k points.
 
     Returns:
         (k, n, d) [rad or m] d independent motions, where d is the smallest number at
-        any point.
+        all points.
     """
     robot = motion.postures.robot
     passive = np.array([f.passive for f in robot.frames])
@@ -300,7 +298,7 @@ def idle_rates(motion: Motion) -> NDArray:
 
 
 def _check_followed(E: NDArray, q: NDArray, right: NDArray) -> None:
-    """Reject velocities and accelerations that the robot cannot reach."""
+    """Raise NotFollowed if the equations have no solution."""
     left = np.abs((E @ q[..., None])[..., 0] - right).max(axis=1, initial=0.0)
     size = np.abs(right).max(axis=1, initial=0.0)
     size = np.maximum(size, 1e-6 * size.max(initial=0.0))

@@ -1,9 +1,9 @@
 """Errors of a robot along a path: deflection, forces and stress due to acceleration.
 
-At each instant, inertia and weight of the bodies act as loads on the posture, and
-problem (22) is solved as for a robot at rest (quasi-static). Vibration, damping and the
-inertia of the deflection itself are neglected, which is valid if the motion takes many
-periods of the first natural mode and its acceleration does not jump.
+At each instant, inertia and weight act as static loads, and problem (22) is solved.
+Vibration, damping and the inertial forces of the deflection itself are neglected.  This
+is valid if the path takes many periods of the first natural frequency, and if the
+acceleration is continuous.
 """
 
 from collections.abc import Callable
@@ -45,20 +45,20 @@ from forcefit.assembly.sweeps.targets import goals_of, of_joints
 from forcefit.inputs.table import BadInput, nearest
 from forcefit.results.display import Figures, html_table, largest, short_repr
 
-ASSUMPTIONS = ("none", "frozen", "free")  # for the bounds in problem (27) under load
+ASSUMPTIONS = ("none", "frozen", "free")  # for the pose error bounds, problem (27)
 if TYPE_CHECKING:
     import pandas
     import xarray
 
 _BLOCK = 2000  # number of points that are solved and stored together
-_BLOCK_OF_TANGENTS = 100  # number of points per block with tangents at each point
-# results that also exist at points without a solution
+_BLOCK_OF_TANGENTS = 100  # this number if the compliance is computed under load
+# results that are available at points without an equilibrium
 _GEOMETRIC = {
     "coordinates", "rates", "second_rates", "platform", "platform_velocity",
     "platform_acceleration", "compliance",
 }  # fmt: skip
 Progress = Callable[[int, int], None]
-# function that returns the arrays of the block that begins at a given point
+# function that returns the stored arrays of a block, or computes them
 Recall = Callable[..., tuple[NDArray, ...]]
 
 
@@ -67,28 +67,32 @@ class PathErrors:
     """Results for a robot with n frames at k instants of a path.
 
     Attributes:
-        robot: the robot with the effects in its file applied, where an elastic
-            foundation is an additional frame.
+        robot: the robot with the effects in its file applied.  An elastic foundation is
+            an additional frame.
         declared: the robot as declared in its file.
-        trajectory: path as components of the pose over time.
-        assumption: assumption for the bounds in problem (27); ``"none"`` for no bounds.
+        trajectory: components of the pose over time.
+        assumption: assumption for the pose error bounds, problem (27); ``"none"`` for
+            no bounds.
         state: state for which the compliance is computed.
         frequency: [Hz] lowest natural frequency along the path; NaN if unknown.
-        free: largest number of joint motions prescribed neither by path nor by
-            closures; these stay at rest.
+        free: largest number of joint motions that neither the path nor the loop
+            closures prescribe.
         arrays: results by name, with k rows each; NaN where the status is not ok.
 
-            - ``coordinates``, ``rates``, ``second_rates`` (k, n) of all joints
-            - ``platform`` (k, 4, 4), ``platform_velocity``, ``platform_acceleration``
-              (k, 6) of its origin
-            - ``platform_screw`` (k, 6) pose error due to geometric errors and all loads
-            - ``inertial_screw`` (k, 6) its change due to the accelerations
-            - ``energy`` (k,), ``wrench`` (k, n, 6) that bodies transmit at their tips,
-              ``drive_force`` (k, drives), ``stress`` (k, links)
-            - ``compliance`` (k, 6, 6) of the platform in this state
-            - with an assumption ``rotation_error``, ``translation_error`` (k, 2)
-        status: (k,) ``"ok"``, or why a point has no solution.
-        reason: (k,) message where the status is not ok.
+            - ``coordinates``, ``rates``, ``second_rates`` (k, n): joint coordinates and
+              their derivatives
+            - ``platform`` (k, 4, 4): pose of the platform
+            - ``platform_velocity``, ``platform_acceleration`` (k, 6): at its origin
+            - ``platform_screw`` (k, 6): pose error due to geometric errors and loads
+            - ``inertial_screw`` (k, 6): change of the pose error due to accelerations
+            - ``energy`` (k,): elastic energy
+            - ``wrench`` (k, n, 6): wrench that each body transmits at its tip
+            - ``drive_force`` (k, drives): forces of the drives
+            - ``stress`` (k, links): largest stress in each link
+            - ``compliance`` (k, 6, 6): compliance of the platform
+            - ``rotation_error``, ``translation_error`` (k, 2): pose error bounds
+        status: (k,) ``"ok"``, or the kind of failure at this instant.
+        reason: (k,) error message if the status is not ok.
     """
 
     robot: Robot
@@ -105,35 +109,36 @@ class PathErrors:
     __repr__, _repr_html_ = short_repr, html_table
 
     def _figures(self) -> Figures:
-        """Return the values that ``forcefit assembly path`` prints first."""
+        """Return the quantities that are shown in the short representation."""
         solved = self.status == OK
         return {
             "points": f"{len(self.status)}, {np.count_nonzero(solved)} solved",
-            "deflection by acceleration": f"at most {largest(self.inertial[solved])}",
+            "deflection due to acceleration": f"at most "
+            f"{largest(self.inertial[solved])}",
             "path time": f"{self.trajectory.duration:.4g} s, {self.periods:.3g} "
             "periods of the first natural frequency",
         }
 
     def to_xarray(self) -> "xarray.Dataset":
-        """Return the data set over ``time`` that ``--output`` writes."""
+        """Return an xarray data set over ``time``."""
         from forcefit.assembly.path.dataset import path_dataset
 
         return path_dataset(self)
 
     def to_pandas(self) -> "pandas.DataFrame":
-        """Return a table with one row per instant and columns (variable, component)."""
+        """Return a pandas table with a row for each instant."""
         from forcefit.assembly.model.tables import frame_table
 
         return frame_table(self.to_xarray(), "time")
 
     @property
     def inertial(self) -> NDArray:
-        """(k, 6) [rad, m] change of the platform's error due to the accelerations."""
+        """Change of the pose error due to the accelerations, (k, 6) [rad, m]."""
         return self.arrays["inertial_screw"]
 
     @property
     def periods(self) -> float:
-        """[-] duration of the path in periods of the first mode; NaN if unknown."""
+        """Duration of the path in periods of the first mode; NaN if unknown."""
         return self.trajectory.duration * self.frequency
 
     @property
@@ -143,7 +148,7 @@ class PathErrors:
 
     @property
     def drive_units(self) -> dict[str, str]:
-        """Unit of each drive's force: N for a prismatic joint, N m for others."""
+        """Unit of each drive force, N for prismatic joints and N m for all others."""
         return {
             f.name: "N" if f.joint == "prismatic" else "N m"
             for f in self.robot.frames if f.actuated
@@ -162,7 +167,7 @@ def path_errors(
     progress: Progress = lambda done, most: None,
     recall: Recall = lambda compute, *given: compute(),
 ) -> PathErrors:
-    """Compute the errors of a robot along a path, inertial effects included.
+    """Compute the errors of a robot along a path, including inertial effects.
 
     Args:
         robot: robot with masses.
@@ -171,23 +176,23 @@ def path_errors(
         load: (6,) [N m, N] constant load on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] gravity in base axes; None for no gravity.
         assumption: assumption for the pose error bounds, problem (27): ``"frozen"`` or
-            ``"free"``; ``"none"`` for no bounds.
-        state: state for which the compliance is computed: ``"nominal"``, ``"contact"``
-            or ``"exact"``; the latter two under the loads at each instant.
-        under: values by name of the covariates on which the effects in the robot file
-            depend, such as ``temperature``; ``time`` is its value at the first instant.
-        progress: called with the numbers of solved points and of all points.
+            ``"free"``, or ``"none"`` for no bounds.
+        state: state for which the compliance is computed: ``"nominal"``, or
+            ``"contact"`` or ``"exact"`` under the loads at each instant.
+        under: values of covariates by name, such as ``temperature``, for the effects in
+            the robot file.  ``time`` is the time at the first instant.
+        progress: function called with the number of solved points and the number of
+            all points.
         recall: method of :class:`forcefit.assembly.statistics.replay.Replay`, which
-            stores blocks of points; by default every block is computed.
+            stores blocks of points.  By default, all blocks are computed.
 
     Returns:
         The results at all instants.
 
     Raises:
-        BadInput: no body has a mass, an effect cannot be computed along a path, a point
-            is out of reach or cannot be followed, the assumption or the state is
-            unknown, a link has a mass while the state is ``"exact"``, or an effect is
-            nonlinear while the state is not ``"nominal"``.
+        BadInput: no body has a mass, an effect is not supported along a path or in this
+            state, the robot cannot follow the path, the assumption or the state is
+            unknown, or a link has a density and the state is ``"exact"``.
     """
     if assumption not in ASSUMPTIONS:
         hint = nearest(assumption, ASSUMPTIONS)
@@ -229,7 +234,7 @@ class _Asked:
 
 
 def _recalled(asked: _Asked, rows: slice, recall: Recall) -> dict[str, NDArray]:
-    """Return the results of a block of points, stored or newly computed."""
+    """Return the stored or computed results of a block of points."""
 
     def compute() -> tuple[NDArray, ...]:
         solved = _solve(asked, rows)
@@ -242,7 +247,7 @@ def _recalled(asked: _Asked, rows: slice, recall: Recall) -> dict[str, NDArray]:
 
 
 def _solve(asked: _Asked, rows: slice) -> dict[str, NDArray]:
-    """Compute the results of a block of points."""
+    """Return the results of a block of points."""
     there = _placed(asked, rows)
     conditions = _conditions(asked, rows, there)
     gravity = conditions.gravity
@@ -303,7 +308,7 @@ def _placed(asked: _Asked, rows: slice) -> Posture:
 
 
 def _conditions(asked: _Asked, rows: slice, there: Posture) -> Conditions:
-    """Return loads and effects of a block of points."""
+    """Return the conditions at a block of points."""
     times = asked.trajectory.times
     return path_conditions(
         asked.robot, there, times[rows] - times[0], asked.load, asked.gravity,
@@ -312,7 +317,7 @@ def _conditions(asked: _Asked, rows: slice, there: Posture) -> Conditions:
 
 
 def _verdicts(asked: _Asked, rows: slice, there: Posture) -> list[tuple[str, str]]:
-    """Check whether each posture is usable; return status and reason."""
+    """Return the status of each posture, and the reason."""
     names = asked.trajectory.names
     goals = goals_of(names, asked.robot, asked.trajectory.values[rows])
     target = Target(coordinates=goals) if of_joints(names) else Target(goals)
@@ -322,23 +327,23 @@ def _verdicts(asked: _Asked, rows: slice, there: Posture) -> list[tuple[str, str
 def _followed(
     asked: _Asked, rows: slice, postures: Posture, idle: NDArray | float = 0.0
 ) -> Motion:
-    """Compute the motion of a block of points, idle motions included."""
+    """Return the motion at a block of points."""
     path = asked.trajectory
     at = path.values[rows], path.first[rows], path.second[rows]
     try:
         return follow_path(postures, path.names, at, idle)
     except NotFollowed as error:
         raise BadInput(
-            f"path at {path.times[rows][error.row]:.6g} s: the platform cannot have "
-            "the velocity and acceleration of the path here; expected a path without "
-            "singular postures"
+            f"path at {path.times[rows][error.row]:.6g} s: found a singular posture, "
+            "in which the platform cannot move with the velocity and acceleration of "
+            "the path; expected a path without singular postures"
         ) from None
 
 
 def _statuses(
     assembly: Assembly, verdict: list[tuple[str, str]]
 ) -> tuple[NDArray, NDArray]:
-    """Return the status of each point and its reason."""
+    """Return the status of each point, and the reason."""
     status, reason = assembly.status.astype(object), assembly.reason.astype(object)
     for i, (geometric, why) in enumerate(verdict):
         if geometric and (status[i] == OK or geometric == SINGULAR):
@@ -347,14 +352,14 @@ def _statuses(
 
 
 def _at_origin(twists: NDArray, T: NDArray) -> NDArray:
-    """Express twists (k, 6) at the platform's origin."""
+    """Return twists (k, 6) at the platform's origin."""
     moved = twists.copy()
     moved[:, 3:] += np.cross(twists[:, :3], T[:, :3, 3])
     return moved
 
 
 def _drive_forces(robot: Robot, joint_wrenches: NDArray) -> NDArray:
-    """Return each drive's force (k, drives) [N m or N] on the part that it carries."""
+    """Return the force of each drive on the body that it moves, (k, drives)."""
     driven = [i for i, f in enumerate(robot.frames) if f.actuated]
     screws = np.array([own_screw(robot.frames[i]) for i in driven]).reshape(-1, 6)
     forces: NDArray = -np.einsum("kdi,di->kd", joint_wrenches[:, driven], screws)
@@ -362,7 +367,7 @@ def _drive_forces(robot: Robot, joint_wrenches: NDArray) -> NDArray:
 
 
 def _stresses(robot: Robot, loads: InertialLoads, tips: NDArray) -> NDArray:
-    """Compute the largest stress (k, links) [Pa] in every link with a known stress."""
+    """Return the largest stress in each link with a stress model, (k, links) [Pa]."""
     links = stressed_links(robot)
     stress = np.full((len(tips), len(links)), np.nan)
     solved = np.isfinite(tips).all(axis=(1, 2))

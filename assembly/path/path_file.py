@@ -1,4 +1,4 @@
-"""Path tables: poses or joint coordinates, with or without times."""
+"""Files of paths: poses or joint coordinates, with or without times."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,12 +14,12 @@ from forcefit.inputs.table import BadInput, quoted
 
 @dataclass(frozen=True, eq=False)
 class PathTable:
-    """Rows of a path.
+    """Poses or joint coordinates of a path.
 
     Attributes:
         names: components, either ``tx`` .. or ``q.<frame>``.
         values: (rows, components) [m or rad] values.
-        times: (rows,) [s] increasing times; None if the table has no times.
+        times: (rows,) [s] increasing times, or None.
         labels: names of the rows, for messages.
     """
 
@@ -34,19 +34,19 @@ class PathTable:
 
 
 def read_path(file: Path | str, robot: Robot) -> PathTable:
-    """Read the table of a path from a CSV file.
+    """Read a path from a CSV file.
 
     Args:
-        file: CSV file with one row per pose and columns ``pose.tx`` .. [m, rad] or
-            ``q.<frame>``, optionally ``time`` [s] and ``id``.
-        robot: robot whose actuated joints may be columns.
+        file: CSV file with a row for each pose and the columns ``pose.tx`` .. [m, rad]
+            or ``q.<frame>``, and optionally ``time`` [s] and ``id``.
+        robot: robot that moves along the path.
 
     Returns:
-        The table.
+        The path.
 
     Raises:
-        BadInput: the table is invalid, has fewer than two rows, or its times do not
-            increase; the message contains line and column.
+        BadInput: the file is invalid, has fewer than two rows, or its times do not
+            increase.
     """
     targets = read_targets(file, robot, extra=("time",))
     names = tuple(name for name in targets.names if name != "time")
@@ -60,7 +60,7 @@ def read_path(file: Path | str, robot: Robot) -> PathTable:
 
 
 def check_path(table: PathTable, where: str = "path") -> None:
-    """Reject a path with fewer than two rows or with times that do not increase.
+    """Raise BadInput for a path without two poses or with times that do not increase.
 
     Args:
         table: the path.

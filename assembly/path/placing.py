@@ -1,4 +1,4 @@
-"""Postures along a path, and the first natural frequency at them."""
+"""Postures and the first natural frequency along a path."""
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,13 +16,13 @@ from forcefit.assembly.solvers.conic import SolverFailed
 from forcefit.assembly.sweeps.targets import goals_of, of_joints
 from forcefit.inputs.table import BadInput
 
-_FREQUENCIES = 5  # number of postures at which the first frequency is computed
+_FREQUENCIES = 5  # number of postures at which natural frequencies are computed
 
 
 def placed(
     robot: Robot, names: tuple[str, ...], values: NDArray
 ) -> tuple[list[Posture | None], list[str]]:
-    """Compute the posture for each row of a path, or the reason why none exists.
+    """Return the posture at each point of a path.
 
     Args:
         robot: any robot.
@@ -30,15 +30,15 @@ def placed(
         values: (k, components) [m or rad] values.
 
     Returns:
-        For each row, a posture or None, and a reason, which is empty if there is a
-        posture.
+        For each point, a posture and an empty string, or None and the reason why the
+        robot cannot reach the point.
     """
     place = place_many_joints if of_joints(names) else place_many
     return place(robot, goals_of(names, robot, values))
 
 
 def check_rows(robot: Robot, table: PathTable, where: str = "path") -> None:
-    """Reject a path with a row that is out of the robot's reach.
+    """Raise BadInput if the robot cannot reach a point of a path.
 
     Args:
         robot: any robot.
@@ -46,7 +46,7 @@ def check_rows(robot: Robot, table: PathTable, where: str = "path") -> None:
         where: file of the path, for messages.
 
     Raises:
-        BadInput: a row is out of reach; the message names the row.
+        BadInput: the robot cannot reach a row.
     """
     _, reasons = placed(robot, table.names, table.values)
     for row, reason in enumerate(reasons):
@@ -58,18 +58,18 @@ def first_frequency(
     robot: Robot, trajectory: Trajectory, load: ArrayLike | None,
     gravity: ArrayLike | None, under: Covariates,
 ) -> float:  # fmt: skip
-    """Compute the lowest natural frequency along a path with locked drives.
+    """Return the lowest natural frequency along a path with locked drives.
 
     Args:
         robot: any robot.
         trajectory: the path.
-        load: (6,) [N m, N] load on the platform, which affects the secant stiffness of
-            nonlinear effects.
+        load: (6,) [N m, N] load on the platform, which determines the secant stiffness
+            of nonlinear effects.
         gravity: (3,) [m/s^2] gravity in base axes; None for no gravity.
-        under: covariates of the robot's effects by name.
+        under: values of the covariates of the robot's effects, by name.
 
     Returns:
-        [Hz] frequency of the robot with its effects; NaN if nothing vibrates.
+        [Hz] frequency of the robot with its effects; NaN if it has no vibration mode.
     """
     count = len(trajectory.times)
     rows = np.unique(np.linspace(0, count - 1, _FREQUENCIES).astype(int))

@@ -1,14 +1,16 @@
-"""Rest-to-rest motion profiles: path fraction s over relative time t, 0 to 1.
+"""Rest-to-rest motion profiles: fraction s of the path at the relative time t.
 
-==========  ========================  ==========  ============  ====================
-name        s                         peak speed  acceleration  jumps
-==========  ========================  ==========  ============  ====================
-quintic     10 t^3 - 15 t^4 + 6 t^5   1.875       5.774         of the jerk
-seventh     35 t^4 - 84 t^5 + 70 t^6  2.1875      7.513         none of the jerk
+The peaks of speed and acceleration refer to s and t, which range from 0 to 1.
+
+==========  ========================  ======  ============  =======================
+name        s                         speed   acceleration  discontinuity
+==========  ========================  ======  ============  =======================
+quintic     10 t^3 - 15 t^4 + 6 t^5   1.875   5.774         jerk
+seventh     35 t^4 - 84 t^5 + 70 t^6  2.1875  7.513         derivative of the jerk
             - 20 t^7
-trapezoid   thirds of the time: speed 1.5         4.5           of the acceleration
-            grows, stays, falls
-==========  ========================  ==========  ============  ====================
+trapezoid   constant acceleration,    1.5     4.5           acceleration
+            speed and deceleration
+==========  ========================  ======  ============  =======================
 
 Sources:
     Biagiotti & Melchiorri (2008), Trajectory Planning for Automatic Machines and
@@ -25,18 +27,18 @@ Law = Callable[[NDArray], tuple[NDArray, NDArray, NDArray]]
 
 
 def _polynomial(*coefficients: float) -> Law:
-    """Return the profile of a polynomial with given coefficients, constant first."""
+    """Return a polynomial profile, with coefficients in ascending order."""
     s = Polynomial(coefficients)
     return lambda t: (s(t), s.deriv()(t), s.deriv(2)(t))
 
 
 def _trapezoid(t: NDArray) -> tuple[NDArray, NDArray, NDArray]:
-    """Return s, s' and s'': acceleration, constant speed, deceleration in thirds."""
-    left = np.minimum(t, 1 - t)  # time from the nearest end
+    """Return s, s' and s'' of the trapezoidal profile."""
+    left = np.minimum(t, 1 - t)  # time to the nearest end
     ramp = left < 1 / 3
     way = np.where(ramp, 2.25 * left**2, 1.5 * left - 0.25)
     speed = np.where(ramp, 4.5 * left, 1.5)
-    # at a jump, the acceleration in the outer third is returned
+    # at t = 1/3 and 2/3, the acceleration of the first or last third is returned
     size = np.where(left <= 1 / 3, 4.5, 0.0)
     return np.where(t <= 0.5, way, 1 - way), speed, np.where(t <= 0.5, size, -size)
 

@@ -19,11 +19,12 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _ASSUMED = (
-    "Quasi-static: inertia and weight act as loads at each instant. Vibration, damping "
-    "and the inertia of the deflection itself are neglected.",
-    "Drives follow the nominal path; their control errors are neglected.",
-    "Bodies move as the rigid nominal robot; a beam's mass acts along the beam.",
-    "Small screws: the closures are linear in errors and deflections.",
+    "Inertia and weight act as static loads at each instant. Vibration, damping and "
+    "inertial forces due to the deflection are neglected.",
+    "Control errors of the drives are neglected.",
+    "The accelerations are those of the rigid nominal robot. The mass of a beam is "
+    "distributed along the beam.",
+    "The model is linear in errors and deflections.",
 )
 
 
@@ -50,7 +51,7 @@ def plot_path(errors: PathErrors) -> "Figure":
     panels[3].plot(times, sizes(errors)["acceleration"])
     for panel, words in zip(
         panels,
-        ("deflection by acceleration [mm]", "rotation by acceleration [mrad]",
+        ("deflection due to acceleration [mm]", "rotation due to acceleration [mrad]",
          "drive force [N m or N]", "acceleration of the platform [m/s²]"),
         strict=True,
     ):  # fmt: skip
@@ -66,7 +67,7 @@ def plot_path(errors: PathErrors) -> "Figure":
 def path_page(
     summary: Mapping[str, Any], errors: PathErrors, provenance: Provenance
 ) -> str:
-    """Format the results along a path as an HTML page.
+    """Return the HTML report of the results along a path.
 
     Args:
         summary: result of :func:`forcefit.assembly.path.summary.path_summary`.
@@ -74,7 +75,7 @@ def path_page(
         provenance: the command and its input files.
 
     Returns:
-        Self-contained HTML.
+        HTML without references to other files.
     """
     peaks = summary.get("largest", {})
     return page(
@@ -100,7 +101,7 @@ def path_page(
 
 
 def _good(summary: Mapping[str, Any]) -> bool | None:
-    """Return True if all instants are solved, None if vibration may be significant."""
+    """Return the verdict on a path, or None if vibration may be significant."""
     if summary["status"] != OK:
         return False
     periods = summary["periods"] or 0.0
@@ -108,17 +109,20 @@ def _good(summary: Mapping[str, Any]) -> bool | None:
 
 
 def _verdict(summary: Mapping[str, Any]) -> str:
-    """Format the conclusion on a path's errors as one sentence."""
+    """Return the conclusion on the errors along a path as a sentence."""
     if "largest" not in summary:
         return f"No point has a result: {summary.get('reason', summary['status'])}."
     peak = summary["largest"].get("inertial_translation")
     if peak is None:
-        verdict = "The deflection by acceleration is unknown: no equilibrium at rest"
+        verdict = (
+            "The deflection due to acceleration is unknown, because the robot has no "
+            "equilibrium at rest"
+        )
     else:
         size = Value(peak["value"], "m").text
-        verdict = f"Acceleration deflects the platform by at most {size}"
+        verdict = f"The deflection due to acceleration is at most {size}"
     if _good(summary) is None:
-        verdict += "; vibration, which is neglected, may exceed it"
+        verdict += "; the neglected vibration may exceed this value"
     if summary["status"] != OK:
         verdict += f"; {summary['status']} {summary.get('reason', '')}"
     return verdict + "."
@@ -135,15 +139,15 @@ def _tiles(summary: Mapping[str, Any]) -> list[Tile]:
             tiles.append(Tile(f"Largest {words}", [Value(peak["value"], unit)], note))
     if summary["periods"] is not None and np.isfinite(summary["periods"]):
         periods: list[str | Value] = [
-            f"of {summary['first_frequency']:.4g} Hz; below {LEAST_PERIODS:g}, "
-            "vibration adds to these numbers."
+            f"of {summary['first_frequency']:.4g} Hz; with less than "
+            f"{LEAST_PERIODS:g} periods, vibration is significant."
         ]
         tiles.append(Tile("Periods", [f"{summary['periods']:.3g}"], periods))
     return tiles
 
 
 def _largest(summary: Mapping[str, Any]) -> str:
-    """Format the largest values and drive forces as a table."""
+    """Return a table of the largest values and drive forces."""
     rows = [
         [LARGEST[key][0], Value(peak["value"], LARGEST[key][1]),
          Value(peak["time"], "s"), peak.get("frame", "")]
@@ -162,16 +166,16 @@ def _largest(summary: Mapping[str, Any]) -> str:
 
 
 def _charts(errors: PathErrors) -> list[str]:
-    """Plot deflection, rotation, drive forces and acceleration."""
+    """Return charts of deflection, rotation, drive forces and acceleration."""
     screws = errors.inertial.T
     forces = dict(zip(errors.drives, errors.arrays["drive_force"].T, strict=True))
     of_size = sizes(errors)
     return [
         grid(
             _chart(errors, dict(zip(SCREW[:3], screws[:3], strict=True)), "rad",
-                   "rotation by acceleration"),
+                   "rotation due to acceleration"),
             _chart(errors, dict(zip(SCREW[3:], screws[3:], strict=True)), "m",
-                   "deflection by acceleration"),
+                   "deflection due to acceleration"),
         ),
         grid(
             _chart(errors, forces, "N m or N", "drive force"),
@@ -184,7 +188,7 @@ def _charts(errors: PathErrors) -> list[str]:
 def _chart(
     errors: PathErrors, lines: Mapping[str, NDArray], unit: str, title: str
 ) -> str:
-    """Plot lines over time, with the title as the caption."""
+    """Return a chart of lines over time."""
     traces = [
         {"type": "scatter", "mode": "lines", "x": errors.trajectory.times, "y": values,
          "name": name, "line": {"color": COLOURS[k % len(COLOURS)]}}

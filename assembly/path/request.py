@@ -1,4 +1,4 @@
-"""Errors along a path from the options of ``forcefit assembly path``."""
+"""Errors along a path for the options of ``forcefit assembly path``."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -41,13 +41,13 @@ class PathTimes:
     """Timing of a path.
 
     Attributes:
-        profile: name of a profile from rest to rest in
+        profile: name of a rest-to-rest profile in
             :data:`forcefit.assembly.path.profiles.PROFILES`; None if times are given.
         duration: [s] duration of the profile.
         speed: [m/s, or rad/s or m/s of drives] largest speed of the profile.
         acceleration: [m/s^2, or rad/s^2 or m/s^2 of drives] largest acceleration of the
             profile.
-        interval: [s] time between the rows of a table without times.
+        interval: [s] time between the poses of a path without times.
         ends: ``"rest"`` or ``"moving"``, for a path with times.
         points: number of equally spaced instants.
     """
@@ -62,7 +62,7 @@ class PathTimes:
 
 
 def _accepting_times(function: Callable[P, R]) -> Callable[P, R]:
-    """Make a function accept ``times`` as in the last release."""
+    """Return a function that accepts the deprecated argument ``times``."""
 
     @wraps(function)
     def call(*args: P.args, **kwargs: P.kwargs) -> R:
@@ -97,44 +97,43 @@ def errors_along_path(
     command: str = "",
     progress: Progress = lambda done, most: None,
 ) -> PathErrors:
-    """Compute the errors of a robot along a path, inertial effects included.
+    """Compute the errors of a robot along a path, including inertial effects.
 
     Args:
-        robot: a robot with masses, a robot file, or a built-in name.
-        path: rows of poses or joint coordinates, or a CSV file with such rows, with or
-            without a column ``time``; see
+        robot: robot with masses, robot file, or name of a built-in robot.
+        path: poses or joint coordinates, or a CSV file for
             :func:`forcefit.assembly.path.path_file.read_path`.
-        profile: name of a profile from rest to rest in
+        profile: name of a rest-to-rest profile in
             :data:`forcefit.assembly.path.profiles.PROFILES`; None if times are given.
         duration: [s] duration of the profile.
         speed: [m/s, or rad/s or m/s of drives] largest speed of the profile.
         acceleration: [m/s^2, or rad/s^2 or m/s^2 of drives] largest acceleration of the
             profile.
-        interval: [s] time between the rows of a table without times.
+        interval: [s] time between the poses of a path without times.
         ends: ``"rest"`` or ``"moving"``, for a path with times.
         points: number of equally spaced instants.
         load: (6,) [N m, N] constant load on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] gravity in base axes; None for no gravity.
         assumption: assumption for the pose error bounds, problem (27): ``"frozen"`` or
-            ``"free"``; ``"none"`` for no bounds.
+            ``"free"``, or ``"none"`` for no bounds.
         state: state for which the compliance of the platform is computed:
-            ``"nominal"``; or ``"contact"`` or ``"exact"`` under the loads of each
+            ``"nominal"``, or ``"contact"`` or ``"exact"`` under the loads at each
             instant.
-        drive_force: [N m or N] force by drive name. Such a drive applies this force
-            instead of holding its coordinate.
-        under: values by name of the covariates on which the effects in the robot file
-            depend, such as ``temperature``; ``time`` is its value at the first instant.
+        drive_force: [N m or N] forces of force-controlled drives by name.
+        under: values of covariates by name, such as ``temperature``, for the effects in
+            the robot file.  ``time`` is the time at the first instant.
         output: NetCDF file to write.  Finished points are stored in
-            ``<output>.journal``. After an interruption, the same call resumes from it.
-        command: command line for the provenance in the file; empty if there is none.
-        progress: called with the numbers of solved points and of all points.
+            ``<output>.journal``.  After an interruption, the same call resumes from it.
+        command: command line for the provenance in the file, or an empty string.
+        progress: function called with the number of solved points and the number of
+            all points.
 
     Returns:
         The results at all instants.
 
     Raises:
-        BadInput: the path, its times or the robot are invalid, a row is out of reach,
-            the journal belongs to another path, or a file cannot be written.
+        BadInput: the path, its times or the robot are invalid, the robot cannot reach a
+            pose, the journal belongs to another path, or a file cannot be written.
     """
     machine = robot if isinstance(robot, Robot) else load_robot(robot)
     if drive_force:
@@ -159,7 +158,7 @@ def errors_along_path(
 def _identity(
     robot: Robot, trajectory: Trajectory, asked: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """Return values that must be equal to resume a path from a journal."""
+    """Return the values that must be equal to those in a journal to resume a path."""
     digest = sha256(trajectory.law.encode())
     for name in ("times", "values", "first", "second"):
         digest.update(np.ascontiguousarray(getattr(trajectory, name)).tobytes())
@@ -180,7 +179,7 @@ def _identity(
 def trajectory_of(
     robot: Robot, path: PathTable | str | Path, times: PathTimes
 ) -> Trajectory:
-    """Build the trajectory of a path, and check that the robot reaches all its rows.
+    """Return the trajectory of a path that the robot can reach.
 
     Args:
         robot: robot with masses.
@@ -191,7 +190,8 @@ def trajectory_of(
         The trajectory.
 
     Raises:
-        BadInput: for the same reasons as in :func:`errors_along_path`.
+        BadInput: the path, its times or the robot are invalid, or the robot cannot
+            reach a pose.
     """
     check_masses(robot)
     where = "path" if isinstance(path, PathTable) else str(path)
@@ -208,7 +208,7 @@ def trajectory_of(
 
 
 def _with_times(table: PathTable, times: PathTimes, where: str) -> PathTable:
-    """Add times to the rows; reject contradictory options."""
+    """Return a path with times, or raise BadInput for contradictory options."""
     limits = {
         "--duration": (times.duration, "s"), "--speed": (times.speed, "m/s"),
         "--acceleration": (times.acceleration, "m/s^2"),
@@ -226,18 +226,18 @@ def _with_times(table: PathTable, times: PathTimes, where: str) -> PathTable:
     }  # fmt: skip
     found = [name for name, there in given.items() if there]
     if len(found) != 1:
-        expected = "expected a column time, --interval or --profile, one of them"
+        expected = "expected one of a column time, --interval and --profile"
         raise BadInput(
             f"{where}: found {' and '.join(found) or 'no times'}; {expected}"
         )
     if times.profile is None:
         for option in ("--duration", "--speed", "--acceleration"):
             if limits[option][0] is not None:
-                raise BadInput(f"{option}: found without --profile, which it requires")
+                raise BadInput(f"{option}: found no --profile, which it requires")
     elif times.ends == "moving":
         raise BadInput(
-            "--ends moving: found together with --profile, whose motion starts and "
-            "ends at rest; expected only one of them"
+            "--ends moving: found --profile, whose motion starts and ends at rest; "
+            "expected only one of these options"
         )
     if times.interval is None:
         return table

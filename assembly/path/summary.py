@@ -1,4 +1,4 @@
-"""Summary of the errors along a path, as plain values and as text."""
+"""Summary of the errors along a path, as a dictionary and as text."""
 
 from typing import Any
 
@@ -16,18 +16,19 @@ from forcefit.results.display import largest_row, listing
 from forcefit.results.text import in_unit, lines_of, table_lines
 from forcefit.results.units import FACTORS
 
-LEAST_PERIODS = 10.0  # for fewer periods, vibration adds >= 15 % (quintic, undamped)
-_STARTS = 1e-6  # fraction of the largest acceleration; a larger end value is a jump
-LAWS = {"times": "spline through given times"}
-# largest values by key: description, SI unit, displayed unit
+# [periods] shortest path for which vibration is small, at most 15 % (quintic profile)
+LEAST_PERIODS = 10.0
+_STARTS = 1e-6  # [-] threshold of a zero end acceleration, relative to the largest
+LAWS = {"times": "spline through poses at given times"}
+# description, SI unit and displayed unit of the largest values
 LARGEST = {
-    "inertial_translation": ("deflection by acceleration", "m", "um"),
-    "inertial_rotation": ("rotation by acceleration", "rad", "mrad"),
+    "inertial_translation": ("deflection due to acceleration", "m", "um"),
+    "inertial_rotation": ("rotation due to acceleration", "rad", "mrad"),
     "translation": ("platform translation error", "m", "um"),
     "rotation": ("platform rotation error", "rad", "mrad"),
     "translation_bound": ("bound of the translation error", "m", "um"),
     "rotation_bound": ("bound of the rotation error", "rad", "mrad"),
-    "force": ("force through a body", "N", "N"),
+    "force": ("force at the tip of a body", "N", "N"),
     "stress": ("von Mises stress", "Pa", "MPa"),
     "speed": ("speed of the platform", "m/s", "m/s"),
     "acceleration": ("acceleration of the platform", "m/s^2", "m/s^2"),
@@ -35,14 +36,14 @@ LARGEST = {
 
 
 def sizes(errors: PathErrors) -> dict[str, NDArray]:
-    """Compute the magnitudes of the results at each instant.
+    """Return the magnitudes of the results at each instant.
 
     Args:
-        errors: errors along a path, k points.
+        errors: errors along a path at k instants.
 
     Returns:
-        Magnitudes (k,) in SI units by the keys of :data:`LARGEST`; (k, bodies or links)
-        for forces and stresses.
+        Magnitudes in SI units, with the keys of :data:`LARGEST`.  The shape is (k,), or
+        (k, bodies) for forces and (k, links) for stresses.
     """
     arrays = errors.arrays
     found: dict[str, NDArray] = {}
@@ -63,14 +64,14 @@ def sizes(errors: PathErrors) -> dict[str, NDArray]:
 
 
 def path_summary(errors: PathErrors) -> dict[str, Any]:
-    """Summarise the results of ``assembly path`` as a dictionary of plain values.
+    """Return a summary of the errors along a path as a dictionary.
 
     Args:
         errors: errors along a path.
 
     Returns:
-        Duration, frequency, largest values and when they occur. ``status`` is ``"ok"``,
-        or the status of the first point without a solution, with its reason.
+        Duration, frequency, largest values and their times.  ``status`` is ``"ok"``, or
+        the status of the first point without a solution.
     """
     solved = errors.status == OK
     first = int(np.argmin(solved))
@@ -105,7 +106,7 @@ def path_summary(errors: PathErrors) -> dict[str, Any]:
 def _peak(
     values: NDArray, times: NDArray, owners: list[str] | None = None
 ) -> dict[str, Any]:
-    """Return the largest value, when it occurs, and in which body or link."""
+    """Return the largest value, its time, and its body or link."""
     known = np.where(np.isfinite(values), values, -1.0)  # magnitudes are not negative
     over_time = known if known.ndim == 1 else known.max(axis=1)
     row = largest_row(over_time)
@@ -116,39 +117,39 @@ def _peak(
 
 
 def remarks(errors: PathErrors) -> list[str]:
-    """Format remarks on effects neglected by the quasi-static results.
+    """Return remarks on effects that the quasi-static model neglects.
 
     Args:
         errors: errors along a path.
 
     Returns:
-        One sentence per remark.
+        Sentences without a full stop.
     """
     found, path = [], errors.trajectory
     if errors.periods < LEAST_PERIODS:
         found.append(
             f"the path takes {errors.periods:.3g} periods of the first natural "
-            f"frequency, less than {LEAST_PERIODS:g}: vibration, which these numbers "
-            "neglect, may exceed them"
+            f"frequency, less than {LEAST_PERIODS:g}, so that the neglected vibration "
+            "may exceed the computed deflection"
         )
     if not np.isfinite(errors.periods):
-        found.append("no natural frequency was found: the vibration is unknown")
+        found.append("no natural frequency was found, so the vibration is unknown")
     ends = np.abs(path.second[[0, -1]]).max()
     if path.jumps or ends > _STARTS * np.abs(path.second).max(initial=0.0):
         found.append(
-            "the acceleration jumps along the path or at its ends: undamped vibration, "
-            "which these numbers neglect, doubles or triples the deflection"
+            "the acceleration is discontinuous, so that the neglected vibration can "
+            "double or triple the computed deflection"
         )
     if virtual_joints(errors.robot).cones.shape[1]:
         found.append(
-            "impacts where a clearance changes sides are neglected; without a load the "
-            "pose within the clearances, and the change from it, is not unique"
+            "impacts in clearances are neglected; without a load, the pose within the "
+            "clearances and the deflection due to acceleration are not unique"
         )
     fall = (errors.status == OK) & np.isnan(errors.arrays["inertial_screw"][:, 0])
     if fall.any():
         found.append(
-            f"at {fall.sum()} instants the robot has no equilibrium at rest under "
-            "these loads, so that the deflection by acceleration is unknown"
+            f"at {fall.sum()} instants, the robot has no equilibrium at rest under "
+            "these loads, so that the deflection due to acceleration is unknown"
         )
     if errors.free:
         found.append(_free_motions(errors))
@@ -156,23 +157,23 @@ def remarks(errors: PathErrors) -> list[str]:
 
 
 def _free_motions(errors: PathErrors) -> str:
-    """Format a remark on motions that the path does not prescribe."""
+    """Return a remark on motions that the path does not prescribe."""
     names, robot = errors.trajectory.names, errors.robot
     freedoms = mobility(home_posture(robot)).platform_freedoms
     if names[0] in POSE and len(names) < freedoms:
         return (
-            f"the path states {', '.join(names)} alone, and the platform has "
-            f"{freedoms} degrees of freedom: it moves with minimum joint rates; "
-            "expected a column for each component of the pose"
+            f"the path contains only {', '.join(names)}, but the platform has "
+            f"{freedoms} degrees of freedom; the motion with minimum joint rates is "
+            "used; expected a column for each component of the pose"
         )
     return (
-        f"{errors.free} joint motions follow neither from the path nor from the "
-        "closures; bodies that they move have no momentum along them"
+        f"{errors.free} joint motions are prescribed neither by the path nor by the "
+        "loop closures; the momentum along these motions is assumed to be zero"
     )
 
 
 def path_text(summary: dict[str, Any]) -> str:
-    """Format a summary as text: times, largest values and drive forces."""
+    """Return a summary as text."""
     lines = lines_of(summary, "status reason")
     periods = summary["periods"]
     in_periods = f", {periods:.3g} periods of {summary['first_frequency']:.4g} Hz"
@@ -189,7 +190,7 @@ def path_text(summary: dict[str, Any]) -> str:
 
 
 def _table(summary: dict[str, Any]) -> list[str]:
-    """Format the largest values and drive forces as lines of text."""
+    """Return the largest values and drive forces as lines of text."""
     rows: dict[str, tuple[Any, ...]] = {}
     for key, peak in summary["largest"].items():
         words, _, unit = LARGEST[key]

@@ -1,7 +1,7 @@
 """Platform compliance along a path, nominal or under the loads at each instant.
 
-The tangent is computed for a robot at rest under the d'Alembert loads at the instant,
-which are dead loads: they stay constant while the platform moves.
+The tangent compliance is computed for a robot at rest under the d'Alembert loads.  They
+are dead loads, which do not change if the platform moves.
 """
 
 from typing import Any
@@ -27,15 +27,15 @@ STATES = ("nominal", "contact", "exact")
 
 
 def check_state(robot: Robot, state: str) -> None:
-    """Reject an unknown state, and links with a mass in the state ``"exact"``.
+    """Raise BadInput if the compliance cannot be computed in a state.
 
     Args:
         robot: any robot.
         state: state for which the compliance is computed.
 
     Raises:
-        BadInput: the state is not in :data:`STATES`, or the state is ``"exact"`` and a
-            link has distributed inertia, for which no finite-motion model is available.
+        BadInput: the state is unknown, or it is ``"exact"`` and a link has a density,
+            which is not supported for finite motions.
     """
     if state not in STATES:
         raise BadInput(f"--state: found {quoted(state[:60])}{nearest(state, STATES)}")
@@ -43,33 +43,33 @@ def check_state(robot: Robot, state: str) -> None:
     if state == "exact" and heavy:
         raise BadInput(
             f"--state exact: found a link with a density at frame {quoted(heavy[0])}, "
-            "whose inertia acts along it; expected masses of frames only, or --state "
-            "contact"
+            "which this state does not support; expected links without a density, or "
+            "--state contact"
         )
 
 
 def check_linear(conditions: Conditions, state: str) -> None:
-    """Reject nonlinear effects in the states ``"contact"`` and ``"exact"``.
+    """Raise BadInput for a nonlinear effect in a state other than ``"nominal"``.
 
     Args:
         conditions: conditions at any instants.
         state: state for which the compliance is computed.
 
     Raises:
-        BadInput: an effect is nonlinear, so that its tangent stiffness is not computed.
+        BadInput: an effect is nonlinear.
     """
     places = [law.frame for law in conditions.laws]
     places += [place.frame for place in conditions.yields if not place.linear]
     if places and state != "nominal":
         raise BadInput(
             f"--state {state}: found an effect with a nonlinear law at frame "
-            f"{quoted(places[0])}, whose tangent stiffness is not computed; expected "
-            "--state nominal, in which the compliance leaves this effect out"
+            f"{quoted(places[0])}, which this state does not support; expected "
+            "--state nominal, whose compliance omits this effect"
         )
 
 
 def compliances(conditions: Conditions, state: str, loads: InertialLoads) -> NDArray:
-    """Compute the compliance of the platform at k instants.
+    """Return the compliance of the platform at k instants.
 
     Args:
         conditions: conditions at k instants.
@@ -79,8 +79,7 @@ def compliances(conditions: Conditions, state: str, loads: InertialLoads) -> NDA
 
     Returns:
         (k, 6, 6) [rad/(N m) .. m/N] compliance at the platform's origin, base axes; NaN
-        without an equilibrium. A clearance that touches its bound without force counts
-        as free.
+        without an equilibrium.  Contacts without a force are open.
     """
     if state == "nominal" and not conditions.yields:
         many: Any = platform_stiffness(conditions.postures)  # for k postures
@@ -97,7 +96,7 @@ def compliances(conditions: Conditions, state: str, loads: InertialLoads) -> NDA
 def _compliance(
     conditions: Conditions, state: str, loads: InertialLoads, i: int
 ) -> NDArray:
-    """Compute the platform compliance (6, 6) at one instant."""
+    """Return the compliance of the platform at one instant, (6, 6)."""
     if state == "contact":
         found = equilibrium_of_row(conditions, loads, i)
         return in_contact(found, "unloading").compliance

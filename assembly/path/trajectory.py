@@ -1,12 +1,10 @@
 """Trajectories: pose components over time, with first and second derivatives.
 
-Rows with times are interpolated by a quintic spline, which is continuous up to the
-fourth derivative. If the ends are at rest, speed and acceleration vanish there, and two
-rows give the quintic profile. Rows without times are interpolated by a natural cubic
-spline over the chord length, the sum of the distances between successive rows, so two
-rows give a straight line. The path is then traversed with a profile from
-:mod:`forcefit.assembly.path.profiles`.  Both splines interpolate positions, rotation
-vectors or joint coordinates component by component.
+Poses with times are interpolated by a quintic spline, which is continuous up to the
+fourth derivative.  Poses without times are interpolated by a natural cubic spline over
+the chord length.  This curve is traversed with a profile from
+:mod:`forcefit.assembly.path.profiles`.  Each component of positions, rotation vectors
+or joint coordinates is interpolated separately.
 """
 
 from dataclasses import dataclass
@@ -18,9 +16,9 @@ from forcefit.assembly.path.path_file import PathTable
 from forcefit.assembly.path.profiles import JUMPING, PROFILES
 from forcefit.inputs.table import BadInput, nearest
 
-MOST_POINTS = 20_000  # takes ten seconds and 600 MB for a hexapod
-_FINE = 4001  # number of instants at which the peak speed and acceleration are sought
-_ROWS_MOVING = 6  # smallest number of rows for a quintic spline without end conditions
+MOST_POINTS = 20_000  # maximum number of points; a hexapod then needs 600 MB
+_FINE = 4001  # number of instants for the peak speed and acceleration
+_ROWS_MOVING = 6  # minimum number of poses for a quintic spline without end conditions
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,26 +45,25 @@ class Trajectory:
 
     @property
     def duration(self) -> float:
-        """[s] time from the first to the last instant."""
+        """Time from the first to the last instant [s]."""
         return float(self.times[-1] - self.times[0])
 
 
 def timed(table: PathTable, points: int, ends: str = "rest") -> Trajectory:
-    """Interpolate rows at given times.
+    """Return the trajectory through poses at given times.
 
     Args:
         table: path with times.
         points: number of equally spaced instants.
-        ends: ``"rest"``: speed and acceleration are zero at both ends; ``"moving"``:
-            they follow from the rows (the fifth derivative of the spline is continuous
-            at the two knots nearest to each end).
+        ends: ``"rest"`` if speed and acceleration are zero at both ends, or
+            ``"moving"`` for a spline without end conditions.
 
     Returns:
         The trajectory.
 
     Raises:
-        BadInput: the ends are moving and there are fewer than six rows, or the number
-            of points is out of range.
+        BadInput: ``ends`` is ``"moving"`` and the path has fewer than six poses, or the
+            number of points is out of range.
     """
     from scipy.interpolate import make_interp_spline
 
@@ -93,10 +90,10 @@ def profiled(
     duration: float | None = None, speed: float | None = None,
     acceleration: float | None = None,
 ) -> Trajectory:  # fmt: skip
-    """Traverse the rows with a rest-to-rest motion profile.
+    """Return the trajectory through poses with a rest-to-rest motion profile.
 
     Args:
-        table: path; its times are not used.
+        table: path, whose times are not used.
         points: number of equally spaced instants.
         profile: name in :data:`forcefit.assembly.path.profiles.PROFILES`.
         size: [m] length equivalent to 1 rad in the chord length.
@@ -107,12 +104,12 @@ def profiled(
             platform's origin, or of any named joint.
 
     Returns:
-        The shortest trajectory within the limits.
+        The trajectory, which has the shortest duration within the limits.
 
     Raises:
-        BadInput: the profile is unknown, both or neither of duration and limits are
-            given, two consecutive rows are equal, or limits are given although the
-            platform origin does not move.
+        BadInput: the profile is unknown, duration and limits are both given or both
+            missing, two consecutive poses are equal, or limits are given and the
+            origin of the platform does not move.
     """
     from scipy.interpolate import CubicSpline
 
@@ -121,8 +118,8 @@ def profiled(
         raise BadInput(f'--profile: found "{profile[:60]}"{nearest(profile, PROFILES)}')
     if (duration is None) == (speed is None and acceleration is None):
         raise BadInput(
-            "--profile: expected --duration, or --speed, --acceleration or both of the "
-            "latter"
+            "--profile: expected --duration, or --speed or --acceleration or both of "
+            "the latter"
         )
     curve = CubicSpline(_chords(table, size), table.values, bc_type="natural")
 
@@ -144,13 +141,13 @@ def profiled(
 
 
 def _check_points(points: int) -> None:
-    """Reject a number of points below 2 or above the largest allowed number."""
+    """Raise BadInput for a number of points that is out of range."""
     if not 2 <= points <= MOST_POINTS:
         raise BadInput(f"--points: found {points}, expected 2 to {MOST_POINTS}")
 
 
 def _chords(table: PathTable, size: float) -> NDArray:
-    """Return the fraction (rows,) of the total chord length before each row."""
+    """Return the relative chord length from the first pose to each pose, (rows,)."""
     turns = np.array([name[0] == "r" for name in table.names])
     steps = np.diff(table.values, axis=0) * np.where(turns, size, 1.0)
     lengths = np.linalg.norm(steps, axis=1)
@@ -168,8 +165,8 @@ def _within(
     names: tuple[str, ...], first: NDArray, second: NDArray, speed: float | None,
     acceleration: float | None,
 ) -> float:  # fmt: skip
-    """Scale a motion of unit duration to the shortest duration [s] within limits."""
-    # speeds scale inversely with the duration, accelerations with its square
+    """Return the shortest duration [s] for which a motion is within limits."""
+    # speed is inversely proportional to the duration, acceleration to its square
     moved = [k for k, name in enumerate(names) if name[0] == "t"]
     if names[0].startswith("q."):
         fastest = np.abs(first).max(), np.abs(second).max()

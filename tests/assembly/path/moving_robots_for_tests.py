@@ -1,4 +1,4 @@
-"""Small robots that move along a path, and their motion at given instants."""
+"""Robots that move along a path, for tests."""
 
 import numpy as np
 
@@ -13,7 +13,7 @@ GRAVITY = np.array([0.0, -9.81, 0.0])
 
 
 def hinge(name, parent="base", at=(0, 0, 0), **other):
-    """An actuated hinge about z."""
+    """Return an actuated hinge about z."""
     return Frame(name, parent, at, joint="revolute", actuated=True, **other)
 
 
@@ -24,7 +24,7 @@ def instants(names, values, first, second):
 
 
 def rod(mass, length):
-    """Mass, centre and moments of inertia of a thin rod along x, at its far end."""
+    """Return the inertial data of a thin rod along x, for the frame at its tip."""
     turning = mass * length**2 / 12
     return {
         "mass": mass, "centre_of_mass": [-length / 2, 0, 0],
@@ -35,7 +35,7 @@ def rod(mass, length):
 def spinning_beam(
     rate, acceleration, pieces=1, theory="euler", radius=0.01, axis=(0, 0, 1)
 ):
-    """A beam of 0.5 m along x clamped to a hub that turns about an axis."""
+    """Return a beam along x on a rotating hub, and its motion at one instant."""
     link = BeamLink({"radius": radius}, 70e9, 0.3, 2700.0, theory)
     turn = _turn_of_z(axis)
     step = np.array([0.5 / pieces, 0, 0])
@@ -51,7 +51,7 @@ def spinning_beam(
 
 
 def _turn_of_z(axis):
-    """The rotation vector that lays z along an axis."""
+    """Return the rotation vector that rotates z to a given axis."""
     axis = np.array(axis) / np.linalg.norm(axis)
     across = np.cross([0, 0, 1], axis)
     sine = np.linalg.norm(across)
@@ -61,7 +61,7 @@ def _turn_of_z(axis):
 
 
 def moving_drives(robot, names, path):
-    """Motion of a robot whose drives follow (k, c) coordinates and derivatives."""
+    """Return the motion of a robot for given drive coordinates and derivatives."""
     postures, reasons = place_many_joints(robot, goals_of(names, robot, path[0]))
     assert not any(reasons)
     return follow_path(together(postures), names, path)

@@ -1,4 +1,4 @@
-"""Deflection of a closed-loop robot against the dynamic solution of Exudyn."""
+"""Comparison of the deflection along a path with a dynamic simulation by Exudyn."""
 
 import exudyn as exu
 import exudyn.itemInterface as item
@@ -19,7 +19,7 @@ START, END, DURATION = np.array([-0.02, 0.13]), np.array([0.025, 0.15]), 0.08
 
 
 def arm_angles(tip, foot, side):
-    """Angles of both arms of a leg to the x axis, elbow outward, by the cosine rule."""
+    """Return the angles of both arms of a leg to the x axis, by the law of cosines."""
     along = np.subtract(tip, foot)
     d, to_tip = np.hypot(*along), np.arctan2(along[1], along[0])
     inner = np.arccos((NEAR**2 + d**2 - FAR**2) / (2 * NEAR * d))
@@ -30,7 +30,7 @@ def arm_angles(tip, foot, side):
 
 
 def robot_of(stiffness):
-    """The five-bar robot: rigid arms, elastic drives, a mass at the tip."""
+    """Return a five-bar robot with rigid arms, elastic drives and a mass at its tip."""
     frames = []
     for name, foot, side in (("left", FEET[0], 1), ("right", FEET[1], -1)):
         near, far = arm_angles(START, foot, side)
@@ -55,7 +55,7 @@ def robot_of(stiffness):
 
 
 def simulated(stiffness, steps):
-    """Times and positions of the tip by Exudyn: planar bodies, springs as drives."""
+    """Return times and positions of the tip in a simulation by Exudyn."""
     container = exu.SystemContainer()
     mbs = container.AddSystem()
     ground = mbs.AddObject(item.ObjectGround())
@@ -127,8 +127,8 @@ def simulated(stiffness, steps):
 
 @pytest.mark.slow
 @pytest.mark.exudyn
-def test_quasi_static_deflection_converges_to_dynamic_solution_as_period_squared():
-    """The error of the quasi-static solution decreases as 1 / (T f1)^2."""
+def test_quasi_static_deflection_converges_to_dynamic_solution():
+    """The error is proportional to 1 / (T f1)^2, where f1 is the first frequency."""
     table = PathTable(("tx", "ty"), np.array([START, END]))
     path = profiled(table, 101, "seventh", 1.0, duration=DURATION)
     left_out, periods = [], []

@@ -1,4 +1,4 @@
-"""Effects in a robot file along a path, against closed forms and single postures."""
+"""Tests of effects in a robot file along a path."""
 
 from dataclasses import replace
 
@@ -17,7 +17,7 @@ from tests.assembly.path.moving_robots_for_tests import hinge, instants, rod
 from tests.assembly.path.test_path_errors import heavy, without_clearance
 
 MASS, LENGTH, ALPHA = 2.0, 0.5, 40.0
-TORQUE = MASS * LENGTH**2 / 3 * ALPHA  # of a thin rod about its end
+TORQUE = MASS * LENGTH**2 / 3 * ALPHA  # [N m] torque that accelerates a thin rod
 GRAVITY = [0.0, -9.81, 0.0]
 LOAD = [5.0, 0, 0, 100.0, -40.0, -200.0]
 WARM = {"temperature": 8.0, "time": 60.0}
@@ -46,13 +46,13 @@ ERRORS = ("encoder_offset", "link_length", "thermal_expansion")
 
 
 def arm(**other):
-    """A rod on a hinge about z, accelerated from rest, without gravity."""
+    """Return a rod on an actuated hinge about z."""
     tip = Frame("arm", "hub", [LENGTH, 0, 0], **rod(MASS, LENGTH))
     return Robot("arm", "arm", (hinge("hub"), tip), **other)
 
 
 def turned(robot, **given):
-    """The inertial rotation [rad] of the accelerated rod about z."""
+    """Return the rotation error [rad] of the rod due to its acceleration."""
     path = instants(["q.hub"], [[0.0]], [[0.0]], [[ALPHA]])
     found = path_errors(robot, path, **given)
     assert found.status[0] == "ok"
@@ -75,7 +75,7 @@ def turned(robot, **given):
             {"contact_stiffening": {"hub.coefficient": 1e6, "hub.exponent": 1.5}},
             (TORQUE / 1e6) ** (1 / 1.5),
         ),
-        # one kilogram more at the middle of the rod
+        # an additional mass of 1 kg at the middle of the rod
         (
             {
                 "drive_compliance": {"hub": 4e3},
@@ -85,13 +85,13 @@ def turned(robot, **given):
         ),
     ],
 )
-def test_accelerated_rod_rotates_by_torque_over_effective_stiffness(effects, rotation):
+def test_rotation_of_accelerated_rod_equals_torque_over_stiffness(effects, rotation):
     assert turned(arm(effects=effects)) == pytest.approx(-rotation, rel=1e-9)
 
 
 @pytest.mark.parametrize("state", ["nominal", "contact", "exact"])
-def test_compliance_function_deflects_under_inertial_torque(state):
-    """At q = 0.5 the drive's compliance is 1e-6 + 2e-6 q = 2e-6 rad/(N m)."""
+def test_deflection_equals_compliance_function_times_torque(state):
+    """At q = 0.5, the compliance of the drive is 1e-6 + 2e-6 q = 2e-6 rad/(N m)."""
     soft = Function("hub", ("rz",), ("q.hub",), "powers", {"0": 1e-6, "1": 2e-6},
                     kind="compliance")  # fmt: skip
     path = instants(["q.hub"], [[0.5]], [[0.0]], [[ALPHA]])
@@ -101,15 +101,15 @@ def test_compliance_function_deflects_under_inertial_torque(state):
     assert found.arrays["compliance"][0, 2, 2] == pytest.approx(2e-6, rel=1e-9)
 
 
-def test_first_frequency_along_a_path_includes_the_compliance_of_the_drive():
+def test_first_frequency_includes_drive_compliance():
     robot = arm(effects={"drive_compliance": {"hub": 4e3}})
     path = instants(["q.hub"], [[0.0], [0.1]], [[0.0]] * 2, [[0.0]] * 2)
     expected = np.sqrt(4e3 / (TORQUE / ALPHA)) / (2 * np.pi)
     assert path_errors(robot, path).frequency == pytest.approx(expected, rel=1e-9)
 
 
-def test_errors_added_by_effects_do_not_change_the_inertial_deflection():
-    """A rod that is 8 K warmer and 30 um longer has the same inertial loads."""
+def test_geometric_effects_do_not_change_inertial_deflection():
+    """Thermal expansion and a length error do not change the inertial loads."""
     effects = {
         "drive_compliance": {"hub": 4e3}, "link_length": {"arm": 3e-5},
         "thermal_expansion": {"arm": 1e-5},
@@ -122,7 +122,7 @@ def test_errors_added_by_effects_do_not_change_the_inertial_deflection():
     assert found.inertial[0, 2] == pytest.approx(-TORQUE / 4e3, rel=1e-9)
 
 
-def test_effect_time_is_the_start_time_plus_the_path_time():
+def test_time_of_effects_equals_start_time_plus_path_time():
     growing = Function("arm", ("tx",), ("time",), "powers", {"1": 1e-6})
     path = instants(["q.hub"], [[0.0]] * 3, [[0.0]] * 3, [[0.0]] * 3)
     path = replace(path, times=np.array([5.0, 6.0, 8.0]))
@@ -133,7 +133,7 @@ def test_effect_time_is_the_start_time_plus_the_path_time():
 
 
 def at_rest(robot, gravity=None, load=None, **given):
-    """A path through three poses of the paper's robot at zero speed."""
+    """Return the errors along a path at zero speed, and those of its postures."""
     values = np.array([[-0.05, -0.5], [0.0, -0.45], [0.06, -0.42]])
     path = instants(["tx", "tz"], values, np.zeros((3, 2)), np.zeros((3, 2)))
     found = path_errors(robot, path, gravity=gravity, load=load, under=WARM, **given)
@@ -144,7 +144,7 @@ def at_rest(robot, gravity=None, load=None, **given):
 
 
 @pytest.mark.parametrize("name", [*EFFECTS, "all", "function"])
-def test_path_at_zero_speed_equals_single_postures_with_the_same_effects(name):
+def test_errors_at_zero_speed_equal_errors_at_rest(name):
     effects = (
         EFFECTS if name == "all" else {k: EFFECTS[k] for k in EFFECTS if k == name}
     )
@@ -168,10 +168,8 @@ def test_path_at_zero_speed_equals_single_postures_with_the_same_effects(name):
     np.testing.assert_array_equal(found.inertial, 0.0)
 
 
-def test_path_with_clearances_and_effect_errors_equals_single_postures():
-    """Without loads, clearances leave the pose undetermined, but the energy is
-    unique.
-    """
+def test_energies_at_zero_speed_equal_energies_at_rest():
+    """The energies are compared, because clearances make the pose undetermined."""
     effects = {name: EFFECTS[name] for name in ERRORS}
     robot = replace(heavy("irsbot2"), effects=effects)
     found, applied = at_rest(robot, assumption="frozen")
@@ -180,7 +178,7 @@ def test_path_with_clearances_and_effect_errors_equals_single_postures():
     assert (found.status == "ok").all()
 
 
-def test_self_weight_effect_along_a_path_equals_the_gravity_option():
+def test_self_weight_effect_equals_gravity_option():
     path = instants(["q.hub"], [[0.3]], [[2.0]], [[ALPHA]])
     springs = {"drive_compliance": {"hub": 4e3}}
     known = path_errors(
@@ -196,7 +194,7 @@ def test_self_weight_effect_along_a_path_equals_the_gravity_option():
     [
         (
             {"effects": {"friction_hysteresis": {"hub": 1.0}}},
-            '"friction_hysteresis" depends on the side from which',
+            '"friction_hysteresis" depends on the direction of approach',
         ),
         (
             {"effects": {"geometric_stiffening": {}}},
@@ -209,7 +207,7 @@ def test_self_weight_effect_along_a_path_equals_the_gravity_option():
                     Function("arm", ("tx",), ("approach",), "powers", {"1": 1.0}),
                 )
             },
-            "arm tx of approach.* depends on the side from which",
+            "arm tx of approach.* depends on the direction of approach",
         ),
         (
             {
@@ -222,20 +220,20 @@ def test_self_weight_effect_along_a_path_equals_the_gravity_option():
         ),
     ],
 )  # fmt: skip
-def test_effect_unsupported_along_a_path_is_rejected_by_name(changes, message):
+def test_unsupported_effect_is_rejected(changes, message):
     path = instants(["q.hub"], [[0.0]], [[0.0]], [[ALPHA]])
     with pytest.raises(BadInput, match=message):
         path_errors(arm(**changes), path)
 
 
-def test_nonlinear_effect_is_rejected_in_all_states_except_nominal():
+def test_nonlinear_effect_is_rejected_in_contact_state():
     effects = {"contact_stiffening": {"hub.coefficient": 1e6, "hub.exponent": 1.5}}
     path = instants(["q.hub"], [[0.0]], [[0.0]], [[ALPHA]])
     with pytest.raises(BadInput, match='nonlinear law at frame "hub"'):
         path_errors(arm(effects=effects), path, state="contact")
 
 
-def test_unknown_covariate_of_a_path_is_rejected():
+def test_unknown_covariate_is_rejected():
     path = instants(["q.hub"], [[0.0]], [[0.0]], [[ALPHA]])
     with pytest.raises(BadInput, match='--under: unknown covariate "heat"'):
         path_errors(arm(), path, under={"heat": 1.0})

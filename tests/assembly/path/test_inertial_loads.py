@@ -1,4 +1,4 @@
-"""Loads of accelerated bodies and beams against closed forms."""
+"""Tests of the loads on accelerated bodies and beams against closed forms."""
 
 import numpy as np
 import pytest
@@ -21,7 +21,7 @@ MASS, LENGTH, G = 2.0, 0.5, 9.81
 
 
 def pendulum():
-    """A rod on a hinge at the origin, along x at home."""
+    """Return a rod on a hinge at the origin, along x in its home pose."""
     body = Frame("rod", "hinge", [LENGTH, 0, 0], **rod(MASS, LENGTH))
     return Robot("pendulum", "rod", (hinge("hinge"), body))
 
@@ -30,12 +30,12 @@ def pendulum():
     ("from_vertical", "axial", "transverse"),
     [(90.0, 0.0, 4.905), (30.0, 42.4786, 2.4525), (0.0, 49.05, 0.0)],
 )
-def test_hinge_forces_of_a_falling_rod_equal_textbook_values(
+def test_hinge_forces_of_falling_rod_equal_closed_form(
     from_vertical, axial, transverse
 ):
-    """Released level: alpha = 3 g sin / 2 L, omega^2 = 3 g cos / L; no moment.
+    """A rod released in the horizontal position exerts 5/2 m g cos a along its axis.
 
-    Axially m g cos + m omega^2 L / 2 = 5/2 m g cos, across m g sin / 4.
+    The transverse force is m g sin a / 4, where a is the angle from the vertical.
     """
     angle = np.radians(from_vertical)
     q = angle - np.pi / 2
@@ -53,7 +53,7 @@ def test_hinge_forces_of_a_falling_rod_equal_textbook_values(
 
 
 def test_drive_torques_of_two_links_equal_lagrange_equations():
-    """Rods of 3 and 2 kg, 0.4 and 0.3 m, in a horizontal and in a vertical plane."""
+    """The arm moves in a horizontal plane and in a vertical plane."""
     frames = (
         hinge("shoulder"),
         hinge("elbow", "shoulder", [0.4, 0, 0], **rod(3.0, 0.4)),
@@ -71,7 +71,7 @@ def test_drive_torques_of_two_links_equal_lagrange_equations():
 
 
 def lagrange(weight):
-    """Torques by the equations of motion of a planar arm of two links."""
+    """Return the torques by the equations of motion of a planar arm with two links."""
     (m1, m2), (l1, l2), (q1, q2) = (3.0, 2.0), (0.4, 0.3), (0.5, 0.8)
     c1, c2, g = l1 / 2, l2 / 2, G * weight
     I1, I2 = m1 * l1**2 / 12, m2 * l2**2 / 12
@@ -88,9 +88,7 @@ def lagrange(weight):
 
 
 def test_rotating_beam_elongation_equals_closed_form():
-    """rho omega^2 L^3 / 3 E = 16.07 um, and rho omega^2 L^2 / 2 = 3.375 MPa at its
-    start.
-    """
+    """The elongation is rho omega^2 L^3 / 3 E, and the stress rho omega^2 L^2 / 2."""
     robot, path = spinning_beam(100.0, 0.0)
     found = path_errors(robot, path)
     assert found.arrays["platform_screw"][0, 3] == pytest.approx(
@@ -100,11 +98,10 @@ def test_rotating_beam_elongation_equals_closed_form():
     assert found.arrays["stress"][0, 0] == pytest.approx(3.375e6, rel=1e-9)
 
 
-def test_bending_of_a_beam_on_an_accelerated_hub_equals_closed_form():
-    """11 q L^4 / 120 E I with q = rho A alpha L at the tip; rotary inertia adds rho I
-    alpha L^3/3EI.
+def test_bending_of_beam_on_accelerated_hub_equals_closed_form():
+    """The load per length increases linearly to q = rho A alpha L at the tip.
 
-    At the start the moment is q L^2 / 3 and the stress 4 M / pi r^3.
+    The deflection is 11 q L^4 / 120 E I, and rotary inertia adds rho alpha L^3 / 3 E.
     """
     r, L, alpha, rho, E = 0.01, 0.5, 500.0, 2700.0, 70e9
     area, second = np.pi * r**2, np.pi * r**4 / 4
@@ -124,8 +121,8 @@ def test_bending_of_a_beam_on_an_accelerated_hub_equals_closed_form():
 
 
 @pytest.mark.parametrize("theory", ["euler", "timoshenko"])
-def test_beam_split_into_pieces_deflects_like_the_whole_beam(theory):
-    """The end loads are exact, even for short thick beams with shear."""
+def test_deflection_does_not_depend_on_number_of_beams(theory):
+    """The equivalent loads at the ends are exact, also for short beams with shear."""
     screws = []
     for pieces in (1, 2, 7):
         robot, path = spinning_beam(
@@ -138,8 +135,8 @@ def test_beam_split_into_pieces_deflects_like_the_whole_beam(theory):
         np.testing.assert_allclose(screw, screws[0], atol=1e-9 * size)
 
 
-def test_base_section_of_a_beam_transmits_the_hub_wrench():
-    """Equilibrium of the whole beam: its load and a tool beside its tip."""
+def test_wrench_at_start_of_beam_equals_hub_wrench():
+    """The beam is in equilibrium under its own load and the load of a tool."""
     robot, path = spinning_beam(80.0, 3000.0, radius=0.03, axis=(0.3, -0.5, 1))
     tool = Frame("tool", "piece0", [0.1, 0.05, -0.07], mass=1.2,
                  inertia=np.diag([1e-3, 2e-3, 2e-3]))  # fmt: skip
@@ -157,8 +154,8 @@ def test_base_section_of_a_beam_transmits_the_hub_wrench():
     np.testing.assert_allclose(sections[2, :3], tip[:3] @ R, atol=1e-12)
 
 
-def test_path_loads_at_rest_equal_the_weight_in_the_static_solution():
-    """Uniform weight corresponds to equal accelerations everywhere."""
+def test_errors_at_rest_equal_static_solution_with_gravity():
+    """The drives are at rest, so only the weight acts."""
     robot, path = spinning_beam(0.0, 0.0, pieces=2, theory="timoshenko")
     found = path_errors(robot, path, gravity=[1.0, -9.0, 2.0])
     static = solve_assembly(home_posture(robot), gravity=[1.0, -9.0, 2.0])

@@ -1,4 +1,4 @@
-"""Inertia of mesh links against that of the same link as a beam."""
+"""Tests of the inertia of mesh links against beams and rigid bodies."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -20,7 +20,7 @@ G = np.array([2.0, -9.0, 3.0])
 
 
 def rod_mass(section_inertia):
-    """(12, 12) consistent mass of a rod along x by Gauss points, cubic shapes."""
+    """Return the consistent mass matrix of a rod along x by Gauss integration."""
     area, L = np.pi * RADIUS**2, LENGTH
     s, w = np.polynomial.legendre.leggauss(8)
     s, w = (s + 1) / 2, w / 2 * L
@@ -44,7 +44,7 @@ def rod_mass(section_inertia):
 
 
 def turned_arm(link):
-    """A link on three hinges, of which each turns and accelerates."""
+    """Return the motion of a link on three accelerated hinges."""
     frames = (
         hinge("z"), hinge("x", "z", rotation=[0, np.pi / 2, 0]),
         hinge("y", "x", [0.1, 0, 0.05], rotation=[np.pi / 3, 0, 0]),
@@ -58,7 +58,7 @@ def turned_arm(link):
 
 
 def with_mass(M):
-    """A mesh link along x whose solution has this mass matrix."""
+    """Return a mesh link along x with a given mass matrix."""
     solved = SimpleNamespace(
         centers=np.array([[0, 0, 0], [LENGTH, 0, 0]]),
         link=SimpleNamespace(compliance=np.zeros((6, 6))),
@@ -67,8 +67,8 @@ def with_mass(M):
     return replace(link, solution=MeshSolution(solved, E, "", M))
 
 
-def test_mass_matrix_of_a_thin_rod_gives_the_beam_loads():
-    """Without rotary inertia, both are the same integrals of a linear load."""
+def test_loads_of_thin_mesh_link_equal_beam_loads():
+    """The rotary inertia of the sections is omitted."""
     beam = BeamLink({"radius": RADIUS}, E, 0.3, RHO, "euler")
     by_beam = inertial_loads(turned_arm(beam), G)
     thin = replace(by_beam.beams[3], m=np.zeros((1, 3)))
@@ -84,10 +84,8 @@ def test_mass_matrix_of_a_thin_rod_gives_the_beam_loads():
     np.testing.assert_allclose(base, expected[1], atol=1e-12 * size)
 
 
-def test_mesh_link_loads_sum_to_the_rigid_body_load():
-    """Newton-Euler equations of a solid cylinder, which hold for any condensed mass
-    matrix.
-    """
+def test_sum_of_mesh_link_loads_equals_rigid_body_load():
+    """The resultant satisfies the Newton-Euler equations of a cylinder."""
     second = np.pi * RADIUS**4 / 4
     motion = turned_arm(with_mass(rod_mass(second)))
     found = inertial_loads(motion, G)
@@ -108,8 +106,8 @@ def test_mesh_link_loads_sum_to_the_rigid_body_load():
 
 
 @pytest.mark.slow
-def test_meshed_bar_loads_equal_beam_loads():
-    """For a short bar of L / r = 11, the end loads differ by at most 2 %."""
+def test_loads_of_meshed_bar_agree_with_beam_loads():
+    """For a short bar with L / r = 11, the loads differ by less than 2 %."""
     solid = MeshLink(MESHES / "distal_plain.stl", "z=0", "z=0.452", E, 0.3, RHO)
     solid = solved_link(Frame("tip", translation=[LENGTH, 0, 0], link=solid))
     beam = BeamLink({"radius": RADIUS}, E, 0.3, RHO)

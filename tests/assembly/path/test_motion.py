@@ -1,4 +1,4 @@
-"""Velocities and accelerations of bodies against finite differences of exact poses."""
+"""Tests of velocities and accelerations of bodies along a path."""
 
 import numpy as np
 import pytest
@@ -27,7 +27,7 @@ CASES = {
 
 
 def path_of(names, home, t):
-    """A smooth path with rotations about all axes, and its derivatives."""
+    """Return a smooth path and its first and second derivatives."""
     k = np.arange(len(names))
     size = np.array([0.02 if name[0] == "t" else 0.15 for name in names])
     w, phase = 1.0 + 0.3 * k, 0.5 * k
@@ -46,7 +46,10 @@ def placed(robot, names, values):
 
 
 def differences(robot, names, home, t, h):
-    """Point velocities and accelerations, angular velocities of bodies, to h^4."""
+    """Return velocities, accelerations and angular velocities by finite differences.
+
+    The differences are of fourth order in the step h.
+    """
     steps = (-2, -1, 0, 1, 2)
     values = path_of(names, home, t + h * np.array(steps))[0]
     poses = dict(zip(steps, placed(robot, names, values).transforms, strict=True))
@@ -62,8 +65,8 @@ def differences(robot, names, home, t, h):
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_velocities_and_accelerations_equal_finite_differences_of_poses(name):
-    """Fourth-order differences of poses whose loops close to 1e-12."""
+def test_velocities_and_accelerations_equal_finite_differences(name):
+    """The finite differences are of fourth order."""
     robot, names = load_robot(name), CASES[name]
     pose = home_posture(robot).pose()
     home = np.array([pose[one] for one in names])
@@ -81,13 +84,13 @@ def test_velocities_and_accelerations_equal_finite_differences_of_poses(name):
 
 
 def two_links(a, b):
-    """A planar arm with two drives, stretched along x at home."""
+    """Return a planar arm with two drives, which is straight in its home pose."""
     frames = hinge("one"), hinge("two", "one", [a, 0, 0])
     return Robot("arm", "tip", (*frames, Frame("tip", "two", [b, 0, 0])))
 
 
-def test_arm_motion_from_joint_path_equals_closed_form():
-    """Two planar links, with tip velocity and acceleration computed by hand."""
+def test_tip_acceleration_of_planar_arm_equals_closed_form():
+    """The acceleration of the tip is known in closed form."""
     a, b = 0.4, 0.3
     robot, names = two_links(a, b), ("q.one", "q.two")
     q, rate, second = ([[0.5, 0.8]], [[3.0, -2.0]], [[20.0, 15.0]])
@@ -102,7 +105,7 @@ def test_arm_motion_from_joint_path_equals_closed_form():
     )  # fmt: skip
 
 
-def test_drives_not_named_in_a_joint_path_remain_at_rest():
+def test_drives_without_path_coordinates_do_not_move():
     robot = load_robot("arm6")
     path = tuple(np.array([[x, y]]) for x, y in ((0.2, 0.3), (1.0, -2), (3.0, 4)))
     names = ("q.joint2", "q.joint4")
@@ -115,8 +118,8 @@ def test_drives_not_named_in_a_joint_path_remain_at_rest():
     assert motion.free == 0
 
 
-def test_rotation_rate_is_correct_for_rotations_beyond_half_a_turn():
-    """A turntable rotates at 2 rad/s while its rotation vector grows to 4 rad."""
+def test_joint_rate_is_correct_for_large_rotations():
+    """The rotation angle is 3 rad, and its rate is 2 rad/s."""
     robot = Robot("table", "top", (hinge("drive"), Frame("top", "drive", [0.1, 0, 0])))
     path = tuple(np.array([[x]]) for x in (3.0, 2.0, 5.0))
     motion = follow_path(placed(robot, ("rz",), path[0]), ("rz",), path)
@@ -124,8 +127,8 @@ def test_rotation_rate_is_correct_for_rotations_beyond_half_a_turn():
     np.testing.assert_allclose(motion.second_rates[0, 0], 5.0, rtol=1e-12)
 
 
-def test_radial_velocity_of_a_stretched_arm_is_rejected():
-    """The tip of a stretched arm cannot move along the arm."""
+def test_radial_velocity_of_straight_arm_is_rejected():
+    """The tip of a straight arm cannot move along the arm."""
     robot, names = two_links(0.4, 0.3), ("tx", "ty")
     there = together([home_posture(robot)])
     path = tuple(np.array(x) for x in ([[0.7, 0.0]], [[1.0, 0.0]], [[0.0, 0.0]]))

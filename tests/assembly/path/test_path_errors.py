@@ -1,4 +1,4 @@
-"""Conservation laws and static limits of the errors along a path."""
+"""Tests of the errors along a path."""
 
 from dataclasses import replace
 
@@ -32,7 +32,7 @@ GRAVITY_ALONG_Z = [0.0, 0.0, -9.81]
 
 
 def heavy(name, density=DENSITY, mass=1.5):
-    """A built-in robot whose beams and platform have a mass."""
+    """Return a built-in robot whose beams and platform have a mass."""
     robot = load_robot(name)
     frames = []
     for frame in robot.frames:
@@ -53,7 +53,7 @@ def without_clearance(robot):
 
 
 def energy(motion, gravity):
-    """Kinetic and potential energy (k,) of all bodies, by textbook formulas."""
+    """Return the kinetic plus potential energy of all bodies, (k,)."""
     robot, T = motion.postures.robot, motion.postures.transforms
     total = np.zeros(len(T))
     for i, frame in enumerate(robot.frames):
@@ -78,8 +78,8 @@ def energy(motion, gravity):
 
 
 @pytest.mark.parametrize("name", ["irsbot2", "hexapod", "delta", "arm6"])
-def test_drive_power_equals_the_rate_of_change_of_energy(name):
-    """Kinetic and potential energy, differenced along the path to fourth order."""
+def test_drive_power_equals_energy_rate(name):
+    """The rate of kinetic and potential energy is computed by finite differences."""
     robot, names = heavy(name), CASES[name]
     pose = home_posture(robot).pose()
     home, h = np.array([pose[one] for one in names]), 2e-3
@@ -100,8 +100,8 @@ def test_drive_power_equals_the_rate_of_change_of_energy(name):
 
 
 @pytest.mark.parametrize("name", ["hexapod", "five_bar"])
-def test_platform_inertia_deflects_the_platform_by_its_compliance(name):
-    """The deflection is C times the d'Alembert wrench of the platform."""
+def test_inertial_deflection_equals_compliance_times_inertial_wrench(name):
+    """The deflection is the product of C and the d'Alembert wrench of the platform."""
     robot, names = heavy(name, density=0.0), CASES[name]
     tight = without_clearance(robot)
     pose = home_posture(tight).pose()
@@ -125,8 +125,8 @@ def test_platform_inertia_deflects_the_platform_by_its_compliance(name):
     np.testing.assert_allclose(arrays["compliance"][0] / size, C / size, atol=1e-9)
 
 
-def test_deflection_grows_with_the_square_of_the_speed():
-    """Half the duration of a rest-to-rest path gives four times the deflection."""
+def test_deflection_is_proportional_to_squared_speed():
+    """If the duration is halved, the deflection is multiplied by four."""
     robot = heavy("five_bar")
     tight = without_clearance(robot)
     table = PathTable(("tx", "ty"), np.array([[0.0, 0.14], [0.02, 0.13]]))
@@ -141,8 +141,8 @@ def test_deflection_grows_with_the_square_of_the_speed():
     np.testing.assert_array_equal(table["inertial_screw"], fast.inertial)
 
 
-def test_clearance_adds_to_the_deflection_of_an_accelerated_arm():
-    """A mass with a radial clearance of 10 um rests on its outer side: + 10 um."""
+def test_clearance_adds_to_deflection_of_accelerated_arm():
+    """A mass with a radial clearance of 10 um moves outward by 10 um."""
     link = BeamLink({"radius": 0.01}, 70e9, 0.3)
     joint = Clearance(radial=1e-5)
     frames = (
@@ -162,7 +162,7 @@ def test_clearance_adds_to_the_deflection_of_an_accelerated_arm():
     assert upper >= stretch + 1e-5
 
 
-def test_massless_robot_and_unknown_assumption_are_rejected():
+def test_robot_without_mass_and_unknown_assumption_are_rejected():
     path = instants(["q.hub"], [[0.0]], [[1.0]], [[0.0]])
     frames = (hinge("hub"), Frame("arm", "hub", [0.3, 0, 0]))
     with pytest.raises(ValueError, match="found no moving mass"):
@@ -172,8 +172,8 @@ def test_massless_robot_and_unknown_assumption_are_rejected():
         path_errors(Robot("arm", "arm", heavy_arm), path, assumption="frosen")
 
 
-def test_paper_robot_takes_54_ms_for_100_mm_at_20_g():
-    """The quintic's peak is 10/sqrt 3 D/T^2: T = 54.2 ms, 3.46 m/s at the middle."""
+def test_path_duration_equals_closed_form_for_peak_acceleration():
+    """The peak acceleration of the quintic profile is 10/sqrt(3) D/T^2."""
     robot = heavy("irsbot2")
     table = PathTable(("tx", "tz"), np.array([[-0.05, -0.5], [0.05, -0.5]]))
     path = profiled(table, 101, "quintic", 1.0, acceleration=20 * 9.80665)
@@ -182,14 +182,14 @@ def test_paper_robot_takes_54_ms_for_100_mm_at_20_g():
     found = path_errors(robot, path)
     speed = np.linalg.norm(found.arrays["platform_velocity"][:, 3:], axis=1)
     assert speed.max() == pytest.approx(3.46, abs=0.01)
-    # robot and path are symmetric about x = 0, the motion about its middle
+    # robot and path are symmetric about x = 0
     mirrored = found.inertial[::-1] * [1, -1, -1, -1, 1, 1]
     size = np.abs(found.inertial).max()
     np.testing.assert_allclose(mirrored, found.inertial, atol=1e-6 * size)
 
 
-def test_falling_pendulum_has_unknown_deflection_without_equilibrium_at_rest():
-    """A level rod of 2 kg falls with 3 g / 4 at its centre: its hinge holds m g / 4."""
+def test_deflection_without_equilibrium_at_rest_is_unknown():
+    """A rod falls from the horizontal position.  The force on its hinge is m g / 4."""
     rail = Frame("rail", rotation=[0.0, np.pi / 2, 0.0], joint="prismatic",
                  actuated=True)  # fmt: skip
     cart = Frame("cart", "rail", rotation=[0.0, -np.pi / 2, 0.0], mass=1.0)
@@ -226,9 +226,9 @@ joint = [
 
 
 def six_legs(file, kind, mass=0.0, across=0.0, about=0.0):
-    """A Gough platform whose six legs have masses on their axes; and a leg's vector.
+    """Return a Gough platform with six heavy legs, and the vector along a leg.
 
-    The moments of inertia of each leg across and about its axis are in kg m^2.
+    The moments of inertia of a leg across and about its axis are in kg m^2.
     """
     text = SPHERICAL_ENDS
     for name, below, above in (("a", 10, 50), ("b", 110, 70)):
@@ -253,16 +253,14 @@ def six_legs(file, kind, mass=0.0, across=0.0, about=0.0):
 
 
 def forces_of_six_legs(robot):
-    """(6,) [N] drive forces in an off-centre posture, moving and accelerated."""
+    """Return the drive forces of an accelerated Gough platform, (6,)."""
     pose, rate, second = [0.05, -0.02, 0.55, 0.1, -0.1, 0.2], [0.5] * 6, [-3.0] * 6
     path = instants(POSE, [pose], [rate], [second])
     return path_errors(robot, path, gravity=GRAVITY_ALONG_Z).arrays["drive_force"][0]
 
 
-def test_drive_forces_are_exact_with_massless_freely_spinning_legs(tmp_path):
-    """Six equal legs between ball joints: each drive carries m (g + a) / (6 cos(angle
-    to z)).
-    """
+def test_drive_forces_of_gough_platform_equal_closed_form(tmp_path):
+    """The force of each drive is m (g + a) / (6 cos b) for an angle b of legs to z."""
     robot, along = six_legs(tmp_path / "six_sps.toml", "spherical")
     pose = [0.0, 0.0, 0.5, 0.0, 0.0, 0.0]
     path = instants(POSE, [pose], [np.zeros(6)], [[0, 0, 5.0, 0, 0, 0]])
@@ -271,10 +269,8 @@ def test_drive_forces_are_exact_with_massless_freely_spinning_legs(tmp_path):
     np.testing.assert_allclose(errors.arrays["drive_force"][0], expected, rtol=1e-9)
 
 
-def test_spin_of_legs_with_mass_on_their_axes_does_not_change_drive_forces(tmp_path):
-    """Ball joints at the base allow spin and universal joints do not, with equal
-    forces.
-    """
+def test_drive_forces_do_not_depend_on_spin_of_legs(tmp_path):
+    """The legs can spin between ball joints, but not on universal joints."""
     file = tmp_path / "six.toml"
     forces = [
         forces_of_six_legs(six_legs(file, kind, mass=0.8)[0])
@@ -283,10 +279,8 @@ def test_spin_of_legs_with_mass_on_their_axes_does_not_change_drive_forces(tmp_p
     np.testing.assert_allclose(forces[0], forces[1], rtol=1e-9)
 
 
-def test_spin_of_round_legs_between_ball_joints_is_removed(tmp_path):
-    """Without moments about their axes, the legs never start to spin, so no force
-    depends on their moment of inertia about the axis.
-    """
+def test_drive_forces_do_not_depend_on_axial_inertia_of_legs(tmp_path):
+    """The legs do not spin, so forces do not depend on their axial inertia."""
     file = tmp_path / "six.toml"
     forces = [
         forces_of_six_legs(six_legs(file, "spherical", 0.8, 0.02, about)[0])
@@ -295,10 +289,10 @@ def test_spin_of_round_legs_between_ball_joints_is_removed(tmp_path):
     np.testing.assert_allclose(forces[1], forces[0], rtol=1e-9)
 
 
-def test_thread_converts_the_force_of_a_slide_into_a_torque(tmp_path):
-    """A leg with its masses on its axis: the torque of its screw is h times the force.
+def test_screw_torque_equals_slide_force_times_lead(tmp_path):
+    """The torque of a screw is the product of h = pitch / 2 pi and the force.
 
-    The spindle turns many times, but has no inertia about its axis.
+    The screw has no moment of inertia about its axis.
     """
     file = tmp_path / "six.toml"
     slides, _ = six_legs(file, "universal", mass=0.8)

@@ -1,4 +1,4 @@
-"""Compliance along a path under instantaneous loads, and force-controlled drives."""
+"""Tests of the compliance along a path, and of force-controlled drives."""
 
 from dataclasses import replace
 
@@ -12,7 +12,7 @@ from forcefit.assembly.path.path_errors import path_errors
 from forcefit.assembly.path.path_file import PathTable
 from tests.assembly.path.moving_robots_for_tests import hinge, instants
 
-ALONG_X = [0, np.pi / 2, 0]  # turns z into x
+ALONG_X = [0, np.pi / 2, 0]  # rotation vector that rotates z to x
 MASS = 3.0
 
 
@@ -23,14 +23,14 @@ def slide(name, **more):
 
 
 def spring(k):
-    """Only the coordinate of a drive is elastic."""
+    """Return the stiffness of a drive that is compliant along its axis only."""
     K = np.diag(np.full(6, np.inf))
     K[5, 5] = k
     return K
 
 
-def test_closed_clearance_is_compliant_along_its_round_bound():
-    """On a bound of radius c, the force m a acts like a spring of stiffness m a / c."""
+def test_compliance_along_contact_rim_equals_clearance_over_force():
+    """The compliance along the rim of a clearance c is c / (m a)."""
     c, k = 2e-5, 1e7
     rail = slide("rail", joint_stiffness=spring(k))
     seat = Frame("seat", "rail", rotation=[0, -np.pi / 2, 0],
@@ -47,10 +47,8 @@ def test_closed_clearance_is_compliant_along_its_round_bound():
     np.testing.assert_allclose(across, c / (MASS * abs(accelerations[:, 0])), rtol=1e-6)
 
 
-def test_centrifugal_force_stiffens_an_elastic_hinge():
-    """The lever arm of the dead force m omega^2 L gives K = k + m omega^2 L^2 at the
-    hinge.
-    """
+def test_centrifugal_force_stiffens_elastic_hinge():
+    """The stiffness of the hinge is k + m omega^2 L^2."""
     k, length, rates = 200.0, 0.4, np.array([[0.0], [10.0], [25.0]])
     K = np.diag(np.full(6, np.inf))
     K[2, 2] = k
@@ -66,7 +64,7 @@ def test_centrifugal_force_stiffens_an_elastic_hinge():
     np.testing.assert_allclose(nominal[:, 2, 2], 1 / k, rtol=1e-12)
 
 
-def test_exact_state_rejects_a_link_with_density():
+def test_exact_state_rejects_link_with_density():
     link = BeamLink({"radius": 0.01}, 70e9, 0.3, 2700.0)
     tip = Frame("tip", "hub", [0.4, 0, 0], link=link)
     robot = Robot("arm", "tip", (hinge("hub"), tip))
@@ -78,15 +76,15 @@ def test_exact_state_rejects_a_link_with_density():
 
 
 def two_drives():
-    """One cart on two drives along x: the second is redundant."""
+    """Return a cart with two parallel drives along x."""
     tool = Frame("tool", "a", mass=MASS)
     end = Frame("end", "b")
     drives = slide("a", joint_stiffness=spring(1e6)), slide("b")
     return Robot("cart", "tool", (*drives, tool, end), (("end", "tool"),))
 
 
-def test_drive_with_a_force_unloads_the_other_drive():
-    """m a = F_a + F_b at each instant."""
+def test_forces_of_two_drives_sum_to_inertial_force():
+    """At each instant, m a = F_a + F_b."""
     table = PathTable(("tx",), np.array([[0.0], [0.1]]))
     found = errors_along_path(
         two_drives(), table, profile="quintic", duration=0.2, points=21,
@@ -99,8 +97,8 @@ def test_drive_with_a_force_unloads_the_other_drive():
     assert replace(found.robot, remarks=()) == replace(by_robot, remarks=())
 
 
-def test_an_interrupted_path_resumes_with_the_same_results(tmp_path):
-    """Ctrl-C after the first block: the file equals that of an uninterrupted run."""
+def test_interrupted_path_resumes_with_same_results(tmp_path):
+    """The computation is interrupted after the first block of points."""
     table = PathTable(("tx",), np.array([[0.0], [0.1]]))
 
     def compute(file, progress=lambda done, total: None):

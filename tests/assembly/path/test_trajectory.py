@@ -1,4 +1,4 @@
-"""Profiles and splines against textbook values, and invalid path input."""
+"""Tests of motion profiles, splines and path files."""
 
 import numpy as np
 import pytest
@@ -20,8 +20,8 @@ def line(*values, times=None):
 
 
 @pytest.mark.parametrize("profile", PEAKS)
-def test_profile_peaks_equal_textbook_values(profile):
-    """Peaks in units of D / T and D / T^2, from 0 to 1, at rest at both ends."""
+def test_profile_peaks_equal_closed_form(profile):
+    """The peaks are in units of D / T and D / T^2."""
     t = np.linspace(0, 1, 30_001)
     s, speed, acceleration = PROFILES[profile](t)
     peak_speed, peak_acceleration = PEAKS[profile]
@@ -29,22 +29,20 @@ def test_profile_peaks_equal_textbook_values(profile):
     assert np.abs(acceleration).max() == pytest.approx(peak_acceleration, rel=1e-7)
     assert (s[0], s[-1]) == pytest.approx((0, 1))
     assert (speed[0], speed[-1]) == pytest.approx((0, 0))
-    # the acceleration jumps twice: a step each counts half too much
+    # the trapezoidal rule has an error at each of two jumps of the acceleration
     step = 9.1 * t[1] if profile == "trapezoid" else 1e-8
     np.testing.assert_allclose(integral(speed, t), s, atol=1e-8)
     np.testing.assert_allclose(integral(acceleration, t), speed, atol=step)
 
 
 def integral(values, t):
-    """Integral from the first instant to each, by the trapezoidal rule."""
+    """Return the integral up to each instant by the trapezoidal rule."""
     steps = (values[1:] + values[:-1]) / 2 * np.diff(t)
     return np.concatenate([[0.0], np.cumsum(steps)])
 
 
-def test_polynomial_profiles_end_with_zero_acceleration_or_jerk():
-    """The acceleration vanishes at the ends of the quintic, and of degree seven also
-    the jerk.
-    """
+def test_polynomial_profiles_have_zero_acceleration_at_ends():
+    """The jerk is also zero at the ends of the profile of degree seven."""
     h = 1e-5
     for profile, order in (("quintic", 1), ("seventh", 2)):
         acceleration = PROFILES[profile](np.array([0.0, h, 2 * h]))[2]
@@ -54,7 +52,7 @@ def test_polynomial_profiles_end_with_zero_acceleration_or_jerk():
 
 
 @pytest.mark.parametrize("profile", PEAKS)
-def test_limits_of_speed_and_acceleration_determine_the_shortest_duration(profile):
+def test_duration_is_shortest_within_speed_and_acceleration_limits(profile):
     speed, acceleration = PEAKS[profile]
     path, D = line(0.1, 0.3), 0.2
     by_speed = profiled(path, 11, profile, 1.0, speed=0.5)
@@ -63,8 +61,8 @@ def test_limits_of_speed_and_acceleration_determine_the_shortest_duration(profil
     assert by_both.duration == pytest.approx(np.sqrt(acceleration * D), rel=1e-5)
 
 
-def test_two_rows_with_times_are_the_quintic_profile():
-    """The spline at rest at both ends is the minimum-jerk quintic."""
+def test_spline_through_two_poses_equals_quintic_profile():
+    """Speed and acceleration are zero at both ends."""
     by_time = timed(line(0.0, 0.4, times=np.array([1.0, 3.0])), 9)
     by_profile = profiled(line(0.0, 0.4), 9, "quintic", 1.0, duration=2.0)
     for name in ("values", "first", "second"):
@@ -73,18 +71,16 @@ def test_two_rows_with_times_are_the_quintic_profile():
         )
 
 
-def test_path_with_moving_ends_reproduces_a_quintic_motion():
-    """A quintic spline through samples of t^5 is t^5, even at unequal times."""
+def test_spline_with_moving_ends_reproduces_quintic_motion():
+    """A quintic spline through samples of t^5 is equal to t^5."""
     times = np.array([0.0, 0.3, 0.5, 0.9, 1.4, 1.7, 2.0])
     path = timed(line(*times**5, times=times), 41, ends="moving")
     np.testing.assert_allclose(path.values[:, 0], path.times**5, atol=1e-12)
     np.testing.assert_allclose(path.second[:, 0], 20 * path.times**3, atol=1e-9)
 
 
-def test_acceleration_of_a_sampled_cosine_converges_with_fourth_order():
-    """The second derivative of a quintic spline has an error of h^4 away from
-    its ends.
-    """
+def test_spline_acceleration_converges_with_fourth_order():
+    """Far from its ends, the second derivative has an error proportional to h^4."""
     errors = []
     for count in (11, 21, 41):
         times = np.linspace(0, 2 * np.pi, count)
@@ -96,10 +92,8 @@ def test_acceleration_of_a_sampled_cosine_converges_with_fourth_order():
     assert (orders > 3.5).all()
 
 
-def test_motion_profile_over_many_rows_has_continuous_acceleration():
-    """Along three collinear rows, the speed is that of the profile and the curve is
-    smooth.
-    """
+def test_profile_along_several_poses_has_continuous_acceleration():
+    """The path consists of three collinear positions, or of three corners."""
     path = profiled(line(0.0, 0.1, 0.4), 101, "quintic", 1.0, duration=1.0)
     straight = profiled(line(0.0, 0.4), 101, "quintic", 1.0, duration=1.0)
     np.testing.assert_allclose(path.values, straight.values, atol=1e-14)
@@ -127,7 +121,7 @@ def test_motion_profile_over_many_rows_has_continuous_acceleration():
          "found 2 rows, expected at least 6"),
     ],
 )  # fmt: skip
-def test_path_that_cannot_be_computed_is_rejected(call, message):
+def test_invalid_trajectory_options_are_rejected(call, message):
     with pytest.raises(ValueError, match=message):
         call(line(0.0, 0.1))
 
@@ -166,6 +160,6 @@ def test_path_file_preserves_times_names_and_ids(tmp_path):
     np.testing.assert_array_equal(path.values, [[0, 0.14], [0.01, 0.15]])
 
 
-def test_decreasing_times_are_rejected_and_no_file_is_written():
+def test_decreasing_times_are_rejected():
     with pytest.raises(ValueError, match="path: row 2, time: found -1 s after 0 s"):
         check_path(line(0, 1, times=np.array([0.0, -1.0])))

@@ -134,18 +134,18 @@ def test_path_in_python_equals_that_of_the_command(run, slide):
 
 
 BAD = {
-    "no times": ([], "found no times; expected a column time, --interval or --profile"),
+    "no times": ([], "found no times; expected one of a column time, --interval and "),
     "unknown profile": (["--profile", "quintik", "--duration", "1"],
                         'found "quintik"; did you mean "quintic"?'),
     "no duration": (["--profile", "quintic"], "--profile: expected --duration"),
-    "limit alone": (["--interval", "1", "--speed", "1"], "--speed: found without"),
+    "limit alone": (["--interval", "1", "--speed", "1"], "--speed: found no --profile"),
     "negative": (["--profile", "quintic", "--duration", "-1"], "--duration: found -1"),
     "infinite": (["--profile", "quintic", "--speed", "inf"], "--speed: found inf"),
     "twice": (["--profile", "quintic", "--duration", "1", "--interval", "1"],
               "found --interval and --profile"),
     "ends": (["--interval", "1", "--ends", "reset"], '--ends: found "reset"; did you'),
     "moving": (["--profile", "quintic", "--duration", "1", "--ends", "moving"],
-               "--ends moving: found together with --profile"),
+               "--ends moving: found --profile"),
     "points": (["--interval", "1", "--points", "1"], "--points: found 1, expected 2"),
     "assumption": (["--interval", "1", "--assumption", "budget"],
                    '--assumption: found "budget"'),
