@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _ASSUMED = (
-    "Inertia and weight act as static loads at each instant. Vibration, damping and "
-    "inertial forces due to the deflection are neglected.",
+    "Quasi-static model, in which inertia and weight act as loads at each instant. "
+    "Vibration, damping and inertial forces due to the deflection are neglected.",
     "Control errors of the drives are neglected.",
     "The accelerations are those of the rigid nominal robot. The mass of a beam is "
     "distributed along the beam.",

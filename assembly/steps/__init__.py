@@ -1,6 +1,6 @@
-"""Stepwise assembly: bodies are located, joined and released one step at a time.
+"""Stepwise assembly: bodies are fixed, joined and released one step at a time.
 
-Start with ``plan.py``, which defines the steps as data, then ``run.py``, which carries
-them out.  Each step results in an equilibrium (``equilibrium.py``), computed from the
-state after the preceding step.
+``plan.py`` defines the steps, and ``run.py`` computes the results of a plan.  The state
+after each step is an equilibrium (``equilibrium.py``), which depends on the state
+before the step.
 """

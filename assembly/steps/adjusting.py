@@ -1,15 +1,15 @@
-"""Adjustments: changes of a geometric error that minimise a reading.
-
-The solution method depends on the case:
+"""Adjustments: changes of a geometric error that minimise a measured value.
 
 ====================== =============================================================
-no loose clearance     the reading is linear in the change: least squares
-closure, no loads      convex in the change and the clearances together: one equilibrium
-frame, or loads        piecewise linear in the change, because the equilibrium
-                       determines which clearances are in contact: the Gauss-Newton
-                       method finds local minima, and the smaller one is taken.  It
-                       starts from the present error, and from the change that is best
-                       if all clearances remain where they are pressed
+problem                method
+====================== =============================================================
+no loose clearance     The measured value is linear in the change.  Linear least
+                       squares are used.
+closure, no loads      The energy is convex in the change and the motions within
+                       clearances.  One equilibrium is computed.
+frame, or loads        The measured value is piecewise linear in the change.  The
+                       Gauss-Newton method finds local minima from two initial
+                       guesses, and the smaller minimum is used.
 ====================== =============================================================
 """
 
@@ -30,17 +30,19 @@ from forcefit.assembly.steps.state import (
 )
 from forcefit.inputs.table import BadInput, quoted
 
-_MOST_STEPS, _HALVINGS = 30, 12  # largest numbers of steps, and halvings per step
+_MOST_STEPS, _HALVINGS = 30, 12  # maximum number of steps, and of halvings of a step
 _STEP = 1e-7  # [rad, reference lengths] step of the finite differences
-# derivatives below this fraction of the largest one are finite-difference errors
-_FLAT = 1e-6
-_SETTLED = 1e-7  # relative reduction of the reading below which the search stops
+_FLAT = 1e-6  # [-] threshold of a zero derivative, relative to the largest
+_SETTLED = 1e-7  # [-] convergence tolerance on the relative change of the value
 
 
 def with_adjustment(
     machine: Machine, state: State, step: Adjust, amount: NDArray
 ) -> State:
-    """Return the state with a changed geometric error, before its equilibrium."""
+    """Return a state with a changed geometric error.
+
+    Its equilibrium is not computed.
+    """
     first = 6 * machine.posture.robot.index(step.frame)
     errors = state.errors.copy()
     errors[:, first + rows_of(step.components)] += amount
@@ -48,18 +50,18 @@ def with_adjustment(
 
 
 def adjustment_of(machine: Machine, state: State, step: Adjust) -> NDArray:
-    """Compute the (k, a) [rad or m] change that minimises the reading of a step.
+    """Return the change of a geometric error that minimises a measured value.
 
     Args:
-        machine: columns and rows of the robot.
+        machine: the robot in array form.
         state: state before the step.
         step: the adjustment.
 
     Returns:
-        Changes of the frame's geometric error in its a adjusted components.
+        (k, a) [rad or m] changes of the a adjusted components of the error.
 
     Raises:
-        BadInput: some clearances are loose while the joint of the frame is bolted.
+        BadInput: the joint of the frame is bolted, and other clearances are loose.
     """
     if step.amount is not None:
         return np.broadcast_to(step.amount, (len(state.errors), len(step.components)))
@@ -76,7 +78,7 @@ def adjustment_of(machine: Machine, state: State, step: Adjust) -> NDArray:
 
 
 def _linear_adjustment(machine: Machine, state: State, step: Adjust) -> NDArray:
-    """Find the adjustment that minimises a reading if no clearance is loose."""
+    """Return the best adjustment if no clearance is loose."""
     count = len(step.components)
     value = _to_vanish(machine, state, step)
     slopes = np.empty((value.shape[1], count))
@@ -85,13 +87,13 @@ def _linear_adjustment(machine: Machine, state: State, step: Adjust) -> NDArray:
         unit[:, i] = 1.0
         moved = settle(machine, with_adjustment(machine, state, step, unit))
         slopes[:, i] = (_to_vanish(machine, moved, step) - value)[0]
-    # of all equally good changes, take the smallest, with lengths in reference lengths
+    # minimum-norm solution, with lengths in reference lengths
     unit = 1 / machine.scale[rows_of(step.components)]
     return -value @ np.linalg.pinv(slopes * unit).T * unit
 
 
 def _best_local_adjustment(machine: Machine, state: State, step: Adjust) -> NDArray:
-    """Return the better of two adjustments at local minima of the reading."""
+    """Return the better of two adjustments at local minima."""
     none = np.zeros((len(state.errors), len(step.components)))
     amount, size = _local_adjustment(machine, state, step, none)
     pressed = _linear_adjustment(*_with_pressed_clearances(machine, state), step)
@@ -101,7 +103,7 @@ def _best_local_adjustment(machine: Machine, state: State, step: Adjust) -> NDAr
 
 
 def _with_pressed_clearances(machine: Machine, state: State) -> tuple[Machine, State]:
-    """Return the machine with its current clearances as fixed geometric errors."""
+    """Return a machine whose motions within clearances are fixed geometric errors."""
     moved, joints = state.found.clearances @ machine.cones.T, machine.joints
     fixed = replace(joints, cones=joints.cones[:, :0], group=joints.group[:0])
     found = replace(state.found, clearances=state.found.clearances[:, :0])
@@ -112,7 +114,7 @@ def _with_pressed_clearances(machine: Machine, state: State) -> tuple[Machine, S
 def _local_adjustment(
     machine: Machine, state: State, step: Adjust, start: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Return the adjustment at a local minimum of the reading, and the (k,) minimum."""
+    """Return the adjustment at a local minimum, and the minimum (k,)."""
     unit = 1 / machine.scale[rows_of(step.components)]
     amount = start
     value, slopes = _value_and_slopes(machine, state, step, amount)
@@ -120,7 +122,7 @@ def _local_adjustment(
         inverse = np.linalg.pinv(slopes * unit, rcond=_FLAT)
         change = -np.einsum("kcp,kp->kc", inverse, value) * unit
         size, going = np.linalg.norm(value, axis=1), np.ones(len(value), dtype=bool)
-        for _ in range(_HALVINGS):  # a full step may lead to another set of contacts
+        for _ in range(_HALVINGS):  # a full step may change the contacts
             trial = amount + change * going[:, None]
             found = _value_at(machine, state, step, trial)
             less = np.linalg.norm(found, axis=1) < size * (1 - _SETTLED)
@@ -138,7 +140,7 @@ def _local_adjustment(
 def _value_and_slopes(
     machine: Machine, state: State, step: Adjust, amount: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Evaluate minimised quantities (k, p), and their derivatives by adjustment."""
+    """Return the quantities to minimise (k, p), and their derivatives."""
     value = _value_at(machine, state, step, amount)
     slopes = np.empty((*value.shape, len(step.components)))
     for i, scale in enumerate(machine.scale[rows_of(step.components)]):
@@ -150,28 +152,26 @@ def _value_and_slopes(
 
 
 def _value_at(machine: Machine, state: State, step: Adjust, amount: NDArray) -> NDArray:
-    """Evaluate the quantities that an adjustment minimises, after a trial change."""
+    """Return the quantities to minimise for a trial adjustment."""
     moved = settle(machine, with_adjustment(machine, state, step, amount))
     return _to_vanish(machine, moved, step)
 
 
 def _check_not_bolted(machine: Machine, state: State, step: Adjust) -> None:
-    """Reject an adjustment in a bolted joint while other clearances are loose."""
+    """Raise BadInput for an adjustment of a bolted joint."""
     if machine.posture.robot.index(step.frame) in state.bolted.values():
         raise BadInput(
-            f"step {quoted(step.name)}: found clearances that are not bolted, and "
-            f"{quoted(step.frame)}, whose joint is bolted; expected another frame to "
-            "adjust"
+            f"step {quoted(step.name)}: found an adjustment of {quoted(step.frame)}, "
+            "whose joint is bolted, although other joints with clearance are not "
+            "bolted; expected another frame to adjust"
         )
 
 
 def _closing_adjustment(machine: Machine, state: State, step: Adjust) -> NDArray:
     """Return the adjustment that minimises the energy required to close a loop.
 
-    The changes are treated as free motions of the closed machine, whose energy is
-    convex in the changes and the clearances together.  If several changes are equally
-    good, the smallest of those that keep the clearances closest to their positions is
-    taken.
+    The adjusted errors are treated as free motions of the closed machine.  If several
+    adjustments have the same energy, the smallest one is returned.
     """
     rows = rows_of(step.components)
     units = np.zeros((len(machine.free), len(rows)))
@@ -188,7 +188,7 @@ def _closing_adjustment(machine: Machine, state: State, step: Adjust) -> NDArray
 
 
 def _least_change(machine: Machine, state: State, count: int) -> NDArray:
-    """Return the smallest values (k, a) of the last a motions with equal openings."""
+    """Return the smallest values of the last a motions with equal openings, (k, a)."""
     motions = machine.movable((), tuple(state.bolted.values()), 1)[2][:-count]
     rows = np.vstack([hold.rows for hold in state.holds.values()])
     changing, free = rows @ machine.free[:, -count:], rows @ machine.free[:, :-count]
@@ -201,7 +201,7 @@ def _least_change(machine: Machine, state: State, count: int) -> NDArray:
 
 
 def _to_vanish(machine: Machine, state: State, step: Adjust) -> NDArray:
-    """Return the quantities to minimise: a reading, or the strains of a closure."""
+    """Return the quantities to minimise: a screw, or the springs of a closed loop."""
     part = step.reading.part
     if isinstance(part, str):
         return reading_of(machine, state, step.reading)

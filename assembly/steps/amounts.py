@@ -1,10 +1,8 @@
-"""Simultaneous optimisation of all adjustments of a plan for one objective.
+"""Simultaneous optimisation of all adjustments of a plan.
 
-The search starts from the changes with which each adjustment minimises its own reading.
-A Gauss-Newton method then differentiates the whole plan by finite differences, for
-which all trial changes are carried out together, as machines that differ in their
-adjustments. A change is accepted only if the objective decreases, so the result, a
-local minimum, is never worse than the starting point.
+The Gauss-Newton method minimises an objective of the whole plan.  The initial guess is
+the plan in which each adjustment minimises its own measured value.  Derivatives are
+computed by finite differences.  The result is a local minimum.
 """
 
 from collections.abc import Callable
@@ -20,31 +18,31 @@ from forcefit.assembly.steps.run import StepResult, carry_out
 from forcefit.assembly.steps.state import State
 
 _STEP = 1e-7  # [rad, reference lengths] step of the finite differences
-# derivatives below this fraction of the largest one are finite-difference errors
-_FLAT = 1e-6
-# largest number of Gauss-Newton steps, and fractions of each step that are tried
+_FLAT = 1e-6  # [-] threshold of a zero derivative, relative to the largest
+# maximum number of Gauss-Newton steps, and trial fractions of a step
 _MOST_STEPS, _SHARES = 20, 0.5 ** np.arange(8)
-_SETTLED = 1e-7  # relative reduction of the objective below which the iteration stops
+_SETTLED = 1e-7  # [-] convergence tolerance on the relative change of the objective
 
-# function from a number of machines to their state before the first step
+# function that returns the state of a given number of machines before the first step
 Start = Callable[[int], State]
 
 
 def with_best_amounts(
     plan: Plan, machine: Machine, start: Start, objective: str, given: float
 ) -> tuple[Plan, float]:
-    """Optimise all adjustments of a plan together; return the plan and its objective.
+    """Return a plan whose adjustments minimise an objective together.
 
     Args:
         plan: a feasible plan.
-        machine: columns and rows of the robot.
-        start: function from a number of equal machines to their state before the plan.
+        machine: the robot in array form.
+        start: function that returns the state of a given number of equal machines
+            before the plan.
         objective: ``"force"``, ``"energy"`` or ``"error"``.
-        given: objective if each adjustment minimises its own reading.
+        given: objective if each adjustment minimises its own measured value.
 
     Returns:
-        The plan, with the changes as ``amount`` of its adjustments, and the objective.
-        Without an improvement, both are returned as passed.
+        The plan with the optimal ``amount`` of each adjustment, and the objective.
+        Without an improvement, both are returned unchanged.
     """
     steps = [step for step in plan.steps if isinstance(step, Adjust)]
     if not steps:
@@ -81,14 +79,14 @@ def with_best_amounts(
 
 
 def _rounded(steps: list[Adjust], amounts: NDArray) -> NDArray:
-    """Round adjustments to multiples of the increments of their steps."""
+    """Return adjustments rounded to multiples of their increments."""
     sizes = np.concatenate([np.full(len(s.components), s.increment) for s in steps])
     whole = np.where(sizes > 0, sizes, 1.0)
     return np.where(sizes > 0, whole * np.round(amounts / whole), amounts)
 
 
 def _with_amounts(plan: Plan, amounts: NDArray) -> Plan:
-    """Return a plan with the given changes (.., total) of its adjustments."""
+    """Return a plan with given amounts of its adjustments, (.., total)."""
     steps, first = [], 0
     for step in plan.steps:
         if isinstance(step, Adjust):
@@ -100,7 +98,7 @@ def _with_amounts(plan: Plan, amounts: NDArray) -> Plan:
 
 
 def _carried_out(plan: Plan, machine: Machine, state: State) -> list[StepResult]:
-    """Carry out all steps of a plan; return their results."""
+    """Return the results of all steps of a plan."""
     results = []
     for step in plan.steps:
         state, result = carry_out(machine, state, step)
@@ -111,7 +109,7 @@ def _carried_out(plan: Plan, machine: Machine, state: State) -> list[StepResult]
 def _outcome(
     plan: Plan, machine: Machine, state: State, objective: str
 ) -> tuple[NDArray, NDArray]:
-    """Evaluate the least-squares residuals (k, p) of a plan, and its objective (k,)."""
+    """Return the residuals (k, p) and the objective (k,) of a plan."""
     forces = [np.zeros((len(state.errors), 3))]
     screw = machine.platform_screw(state.errors, state.found)
     for step in plan.steps:

@@ -1,10 +1,11 @@
 """Joints that are bolted at one pose and are rigid afterwards (``locked_at``).
 
-Just before a joint is bolted, its clearance moves, without loads, to a position at
-which closing the loops requires minimum energy. If there are several such positions,
-the one with the smallest sum of squares, in units of the clearance bounds, is taken.
-Bolting locks this clearance in, so that it acts like a geometric error at all other
-poses. Joints are bolted in the order of the frames; joints with the same pose are
+Before a joint is bolted, it moves within its clearance, without loads, to the position
+with minimum energy.  If there are several such positions, the position with the
+smallest sum of squares is used, where motions are divided by the clearance.  At all
+other poses, this motion is locked and acts like a geometric error.
+
+Joints are bolted in the order of the frames.  Consecutive joints with the same pose are
 bolted together.
 """
 
@@ -31,12 +32,12 @@ from forcefit.inputs.table import BadInput, quoted
 from forcefit.results.display import numbers
 
 BOLT_STREAM = 4  # random number stream of the bolted positions, see draw_generator
-_ROUNDED = 1e-12  # clearances below this fraction of their bound are round-off
-_BOLTED = "is bolted at"  # words in the remark on a bolted joint
+_ROUNDED = 1e-12  # [-] threshold of a zero motion, relative to the clearance
+_BOLTED = "is bolted at"  # words by which a remark on a bolted joint is recognised
 _RULES = {
     "least": "",
-    "uniform": ", drawn machines anywhere at least energy",
-    "worst": "; assembly error bounds the error of all other positions",
+    "uniform": "; random machines are bolted at random positions of minimum energy",
+    "worst": '; "assembly error" bounds the error for all other positions',
 }
 
 
@@ -45,20 +46,19 @@ class CannotBolt(BadInput):
 
 
 def bolt_joints(robot: Robot, rng: np.random.Generator | None = None) -> Robot:
-    """Lock in the clearances of a robot's bolted joints.
+    """Return a robot whose bolted joints are rigid.
 
     Args:
-        robot: robot with solved link stiffnesses.
-        rng: random number generator for the position in a drawn machine, see
+        robot: robot with known link stiffnesses.
+        rng: random number generator for joints with ``left = "uniform"``, see
             :func:`bolted_errors`.
 
     Returns:
-        The robot, with the locked-in screws included in its geometric errors. If no
-        joint is bolted, the robot is returned as passed.
+        The robot.  Its geometric errors include the locked motions of bolted joints.
 
     Raises:
-        BadInput: the pose at which a joint is bolted is out of reach, or the robot
-            cannot be assembled there; the message names the frame.
+        BadInput: the robot cannot reach the pose at which a joint is bolted, or it
+            cannot be assembled there.
     """
     if not any(frame.locked_at for frame in robot.frames):
         return robot
@@ -77,7 +77,7 @@ def bolt_joints(robot: Robot, rng: np.random.Generator | None = None) -> Robot:
 
 
 def _remark(frame: Frame) -> str:
-    """Format a sentence on the position in which a joint is bolted."""
+    """Return a remark on the position at which a joint is bolted."""
     assert frame.locked_at is not None
     screw = numbers(frame.locked_at.screw)
     rule = _RULES[frame.locked_at.left]
@@ -87,15 +87,15 @@ def _remark(frame: Frame) -> str:
 def bolt_generators(
     robot: Robot, seed: int, draws: Sequence[int] | NDArray
 ) -> list[np.random.Generator] | None:
-    """Return random number generators for the bolted positions of drawn machines.
+    """Return random number generators for the bolted positions of random machines.
 
     Args:
         robot: any robot.
         seed: seed of all draws.
-        draws: numbers of the draws.
+        draws: indices of the draws.
 
     Returns:
-        One generator per draw; None if no position is random.
+        A generator for each draw, or None if no position is random.
     """
     bolts = [frame.locked_at for frame in robot.frames]
     if all(bolt is None or bolt.left != "uniform" for bolt in bolts):
@@ -107,22 +107,21 @@ def bolt_generators(
 def bolted_errors(
     robot: Robot, errors: NDArray, rngs: Sequence[np.random.Generator] | None = None
 ) -> NDArray:
-    """Lock in the clearances of bolted joints in the errors of k machines.
+    """Return the errors of k machines, including the locked motions of bolted joints.
 
     Args:
-        robot: robot of n frames with solved link stiffnesses; the errors in its file
-            are not used.
-        errors: (k, n, 6) [rad, m] errors of the machines, without locked-in screws.
-        rngs: k random number generators for joints with ``left = "uniform"``; if None,
-            these joints are bolted at the smallest sum of squares.
+        robot: robot with n frames and known link stiffnesses.  Its own errors are not
+            used.
+        errors: (k, n, 6) [rad, m] errors of the machines without bolted joints.
+        rngs: k random number generators for joints with ``left = "uniform"``.  If None,
+            these joints are bolted at the position with the smallest sum of squares.
 
     Returns:
-        (k, n, 6) [rad, m] errors including the locked-in screws. If no joint is bolted,
-        the array is returned as passed.
+        (k, n, 6) [rad, m] errors including the locked motions.
 
     Raises:
         CannotBolt: a machine cannot be assembled at the pose where it is bolted.
-        BadInput: the pose at which a joint is bolted is out of reach.
+        BadInput: the robot cannot reach the pose at which a joint is bolted.
     """
     total = errors
     for frames, machine in _bolts(robot):
@@ -138,7 +137,7 @@ def bolted_errors(
 def _loose_state(
     robot: Robot, frames: list[int], machine: Machine, errors: NDArray
 ) -> State:
-    """Return machines at the pose where a joint is bolted, just before bolting."""
+    """Return the state of machines before joints are bolted, at the pose of bolting."""
     try:
         return first_state(machine, Plan(()), errors, None)
     except (CannotAssemble, SolverFailed) as error:
@@ -149,7 +148,7 @@ def _loose_state(
 def _with_locked(
     machine: Machine, frames: list[int], errors: NDArray, u: NDArray
 ) -> NDArray:
-    """Add the locked-in clearances of bolted frames to errors."""
+    """Return errors to which the locked motions of bolted frames are added."""
     moved = np.where(np.abs(u) > _ROUNDED, u, 0.0) @ machine.cones.T
     total = errors.copy()
     total[:, frames] += moved.reshape(total.shape)[:, frames]
@@ -157,14 +156,13 @@ def _with_locked(
 
 
 def last_bolt(robot: Robot) -> tuple[list[int], Machine, State]:
-    """Return the joints that are bolted last, and the machine just before.
+    """Return the joints that are bolted last, and the state before they are bolted.
 
     Args:
         robot: robot with a joint that has ``left = "worst"``.
 
     Returns:
-        Indices of the frames, and the machine and its state at the pose of bolting,
-        with these joints still loose.
+        Indices of the frames; and the machine and its state at the pose of bolting.
 
     Raises:
         BadInput: a joint with ``left = "worst"`` is not bolted last, or the robot
@@ -177,8 +175,8 @@ def last_bolt(robot: Robot) -> tuple[list[int], Machine, State]:
         if first.locked_at is not None and first.locked_at.left == "worst":
             raise BadInput(
                 f"{robot.name}: frame {quoted(first.name)}.locked_at.left: found "
-                '"worst" on a joint that is not bolted last; expected "least", or the '
-                "same pose for all joints that are left worst, last in the file"
+                '"worst" for a joint that is not bolted last; expected "least", or the '
+                'same pose for all joints with "worst", which must be last in the file'
             )
         state = _loose_state(robot, earlier, own, total)
         total = _with_locked(own, earlier, total, state.found.clearances)
@@ -187,7 +185,7 @@ def last_bolt(robot: Robot) -> tuple[list[int], Machine, State]:
 
 @lru_cache(maxsize=16)
 def _bolts(robot: Robot) -> list[tuple[list[int], Machine]]:
-    """Return the frames bolted at each pose, and the machine at that pose."""
+    """Return the indices of the frames bolted at each pose, and the machine."""
     rows = [i for i, frame in enumerate(robot.frames) if frame.locked_at is not None]
     bolts, open_ = [], set(rows)
     for _, group in groupby(rows, lambda i: _pose(robot.frames[i])):
@@ -198,14 +196,14 @@ def _bolts(robot: Robot) -> list[tuple[list[int], Machine]]:
 
 
 def _pose(frame: Frame) -> tuple:
-    """Return the common pose at which frames are bolted."""
+    """Return the pose at which a frame is bolted, as a key for comparison."""
     bolt = frame.locked_at
     assert bolt is not None
     return sorted(bolt.pose.items()), sorted(bolt.joints.items()), bolt.left
 
 
 def _posture(robot: Robot, row: int, open_: set[int]) -> Posture:
-    """Return the posture at which joints are bolted, with unbolted joints loose."""
+    """Return the posture at which a joint is bolted, while ``open_`` are not bolted."""
     frames = tuple(
         _loose(frame) if i in open_ else frame for i, frame in enumerate(robot.frames)
     )
@@ -220,14 +218,14 @@ def _posture(robot: Robot, row: int, open_: set[int]) -> Posture:
 
 
 def _loose(frame: Frame) -> Frame:
-    """Return a frame in its state before its joint is bolted."""
+    """Return a frame with the clearance that its joint has before it is bolted."""
     bolt = frame.locked_at
     assert bolt is not None
     return replace(frame, clearance=bolt.clearance, locked_at=None)
 
 
 def refuse_bolted(robot: Robot, what: str) -> None:
-    """Reject robots with bolted joints in computations that are linear in the errors.
+    """Raise BadInput for a robot with bolted joints.
 
     Args:
         robot: any robot.
@@ -240,19 +238,19 @@ def refuse_bolted(robot: Robot, what: str) -> None:
     if bolted:
         raise BadInput(
             f"{robot.name}: frame {quoted(bolted[0])}.locked_at: found a joint that is "
-            f"bolted at a pose, which the {what} does not cover; expected none, or "
-            "assembly statistics, which bolts every drawn machine"
+            f"bolted at a pose, which the {what} does not support; expected a robot "
+            'without bolted joints, or "assembly statistics", which supports them'
         )
 
 
 def loose_over_poses(robot: Robot) -> list[str]:
-    """Format a remark on fixed joints whose clearance is not bolted at any pose.
+    """Return a remark on fixed joints with a clearance that are not bolted.
 
     Args:
         robot: robot that is solved at several poses.
 
     Returns:
-        A list with one sentence, or an empty list.
+        A list with a sentence, or an empty list.
     """
     contacts = contact_frames(robot)
     owners = dict.fromkeys(
@@ -265,6 +263,7 @@ def loose_over_poses(robot: Robot) -> list[str]:
     return [
         (
             f"the clearance of the fixed joint {', '.join(map(quoted, loose))} is "
-            'loose at every pose; where it is bolted at one pose, expected "locked_at"'
+            'loose at every pose; expected "locked_at" if the joint is bolted at one '
+            "pose"
         )
     ]

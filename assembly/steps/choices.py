@@ -1,7 +1,7 @@
-"""Rules for exchanging the steps of a plan.
+"""Rules for permuting the steps of a plan.
 
-Consecutive joins and adjustments may be exchanged, except that an adjustment of a
-closure and the step that joins this closure stay in the order of the plan.
+Consecutive joins and adjustments may be permuted.  An adjustment of a closure and the
+step that joins this closure keep their order.
 """
 
 from collections.abc import Iterator
@@ -12,10 +12,10 @@ from forcefit.assembly.steps.plan import Adjust, Join, Step
 
 
 def choices(left: tuple[Step, ...]) -> Iterator[tuple[Step, tuple[Step, ...]]]:
-    """Yield each step that may come next, together with the steps that then remain.
+    """Yield each step that may be next, with the remaining steps.
 
     Args:
-        left: steps not yet carried out, in the order of the plan.
+        left: steps that are not yet completed, in the order of the plan.
 
     Yields:
         A step, and the remaining steps.
@@ -31,7 +31,7 @@ def choices(left: tuple[Step, ...]) -> Iterator[tuple[Step, tuple[Step, ...]]]:
 
 
 def _keep_order(one: Step, other: Step) -> bool:
-    """Return whether one step adjusts a closure that the other step joins."""
+    """Return whether one of two steps adjusts the closure that the other joins."""
     steps = {type(one): one, type(other): other}
     join, adjust = steps.get(Join), steps.get(Adjust)
     if not isinstance(join, Join) or not isinstance(adjust, Adjust):
@@ -40,13 +40,13 @@ def _keep_order(one: Step, other: Step) -> bool:
 
 
 def movable_runs(steps: tuple[Step, ...]) -> list[list[Step]]:
-    """Return the sequences of steps within which steps may be exchanged.
+    """Return the sequences of consecutive joins and adjustments.
 
     Args:
         steps: steps of a plan.
 
     Returns:
-        The sequences of consecutive joins and adjustments.
+        Sequences in which the steps may be permuted.
     """
     runs = groupby(steps, lambda step: isinstance(step, (Join, Adjust)))
     return [list(run) for movable, run in runs if movable]
@@ -59,7 +59,7 @@ def order_matters(run: list[Step]) -> bool:
         run: sequence of steps, see :func:`movable_runs`.
 
     Returns:
-        True if a part is joined, and a step locks in the position that it finds.
+        True if a step is a join, and the result of a step depends on the state before.
     """
     joins = [step for step in run if isinstance(step, Join)]
     return any(map(depends_on_state, run if joins else joins))

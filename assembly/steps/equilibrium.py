@@ -1,19 +1,18 @@
-"""Minimum energy of a partly assembled robot, for many sets of errors at once.
+"""Equilibrium of partly assembled robots with minimum energy.
 
-The small screws of all frames are s = e + E y + U u + F q. Here e are the errors, y the
-springs, u the clearances and q the free motions
-(:mod:`forcefit.assembly.linear.closure`).  At each assembly step, the rows
+The small screws of all frames are s = e + E y + U u + F q, where e are the errors, y
+the springs, u the motions within clearances and q the free motions
+(:mod:`forcefit.assembly.linear.closure`).  They satisfy the constraints
 
     R s + L y_f = b
 
-of all fixtures and of all closures joined so far hold, where y_f are the springs of the
-fixtures.  The equilibrium minimises y.y / 2 minus the work of the loads, and its
-multipliers are the wrenches of the rows. The unknowns are eliminated as in
-:mod:`forcefit.assembly.linear.reference.reduction`.
+of all fixtures and of all joined closures, where y_f are the springs of the fixtures.
+The equilibrium minimises y.y / 2 minus the work of the loads.  Its multipliers are the
+constraint wrenches.
 
-Clearances and free motions that the energy leaves undetermined stay as close as
-possible to their values after the preceding step. Distance means the sum of squares,
-with clearances in units of their bounds and lengths in reference lengths.
+Minimum energy may not determine all u and q.  The values closest to those after the
+previous step are then used.  The distance is the sum of squares, with u divided by the
+clearances and lengths divided by the reference length.
 """
 
 from dataclasses import dataclass
@@ -32,19 +31,20 @@ from forcefit.assembly.solvers.many_programmes import (
     minimise_energies,
 )
 
-_OPEN = 1e-12  # [rad, reference lengths] closure error that counts as round-off
-_ROUNDING = 1e-14  # round-off error of the equations relative to the right-hand side
-_SOLVED = 1e-11  # strains below this fraction of their summands are solver round-off
-_DRIVEN = 1e-8  # a smaller fraction of a load along a free motion is round-off
+_OPEN = 1e-12  # [rad, reference lengths] tolerance of closed loops
+_ROUNDING = 1e-14  # [-] round-off of the equations, relative to the right-hand side
+_SOLVED = 1e-11  # [-] round-off of the springs, relative to the summands
+_DRIVEN = 1e-8  # [-] threshold of a zero load on a free motion, relative to the load
 
 
 class Held(NamedTuple):
-    """Constraint equations of k partly assembled machines, m rows each.
+    """Constraints of k partly assembled machines.
 
     Attributes:
-        rows: (m, 6n) rows on the screws of all frames, lengths in reference lengths.
+        rows: (m, 6n) coefficients of the screws of all frames, with lengths in
+            reference lengths.
         right: (k, m) right-hand sides.
-        roots: (m, nf) columns of the fixtures' springs, whose energy is y.y / 2.
+        roots: (m, nf) coefficients of the fixtures' springs, whose energy is y.y / 2.
     """
 
     rows: NDArray
@@ -53,16 +53,15 @@ class Held(NamedTuple):
 
 
 class Movable(NamedTuple):
-    """Columns of the screws that may move, and the loads on them.
+    """Motions that are not bolted, and the loads on them.
 
     Attributes:
-        springs: (6n, ny) columns of links and joint springs, whose energy is y.y / 2.
-        cones: (6n, nu) columns of clearances, in units of their bounds.
-        group: (nu,) cone number of each clearance, from 0.
-        free: (6n, nq) columns of free motions, lengths in reference lengths.
-        on_springs: (k, ny) [sqrt(2 J)] loads on the springs. All machines have equal
-            loads.
-        on_cones: (k, nu) [J] loads on the clearances.
+        springs: (6n, ny) screws of links and joint springs, whose energy is y.y / 2.
+        cones: (6n, nu) screws of motions within clearances, for the full clearance.
+        group: (nu,) index of the cone to which each motion belongs.
+        free: (6n, nq) screws of free motions, with lengths in reference lengths.
+        on_springs: (k, ny) [sqrt(2 J)] loads on the springs, equal for all machines.
+        on_cones: (k, nu) [J] loads on the motions within clearances.
         on_free: (k, nq) [J] loads on the free motions.
     """
 
@@ -82,10 +81,10 @@ class Equilibrium:
     Attributes:
         springs: (k, ny) [sqrt(2 J)] scaled deformations of links and joints.
         fixtures: (k, nf) [sqrt(2 J)] scaled deformations of the fixtures.
-        clearances: (k, nu) clearances in units of their bounds.
+        clearances: (k, nu) motions within the clearances, divided by the clearance.
         motions: (k, nq) free motions.
-        multipliers: (k, m) [J] multipliers of the rows: derivatives of the energy with
-            respect to their right-hand sides.
+        multipliers: (k, m) [J] multipliers of the constraints, which are derivatives of
+            the energy with respect to the right-hand sides.
     """
 
     springs: NDArray
@@ -96,13 +95,13 @@ class Equilibrium:
 
     @property
     def energy(self) -> NDArray:
-        """(k,) [J] energy of all springs, including those of fixtures."""
+        """Energy of all springs, including those of fixtures, (k,) [J]."""
         links = np.vecdot(self.springs, self.springs)
         return (links + np.vecdot(self.fixtures, self.fixtures)) / 2
 
 
 class _Split(NamedTuple):
-    """Constraint rows, split into rows with springs and rows without springs."""
+    """Singular value decomposition of constraint rows, with and without springs."""
 
     basis: NDArray
     values: NDArray
@@ -114,13 +113,13 @@ class _Split(NamedTuple):
 def equilibrium(
     held: Held, movable: Movable, last: tuple[NDArray, NDArray], tolerance: float = RANK
 ) -> Equilibrium:
-    """Find the minimum-energy equilibrium closest to the last state.
+    """Return the minimum-energy equilibrium that is closest to the previous state.
 
     Args:
-        held: rows that hold, with fixed screws subtracted from their right-hand sides.
-        movable: columns that may move, and the loads on them.
-        last: preceding clearances (k, nu) and free motions (k, nq).
-        tolerance: relative size below which a singular value counts as zero.
+        held: constraints.
+        movable: motions that are not bolted, and the loads on them.
+        last: previous motions within clearances (k, nu) and free motions (k, nq).
+        tolerance: threshold of a zero singular value, relative to the largest.
 
     Returns:
         The equilibrium.
@@ -152,16 +151,17 @@ def equilibrium(
 
 
 def without_idle_weight(movable: Movable, weight: NDArray, rows: NDArray) -> Movable:
-    """Remove the weight along motions that nothing resists from the loads.
+    """Return the motions and loads without the weight on unconstrained motions.
+
+    It is assumed that the weight of a body that can still move freely is supported.
 
     Args:
-        movable: columns that may move, and the loads on them.
-        weight: (nq,) [J] part of the loads on the free motions due to weight.
-        rows: (m, 6n) rows that hold.
+        movable: motions that are not bolted, and the loads on them.
+        weight: (nq,) [J] loads on the free motions due to weight.
+        rows: (m, 6n) constraint rows.
 
     Returns:
-        The columns with reduced loads, because the fitter carries parts that are still
-        free.
+        The motions with reduced loads.
     """
     if not len(weight):
         return movable
@@ -175,18 +175,18 @@ def without_idle_weight(movable: Movable, weight: NDArray, rows: NDArray) -> Mov
 
 
 def _balancing(B_q: NDArray, drive: NDArray) -> NDArray:
-    """Return multipliers (k, m) that balance the loads on the free motions."""
+    """Return multipliers that balance the loads on the free motions, (k, m)."""
     if not drive.any():
         return np.zeros((len(drive), len(B_q)))
     start = np.linalg.lstsq(B_q.T, -drive.T, rcond=RANK)[0].T
     left = np.abs(start @ B_q + drive).max()
     if left > _DRIVEN * np.abs(drive).max():
-        raise FreeMotion("a load drives a motion that nothing resists")
+        raise FreeMotion("a load acts on a free motion, which nothing resists")
     return start
 
 
 def _split(A: NDArray, tolerance: float, noise: float) -> _Split:
-    """Split constraint rows by singular values: with springs, without springs."""
+    """Return the constraint rows as combinations with and without springs."""
     if not A.size:
         count = A.shape[0]
         none = np.zeros((count, 0)), np.eye(count), np.zeros((A.shape[1], 0))
@@ -200,7 +200,7 @@ def _least(
     split: _Split, A_u: NDArray, right: NDArray, movable: Movable, by_motions: NDArray,
     last: NDArray, noise: float,
 ) -> tuple[NDArray, NDArray, NDArray]:  # fmt: skip
-    """Compute clearances, strains and multipliers of constraint rows with springs."""
+    """Return the motions within clearances, the springs and the multipliers."""
     S = split.values
     h, rigid = right @ split.elastic / S, right @ split.rigid
     if not A_u.shape[1]:
@@ -214,7 +214,10 @@ def _least(
     d = movable.on_cones + by_motions
     least = minimise_energies(G, h, d, H, k, movable.group)
     if not least.feasible.all():
-        raise CannotAssemble("neither springs nor clearances can close the loops")
+        raise CannotAssemble(
+            "the loops cannot be closed by deformations of springs and by motions "
+            "within the clearances"
+        )
     u = _closest(G, h, d, H, least, last, movable.group)
     strains = u @ G.T + h
     terms = np.abs(u) @ np.abs(G).T + np.abs(h)
@@ -226,12 +229,12 @@ def _least(
 
 
 def _check_closed(rigid: NDArray, right: NDArray) -> None:
-    """Reject constraint rows that neither springs nor clearances can satisfy."""
+    """Raise CannotAssemble if a loop without springs and clearances is open."""
     left = np.abs(rigid).max(initial=0.0)
     if left > _OPEN + 1e-9 * np.abs(right).max(initial=0.0):
         raise CannotAssemble(
-            f"a rigid part stays open by {left:.3g} rad or reference lengths: no "
-            "clearance or spring acts there"
+            f"a rigid loop stays open by {left:.3g} rad or reference lengths, because "
+            "it has no clearance or spring in this direction"
         )
 
 
@@ -239,8 +242,8 @@ def _closest(
     G: NDArray, h: NDArray, d: NDArray, H: NDArray, least: Minima, last: NDArray,
     group: NDArray,
 ) -> NDArray:  # fmt: skip
-    """Find the minimum-energy clearances closest to the preceding ones."""
-    rows = np.vstack([G, H, d[:1]])  # one row of d: machines have equal loads
+    """Return the minimum-energy motions in clearances closest to the previous ones."""
+    rows = np.vstack([G, H, d[:1]])  # the loads d are equal for all machines
     size = np.linalg.norm(rows, axis=1)
     rows = rows[size > 0] / size[size > 0, None]
     u = least.clearances
@@ -252,7 +255,7 @@ def _closest(
 
 
 def _moved(B_q: NDArray, right: NDArray, last: NDArray) -> NDArray:
-    """Find the free motions closest to the last ones that satisfy all constraints."""
+    """Return the free motions closest to the last ones that satisfy the constraints."""
     if not B_q.shape[1]:
         return last
     return last + (right - last @ B_q.T) @ np.linalg.pinv(B_q, rcond=RANK).T

@@ -1,22 +1,20 @@
 """Influence of the order of joins on the assembled machine.
 
-A join that is bolted "as it lies" locks in the present opening G_k x.  The set S
-of earlier joins has changed this opening by A_kS lambda_S + B_k q, where
+A join can lock its present opening G_k x.  The set S of earlier joins has changed this
+opening by A_kS lambda_S + B_k q, where
 
 ======  ======================  =====================================================
 symbol  code                    meaning
 ======  ======================  =====================================================
-A_kj    ``coefficients``        G_k K^-1 G_j^T, the influence coefficient of j at k
-B_k     ``free``                opening at k by motions that nothing resists
+A_kj    ``coefficients``        influence coefficient G_k K^-1 G_j^T of join j at k
+B_k     ``free``                opening at k per unit of each free motion q
 lambda                          wrenches of the earlier joins
 ======  ======================  =====================================================
 
-K is the stiffness of the machine before the first of these joins.  Assume that A_kj = 0
-for all other joins j, and that no free motion changes the openings at k and j together.
-Then k finds the same opening after every set of other joins, so its place in the order
-does not matter. Free motions that change only the opening at j, for example the
-rotation of its own pin, are omitted together with the wrenches that they do not
-transmit.
+K is the stiffness of the machine before the first of these joins.  If A_kj = 0 for all
+other joins j, and if no free motion changes the openings at k and j together, the
+opening at k does not depend on the order of the joins.  Free motions that change only
+the opening at j, for example the rotation of its pin, are omitted.
 """
 
 from collections.abc import Sequence
@@ -30,21 +28,21 @@ from forcefit.assembly.steps.machine import Machine
 from forcefit.assembly.steps.plan import Adjust, Fix, Join, Plan, Step, rows_of
 from forcefit.assembly.steps.state import State
 
-_ZERO = 1e-9  # relative size below which an influence counts as round-off error
-_FREE = 1e-11  # stiffnesses below this fraction of the largest one count as zero
+_ZERO = 1e-9  # [-] threshold of a zero influence, relative to the largest possible one
+_FREE = 1e-11  # [-] threshold of a zero stiffness, relative to the largest
 
 
 @dataclass(frozen=True, eq=False)
 class Influence:
-    """Effect of closing one part on the opening at another part.
+    """Influence of one join on the opening that another join locks.
 
     Attributes:
-        locked: step that locks in the opening that it finds.
-        joined: another step, which closes a part.
-        coefficients: (p, r) [rad, m per N m, N] motion of the p components that are
-            locked, per unit of the r components of the closing wrench.
+        locked: step that locks its present opening.
+        joined: another joining step.
+        coefficients: (p, r) [rad, m per N m, N] change of p locked components per unit
+            of r components of the closing wrench.
         free: whether a free motion changes both openings.
-        zero: whether closing the part leaves the opening unchanged for all errors.
+        zero: whether the join does not change the opening for any errors.
     """
 
     locked: str
@@ -55,27 +53,27 @@ class Influence:
 
 
 def why_order_matters(plan: Plan) -> str:
-    """Explain why the final state depends on the order; empty if it does not.
+    """Return the steps because of which the final state depends on the order.
 
     Args:
         plan: any plan.
 
     Returns:
-        Text that lists the steps whose outcome depends on the preceding state.
+        Names of the steps whose result depends on the state before, or an empty string.
     """
     steps = [step.name for step in plan.steps if depends_on_state(step)]
     return ", ".join(steps)
 
 
 def depends_on_state(step: Step) -> bool:
-    """Return whether a step locks in the position in which it finds a part.
+    """Return whether the result of a step depends on the state before the step.
 
     Args:
         step: any step.
 
     Returns:
-        True for parts locked as they lie, force limits that leave an opening, clamps
-        that hold a part where it lies, and adjustments.
+        True for joints and clamps that lock the present position, for force limits that
+        leave an opening, and for adjustments.
     """
     if isinstance(step, Join):
         return isinstance(step.part, str) or bool(step.locked) or step.leave_open
@@ -83,15 +81,15 @@ def depends_on_state(step: Step) -> bool:
 
 
 def influences(machine: Machine, state: State, run: Sequence[Join]) -> list[Influence]:
-    """Compute the influence of all joins on the joins that lock in an opening.
+    """Return the influence of all joins on the joins that lock an opening.
 
     Args:
-        machine: columns and rows of the robot.
-        state: state before the first of the joins; all its clearances are bolted.
-        run: exchangeable joins.
+        machine: the robot in array form.
+        state: state before the first of the joins, without loose clearances.
+        run: joins whose order may be changed.
 
     Returns:
-        One result for each pair of a state-dependent join and another join.
+        Influence for each pair of a join that locks an opening and another join.
     """
     rows = [_rows(machine, join) for join in run]
     bodies, free = _motions(machine, state)
@@ -119,13 +117,13 @@ def influences(machine: Machine, state: State, run: Sequence[Join]) -> list[Infl
 
 
 def _moving_alone(moved: list[NDArray], j: int) -> NDArray:
-    """Return the free motions, as columns, that change only one part's opening."""
+    """Return the free motions that change only the opening at join j, as columns."""
     others = np.vstack([np.zeros((1, moved[j].shape[1])), *moved[:j], *moved[j + 1 :]])
     return null_space(others, rcond=_ZERO) if others.size else np.zeros((0, 0))
 
 
 def _carried(motions: NDArray) -> NDArray:
-    """Return the projector on wrenches that do no work on one part's free motions."""
+    """Return the projector on wrenches that do no work on given motions."""
     return np.eye(len(motions)) - motions @ np.linalg.pinv(motions, rcond=_ZERO)
 
 
@@ -140,7 +138,7 @@ def _size(A: NDArray) -> float:
 
 
 def _unit(machine: Machine, join: Join) -> NDArray:
-    """Return factors that convert a join's rows from reference lengths to m."""
+    """Return factors that convert reference lengths to m, for the opening at a join."""
     if isinstance(join.part, str):
         frames = np.abs(machine.free).reshape(-1, 6, machine.free.shape[1]).any(axis=1)
         return machine.free_size[frames[machine.posture.robot.index(join.part)]]
@@ -148,7 +146,7 @@ def _unit(machine: Machine, join: Join) -> NDArray:
 
 
 def _rows(machine: Machine, join: Join) -> NDArray:
-    """Return the derivatives of a join's opening by springs and by free motions."""
+    """Return the derivative of the opening at a join by springs and free motions."""
     ny = machine.springs.shape[1]
     if isinstance(join.part, str):
         row = machine.posture.robot.index(join.part)
@@ -160,15 +158,15 @@ def _rows(machine: Machine, join: Join) -> NDArray:
 
 
 def _motions(machine: Machine, state: State) -> tuple[NDArray, NDArray]:
-    """Return elastic motions W, scaled so that A = W W^T, and free motions.
+    """Return the elastic motions and the free motions that satisfy all constraints.
 
     Returns:
-        Columns on springs and free motions that satisfy all rows that hold.
+        Elastic motions W, with K^-1 = W W^T, and free motions, as columns.
     """
     movable, _, motions = machine.movable((), tuple(state.bolted.values()), 1)
     holds = list(state.holds.values())
     ny, nq = machine.springs.shape[1], machine.free.shape[1]
-    size = 1 / max(_size(machine.springs), 1e-300)  # scales springs like free motions
+    size = 1 / max(_size(machine.springs), 1e-300)  # scaling factor of the springs
     roots = [hold.roots for hold in holds]
     columns = np.hstack([machine.springs * size, machine.free[:, motions]])
     held = [hold.rows @ columns for hold in holds]

@@ -1,4 +1,4 @@
-"""Array form of a robot at a posture: motion columns, closure and frame rows."""
+"""Robot at a posture in array form, for assembly in steps."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -26,11 +26,11 @@ Part = tuple[str, str] | str
 
 @dataclass(frozen=True, eq=False)
 class Machine:
-    """A robot of n frames at a posture.
+    """A robot with n frames at a posture.
 
     Attributes:
         posture: pose at which the robot is assembled.
-        joints: columns of its springs, clearances and free motions.
+        joints: virtual joints: springs, clearances and free motions.
         size: [m] reference length.
     """
 
@@ -40,46 +40,46 @@ class Machine:
 
     @property
     def springs(self) -> NDArray:
-        """(6n, ny) columns of links and joint springs."""
+        """Screws of links and joint springs, (6n, ny)."""
         return self.joints.elastic
 
     @property
     def cones(self) -> NDArray:
-        """(6n, nu) columns of clearances, in units of their bounds."""
+        """Screws of motions within clearances, for the full clearance, (6n, nu)."""
         return self.joints.cones
 
     @cached_property
     def free_size(self) -> NDArray:
-        """(nq,) unit of each free motion: 1 rad, or the reference length [m]."""
+        """Unit of each free motion, 1 rad or the reference length [m], (nq,)."""
         angles = np.tile(np.repeat([True, False], 3), len(self.joints.free) // 6)
         turns = self.joints.free[angles].any(axis=0)
         return np.where(turns, 1.0, self.size)
 
     @cached_property
     def free(self) -> NDArray:
-        """(6n, nq) columns of free motions, lengths in reference lengths."""
+        """Screws of free motions, with lengths in reference lengths, (6n, nq)."""
         return self.joints.free * self.free_size
 
     @property
     def scale(self) -> NDArray:
-        """(6,) factors that make translations comparable with rotations."""
+        """Factors that divide translations by the reference length, (6,)."""
         return in_reference_lengths(self.size)
 
     @property
     def tolerance(self) -> float:
-        """Relative size below which a singular value counts as zero."""
+        """Threshold of a zero singular value, relative to the largest."""
         return rank_tolerance(float(self.posture.mismatch))
 
     def rows(self, part: Part) -> NDArray:
-        """Return the rows for a frame's screw or a closure's opening.
+        """Return the matrix that converts screws of all frames to one screw or opening.
 
         Args:
-            part: a frame, or the two frames of a closure.
+            part: name of a frame, or names of the two frames of a closure.
 
         Returns:
-            (6, 6n) rows in the axes of the frame or of the closure's first frame, at
-            its origin; lengths in reference lengths.  If the first frame is the end of
-            a drawn joint, the rows are in the axes of this joint, at its point.
+            (6, 6n) matrix, with lengths in reference lengths.  The result is in the
+            axes of the frame or of the closure's first frame, at its origin.  In a
+            robot file of format 2, it is in the axes of the joint, at its point.
         """
         robot, paths = self.posture.robot, self.posture.paths
         if isinstance(part, str):
@@ -95,16 +95,16 @@ class Machine:
     def movable(
         self, loads: Sequence[FrameLoads], bolted: Sequence[int], count: int
     ) -> tuple[Movable, NDArray, NDArray]:
-        """Return the columns that may move, and the loads on them.
+        """Return the motions that are not bolted, and the loads on them.
 
         Args:
             loads: loads that act on frames.
-            bolted: frames whose joints are bolted as they lie.
+            bolted: indices of frames whose joints are bolted.
             count: number of machines.
 
         Returns:
-            The columns; and bool masks of the clearances (nu,) and motions (nq,) among
-            them.
+            The motions and loads, and whether each clearance (nu,) and each free motion
+            (nq,) is included.
         """
         frames = np.repeat(~np.isin(np.arange(len(self.springs) // 6), bolted), 6)
         cones = np.abs(self.cones)[frames].any(axis=0)
@@ -123,22 +123,22 @@ class Machine:
         return movable, cones, motions
 
     def values(self, rows: NDArray, errors: NDArray, found: Equilibrium) -> NDArray:
-        """Evaluate rows for the screws of all frames.
+        """Return the product of a matrix and the screws of all frames.
 
         Args:
-            rows: (m, 6n) rows from :meth:`rows`.
+            rows: (m, 6n) matrix from :meth:`rows`.
             errors: (k, 6n) [rad, m] geometric errors.
-            found: springs, clearances and free motions.
+            found: equilibrium.
 
         Returns:
-            (k, m) values, lengths in reference lengths.
+            (k, m) values, with lengths in reference lengths.
         """
         value = errors @ rows.T + found.springs @ (rows @ self.springs).T
         value += found.clearances @ (rows @ self.cones).T
         return value + found.motions @ (rows @ self.free).T
 
     def platform_screw(self, errors: NDArray, found: Equilibrium) -> NDArray:
-        """Return the platform's screw (k, 6) [rad, m] at its origin, base axes."""
+        """Return the platform screw at its origin, base axes, (k, 6) [rad, m]."""
         robot = self.posture.robot
         row = robot.index(robot.platform)
         own = self.values(self.rows(robot.platform), errors, found) / self.scale
@@ -147,16 +147,16 @@ class Machine:
     def opening(
         self, errors: NDArray, found: Equilibrium, holds: Mapping[str, Any], hold: Any
     ) -> NDArray:
-        """Return the part of an opening that free motions cannot close.
+        """Return the opening of a closure that free motions cannot close.
 
         Args:
             errors: (k, 6n) geometric errors.
-            found: springs, clearances and free motions.
-            holds: rows that hold already.
-            hold: rows to be closed.
+            found: equilibrium.
+            holds: active constraints.
+            hold: constraints of the closure.
 
         Returns:
-            (k, m) right-hand sides minus row values, lengths in reference lengths.
+            (k, m) opening, with lengths in reference lengths.
         """
         open_ = hold.right - self.values(hold.rows, errors, found)
         rows = [other.rows @ self.free for other in holds.values()]
@@ -167,7 +167,7 @@ class Machine:
         return open_ - open_ @ np.linalg.pinv(columns, rcond=RANK).T @ columns.T
 
     def work(self, loads: Sequence[FrameLoads], state: Any) -> NDArray:
-        """Return the work (k,) [J] of loads on all screws of a state."""
+        """Return the work of loads in a state, (k,) [J]."""
         if not loads:
             return np.zeros(len(state.errors))
         found, links = state.found, self.joints.links
@@ -181,7 +181,7 @@ class Machine:
 
 
 def machine_at(posture: Posture) -> Machine:
-    """Convert a robot at a posture to arrays.
+    """Return a robot at a posture in array form.
 
     Args:
         posture: pose at which the robot is assembled.

@@ -1,9 +1,9 @@
-"""Assembly plan: the steps as data.
+"""Steps of an assembly plan.
 
-A frame's screw is expressed at the frame's origin in its axes, after its joint.  The
-opening of a closure is expressed at the origin of the closure's first frame, in the
-axes of that frame; after a drawn joint, at the joint's point and in its axes.
-Components are named ``RX RY RZ TX TY TZ`` as for a screw.
+The screw of a frame refers to the origin and the axes of the frame.  The opening of a
+closure refers to the origin and the axes of its first frame.  In a robot file of format
+2, it refers to the point and the axes of the joint.  Components are named ``RX RY RZ TX
+TY TZ``.
 """
 
 from collections.abc import Mapping
@@ -18,7 +18,7 @@ from forcefit.inputs.table import BadInput, quoted
 from forcefit.stiffness.screws import SCREW
 
 Closure = tuple[str, str]
-GRAVITY = "gravity"  # name of the weight in the dictionary of acting loads
+GRAVITY = "gravity"  # name of the weights in the dictionary of loads
 
 
 @dataclass(frozen=True)
@@ -28,11 +28,12 @@ class Fix:
     Attributes:
         name: name of the step.
         frame: frame that is held.
-        position: [rad, m] fixture error by component; unlisted components are free.
-            None to hold all six components where the frame lies.
-        stiffness: [N m/rad, N/m] fixture stiffness by component; unlisted components
-            are rigid.
-        kind: ``"fix"`` or ``"clamp"``, the kind of step named in results.
+        position: [rad, m] position error of the fixture by component.  Components that
+            are not listed are free.  With None, the fixture holds all six components at
+            their present position.
+        stiffness: [N m/rad, N/m] stiffness of the fixture by component.  Components
+            that are not listed are rigid.
+        kind: kind of step in results, ``"fix"`` or ``"clamp"``.
     """
 
     name: str
@@ -48,13 +49,13 @@ class Join:
 
     Attributes:
         name: name of the step.
-        part: the two frames of a closure, or the frame whose joint is bolted as it
-            lies.
-        locked: components of the closure's opening that are bolted as they lie; all
+        part: names of the two frames of a closure, or name of the frame whose joint is
+            bolted at its present position.
+        locked: components of the opening that are locked at their present value.  All
             others are closed.
         force_limit: [N] largest closing force.
-        leave_open: whether the opening that remains at the force limit is locked in.
-            Otherwise the closure is closed, and the excess force is reported.
+        leave_open: whether the opening that remains at the force limit is locked.
+            Otherwise, the loop is closed, and the excess force is reported.
     """
 
     name: str
@@ -66,7 +67,7 @@ class Join:
 
 @dataclass(frozen=True, eq=False)
 class Preload:
-    """A step that applies a wrench to a frame's body, until the step is released.
+    """A step that applies a wrench to a body, until the step is released.
 
     Attributes:
         name: name of the step.
@@ -81,11 +82,11 @@ class Preload:
 
 @dataclass(frozen=True)
 class Release:
-    """A step that removes fixtures, clamps, preloads or joints of earlier steps.
+    """A step that removes the fixtures, clamps, preloads or joints of earlier steps.
 
     Attributes:
         name: name of the step.
-        steps: names of the earlier steps to release together.
+        steps: names of the earlier steps.
     """
 
     name: str
@@ -109,18 +110,16 @@ class Measure:
 
 @dataclass(frozen=True)
 class Adjust:
-    """A step in which a shim or an adjustable joint compensates a reading.
+    """A step in which a shim or an adjustable joint compensates a measured value.
 
     Attributes:
         name: name of the step.
         frame: frame whose geometric error is changed.
         components: components of the error that are changed.
-        reading: quantity to minimise: components of a frame's screw, or the energy
-            required to close a closure.
-        increment: [rad or m] changes are rounded to multiples of this value; 0 for
-            continuous changes.
-        amount: (a,) or (k, a) [rad or m] change made regardless of the reading, from
-            :func:`forcefit.assembly.steps.amounts.with_best_amounts`.
+        reading: quantity to minimise, which is the screw of a frame, or the energy
+            required to close a loop.
+        increment: [rad or m] increment of the adjustment; 0 if it is continuous.
+        amount: (a,) or (k, a) [rad or m] given adjustment; None to compute it.
     """
 
     name: str
@@ -136,13 +135,13 @@ Step = Fix | Join | Preload | Release | Measure | Adjust
 
 @dataclass(frozen=True)
 class Plan:
-    """The steps of assembly, in order.
+    """The steps of an assembly.
 
-    Closures that are not joined by any step are closed before the first step. Joints
-    that are not bolted by any step retain their clearance.
+    Closures that no step joins are closed before the first step.  Joints that no step
+    bolts retain their clearance.
 
     Attributes:
-        steps: the steps.
+        steps: the steps in order.
     """
 
     steps: tuple[Step, ...]
@@ -154,22 +153,22 @@ class Plan:
 
 
 def check_plan(plan: Plan, robot: Robot) -> None:
-    """Reject steps that are inconsistent with the robot or with each other.
+    """Raise BadInput for a plan that is inconsistent.
 
     Args:
         plan: any plan.
         robot: the robot to be assembled.
 
     Raises:
-        BadInput: a name is unknown or used twice, a part is joined twice, a step
-            releases something that is not held, or a drive of the robot applies a
-            force. The message starts with the step.
+        BadInput: a name is unknown or used twice, a closure or joint is joined twice, a
+            released step is not active, or a drive of the robot is force-controlled.
     """
     driven = [frame.name for frame in robot.frames if frame.drive_force]
     if driven:
         raise BadInput(
-            f"{robot.name}: frame {quoted(driven[0])}.drive_force: found a drive that "
-            "applies a force, which steps of assembly do not compute; expected none"
+            f"{robot.name}: frame {quoted(driven[0])}.drive_force: found a "
+            "force-controlled drive, which assembly steps do not support; expected no "
+            "drive_force"
         )
     taken = {closure_name(closure): "a closure" for closure in robot.closures}
     taken |= {GRAVITY: "the weights"}
@@ -193,7 +192,7 @@ def check_plan(plan: Plan, robot: Robot) -> None:
         if isinstance(step, Release):
             for name in step.steps:
                 if name not in held:
-                    found = f"found {quoted(name)}, which nothing holds"
+                    found = f"found {quoted(name)}, which is not an active step"
                     raise BadInput(f"{where}.release: {found}; expected {_held(held)}")
                 del held[name]
 
@@ -208,7 +207,7 @@ def _parts_of(step: Step) -> list[Closure | str]:
 
 
 def _check_part(where: str, part: Closure | str, robot: Robot) -> None:
-    """Reject a frame or a closure that the robot does not have."""
+    """Raise BadInput for a frame or a closure that the robot does not have."""
     if isinstance(part, str):
         try:
             robot.index(part)
@@ -221,20 +220,26 @@ def _check_part(where: str, part: Closure | str, robot: Robot) -> None:
 
 
 def _check_join(where: str, step: Join, robot: Robot, held: Mapping) -> None:
-    """Reject a part that is already joined, and a joint without clearance to bolt."""
+    """Raise BadInput for a join that is impossible."""
     if step.part in held.values():
-        raise BadInput(f"{where}.join: found a part that is joined already")
+        raise BadInput(
+            f"{where}.join: found a closure or frame that is joined already, expected "
+            "another closure or frame"
+        )
     if isinstance(step.part, str):
         frame = robot.frame(step.part)
         if frame.clearance is None and (not frame.passive or frame.compliant):
             found = f"found {quoted(step.part)}, whose joint has no clearance"
-            raise BadInput(f"{where}.join: {found} and no motion to bolt")
+            raise BadInput(
+                f"{where}.join: {found} and no motion to bolt, expected a frame whose "
+                "joint can move"
+            )
 
 
 def _held(held: Mapping) -> str:
-    """List the names of the steps that may be released."""
+    """Return the names of the steps that may be released, for error messages."""
     names = ", ".join(map(quoted, held))
-    return f"one of {names}" if names else "an earlier step that holds something"
+    return f"one of {names}" if names else "an earlier step to release"
 
 
 def closure_name(closure: Closure) -> str:
@@ -243,5 +248,5 @@ def closure_name(closure: Closure) -> str:
 
 
 def rows_of(components: tuple[str, ...]) -> NDArray:
-    """Return the indices of components of a screw."""
+    """Return the indices of named components of a screw."""
     return np.array([SCREW.index(c) for c in components], dtype=int)

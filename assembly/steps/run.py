@@ -1,14 +1,14 @@
-"""Execution of an assembly plan, on one machine or many that differ in their errors.
+"""Results of an assembly plan for one or many machines, which differ in their errors.
 
-The machine is linear in small screws at one posture. Each step changes the set of rows
-that hold; the equilibrium then follows from the preceding state (``equilibrium.py``).
+The model is linear in small screws at one posture.  Each step changes the active
+constraints, and the new equilibrium depends on the previous one (``equilibrium.py``).
 
 ======  ==================  ==========  ==============================================
 symbol  code                shape       meaning
 ======  ==================  ==========  ==============================================
-E       ``energy``          (k,)        [J] of all springs, including the fixtures
-lambda  ``closing_wrench``  (k, 6)      [N m, N] largest wrench that closes a closure
-gamma   ``opening``         (k, 6)      [rad, m] before the closure is closed
+E       ``energy``          (k,)        [J] energy of all springs and fixtures
+lambda  ``closing_wrench``  (k, 6)      [N m, N] wrench that closes a loop
+gamma   ``opening``         (k, 6)      [rad, m] opening before the loop is closed
 ======  ==================  ==========  ==============================================
 """
 
@@ -46,8 +46,8 @@ from forcefit.assembly.steps.state import (
     without,
 )
 
-_ROUNDED = 1e-13  # smaller relative energy differences are round-off
-_HALVINGS = 50  # bisections for the fraction of an opening that a limited force closes
+_ROUNDED = 1e-13  # [-] threshold of a zero energy difference, relative to the energy
+_HALVINGS = 50  # number of bisections to compute the opening at a limited force
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,26 +57,25 @@ class StepResult:
     Attributes:
         step: the step.
         energy: (k,) [J] energy after the step.
-        work: (k,) [J] work done by the step: by the closing wrench, a clamp, or a
-            slowly increasing preload.
-        load_work: (k,) [J] work of the loads that act both before and after the step.
+        work: (k,) [J] work of the closing wrench, of a clamp, or of a preload that
+            increases slowly.
+        load_work: (k,) [J] work of the loads that act before and after the step.
         lost: (k,) [J] energy dissipated by a release.
-        closing_wrench: (k, 6) [N m, N] largest closing wrench, in the axes of the
+        closing_wrench: (k, 6) [N m, N] wrench after the step, in the axes of the
             closure or fixture; 0 for other steps.
-        opening: (k, 6) [rad, m] opening of the closure before the step, less the part
-            that free motions can close.
-        left_open: (k, 6) [rad, m] opening that a force limit leaves after the step.
-        exceeded: (k,) bool, whether closing requires more than the allowed force.
-        spring_back: (k, 6) [rad, m] motion of the released part (the last one if
-            several are released), in its axes.
-        reading: (k, p) [rad or m] reading of a measurement.
-        adjustment: (k, a) [rad or m] change made by an adjustment.
-        platform_screw: (k, 6) [rad, m] screw after the step, at the platform's origin,
-            base axes.
-        wrenches: (k, 6) [N m, N] locked-in wrenches after the step, by name of the
-            holding step, in its axes.
-        balance: (k,) [J] work, or dissipated energy, minus half the multipliers times
-            the opening; NaN with clearances or gravity.
+        opening: (k, 6) [rad, m] opening of the closure before the step.  It excludes
+            the opening that free motions can close.
+        left_open: (k, 6) [rad, m] opening that remains because of the force limit.
+        exceeded: (k,) bool, True if the closing force exceeds the force limit.
+        spring_back: (k, 6) [rad, m] motion of a closure or frame after its release, in
+            its axes.
+        reading: (k, p) [rad or m] values of a measurement.
+        adjustment: (k, a) [rad or m] amount of an adjustment.
+        platform_screw: (k, 6) [rad, m] screw of the platform after the step, at its
+            origin, base axes.
+        wrenches: (k, 6) [N m, N] wrenches of closures and fixtures after the step, by
+            name of the step that created them.
+        balance: (k,) [J] error of the energy balance; NaN with clearances or gravity.
     """
 
     step: Step
@@ -97,7 +96,7 @@ class StepResult:
 
     @property
     def closing_force(self) -> NDArray:
-        """(k,) [N] norm of the force part of the closing wrench."""
+        """Magnitude of the closing force, (k,) [N]."""
         return np.linalg.norm(self.closing_wrench[:, 3:], axis=1)
 
 
@@ -107,23 +106,23 @@ def assemble_in_steps(
     errors: ArrayLike | None = None,
     gravity: ArrayLike | None = None,
 ) -> list[StepResult]:
-    """Carry out an assembly plan, and return the result of each step.
+    """Return the result of each step of an assembly plan.
 
     Args:
-        plan: the steps.
-        posture: pose at which the robot of n frames is assembled.
+        plan: steps of assembly.
+        posture: pose at which the robot with n frames is assembled.
         errors: (k, n, 6) [rad, m] geometric errors of k machines; None for the errors
             in the robot file.
-        gravity: (3,) [m/s^2] gravity in base axes, which acts from the beginning but
-            does not move parts that nothing holds yet.
+        gravity: (3,) [m/s^2] gravity in base axes.  It does not act on free motions,
+            because bodies that are not yet joined are assumed to be supported.
 
     Returns:
-        The results, one per step.
+        The results of all steps.
 
     Raises:
         BadInput: the plan is inconsistent with the robot.
-        CannotAssemble: the constraints of rigid parts contradict each other.
-        FreeMotion: a load acts along a motion that nothing resists.
+        CannotAssemble: the constraints of rigid bodies contradict each other.
+        FreeMotion: a load acts on a motion without stiffness.
         SolverFailed: the solver for the clearances did not converge.
     """
     check_plan(plan, posture.robot)
@@ -137,12 +136,12 @@ def assemble_in_steps(
 
 
 def carry_out(machine: Machine, state: State, step: Step) -> tuple[State, StepResult]:
-    """Carry out one step of a plan.
+    """Return the state after a step, and the result of the step.
 
     Args:
-        machine: columns and rows of the robot.
+        machine: the robot in array form.
         state: state before the step.
-        step: step of a checked plan.
+        step: step of a plan that :func:`check_plan` accepts.
 
     Returns:
         The state after the step, and the result.
@@ -182,7 +181,7 @@ def _row(machine: Machine, step: Join) -> int:
 def _join(
     machine: Machine, state: State, step: Join, blank: StepResult
 ) -> tuple[State, StepResult]:
-    """Close a closure, except for the components that are bolted as they lie."""
+    """Return the state and the result after a closure is joined."""
     assert not isinstance(step.part, str)
     hold = closed_rows(machine, state, step.part)
     opening = machine.opening(state.errors, state.found, state.holds, hold)
@@ -214,10 +213,10 @@ def _join(
 
 
 def _share(linear: bool, limit: float, needed: NDArray, force: Callable) -> NDArray:
-    """Return the fraction (k,) of each opening that the limited force can close."""
+    """Return the fraction of each opening that a limited force can close, (k,)."""
     share = np.minimum(1.0, limit / np.maximum(needed, 1e-300))
     if linear:
-        return share  # the closing force is proportional to the closed fraction
+        return share  # the closing force is proportional to the fraction
     low, high = np.zeros_like(needed), np.ones_like(needed)
     for _ in range(_HALVINGS):
         middle = (low + high) / 2
@@ -227,7 +226,7 @@ def _share(linear: bool, limit: float, needed: NDArray, force: Callable) -> NDAr
 
 
 def _blank(machine: Machine, state: State, step: Step) -> StepResult:
-    """Return the result of a step that does no work and moves no part."""
+    """Return the result of a step that changes nothing."""
     k = len(state.errors)
     zero, six, empty = np.zeros(k), np.zeros((k, 6)), np.zeros((k, 0))
     return StepResult(
@@ -240,7 +239,7 @@ def _blank(machine: Machine, state: State, step: Step) -> StepResult:
 
 
 def _wrenches(machine: Machine, state: State) -> dict[str, NDArray]:
-    """Return the wrenches (k, 6) [N m, N] of all closures and fixtures that hold."""
+    """Return the wrenches of all joined closures and active fixtures, by step name."""
     found = state.multipliers()
     wrenches = np.zeros((len(state.errors), len(found), 6))
     for i, (name, multipliers) in enumerate(found.items()):
@@ -254,7 +253,7 @@ def _wrenches(machine: Machine, state: State) -> dict[str, NDArray]:
 def _told(
     machine: Machine, before: State, after: State, result: StepResult
 ) -> tuple[State, StepResult]:
-    """Return the state after a step, and the result of the step with its energies."""
+    """Return the state after a step, and the result of the step including energies."""
     step = result.step
     kept = [after.loads[name] for name in after.loads if name in before.loads]
     load_work = machine.work(kept, after) - machine.work(kept, before)
@@ -277,10 +276,10 @@ def _told(
 
 
 def _half_work(machine: Machine, before: State, after: State, step: Step) -> NDArray:
-    """Return the work (k,) [J] of a linear step from its wrenches and openings.
+    """Return the work of a step computed from wrenches and displacements, (k,) [J].
 
-    The work is half the wrench that a step adds, or a release removes, times the motion
-    against this wrench. It is NaN for all other kinds of steps.
+    For a step that adds or removes a wrench, it is half the product of the wrench and
+    the displacement.  For other steps, it is NaN.
     """
     if step.name in after.holds:
         hold, multipliers = after.holds[step.name], after.multipliers()[step.name]
@@ -301,7 +300,7 @@ def _half_work(machine: Machine, before: State, after: State, step: Step) -> NDA
 
 
 def _spring_back(machine: Machine, before: State, after: State, step: Step) -> NDArray:
-    """Return the motion (k, 6) [rad, m] of the last part that a step releases."""
+    """Return the motion of the last closure or frame that a step releases, (k, 6)."""
     motion = np.zeros((len(after.errors), 6))
     released = step.steps if isinstance(step, Release) else ()
     for name in released:

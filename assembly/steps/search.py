@@ -1,15 +1,15 @@
 """Search for the joining order with minimum force, energy or error.
 
-Only joining and adjusting steps are permuted, within each uninterrupted sequence of
-such steps. An adjustment of a closure and the step that joins this closure keep their
-order. If no step locks in a position, the state depends only on the set of parts joined
-so far. Minimising the peak force is then a shortest-path problem over the 2^n sets,
-with the maximum in place of the sum. The path is searched from its end, because the
-state of a set contains the closing forces of all its parts. If joints are bolted as
-they lie, the joining orders are searched by branch and bound. As a lower bound on the
-peak force, the search uses the peak so far; as a lower bound on the final energy, the
-energy of the state in which all pinned parts are joined and all locked parts are left
-open. No bound is known for the error.
+Consecutive joins and adjustments are permuted (:mod:`.choices`).  There are two
+methods:
+
+- If no joint is bolted at its present position, the state depends only on the set of
+  joined closures.  Minimising the peak force is a shortest-path problem over the 2^n
+  sets, where the length of a path is its largest force.  The search starts from the set
+  of all closures, because its equilibrium contains the closing force of each closure.
+- Otherwise, the orders are searched by branch and bound.  The lower bound on the peak
+  force is the peak so far.  The lower bound on the final energy is the energy with all
+  closures joined that have no locked components.  There is no bound on the error.
 """
 
 from collections.abc import Callable
@@ -35,11 +35,11 @@ from forcefit.inputs.table import BadInput, quoted
 
 Objective = Literal["force", "energy", "error"]
 OBJECTIVES: tuple[Objective, ...] = ("force", "energy", "error")
-_EQUAL = 1e-9  # smallest relative improvement that replaces the given order
-MOST_STATES = 200_000  # largest number of computed states, which takes a few minutes
+_EQUAL = 1e-9  # [-] smallest relative improvement over the given order
+MOST_STATES = 200_000  # maximum number of computed states, which takes a few minutes
 
 
-# a partial order of steps: state, peak force, completed steps, remaining steps
+# partial order of steps: state, peak force, completed steps, remaining steps
 _Partial = tuple[State, float, tuple[Step, ...], tuple[Step, ...]]
 
 
@@ -48,11 +48,10 @@ class BestOrder:
     """Best order of the steps of a plan.
 
     Attributes:
-        plan: the plan in the best order, including the changes made by its adjustments.
+        plan: the plan in the best order, with the amounts of its adjustments.
         value: value of the objective [N, J or m].
-        bound: lower bound over all orders, equal to ``value`` if all orders were
-            searched. It is 0 if some adjustments improve on those that minimise the
-            readings.
+        bound: lower bound of the objective over all orders.  It is 0 if the adjustments
+            were optimised together.
         given: value for the order in the given plan; inf if it cannot be assembled.
         searched: number of computed sets or partial orders.
         method: ``"sets"`` or ``"orders"``.
@@ -74,23 +73,24 @@ def best_order(
     progress: Callable[[int], None] = lambda done: None,
     most: int = MOST_STATES,
 ) -> BestOrder:
-    """Find the order of the joining steps that minimises an objective.
+    """Return the order of the joining steps that minimises an objective.
 
     Args:
-        plan: the steps; consecutive joins and adjustments are permuted.
+        plan: steps whose consecutive joins and adjustments are permuted.
         posture: pose at which the robot is assembled.
-        objective: ``"force"`` [N], the largest closing force of any step; ``"energy"``
-            [J], the energy stored at the end; ``"error"`` [m], the translation of the
-            platform at the end.
+        objective: ``"force"`` for the largest closing force [N] of all steps,
+            ``"energy"`` for the final energy [J], or ``"error"`` for the final
+            translation error of the platform [m].
         gravity: (3,) [m/s^2] gravity in base axes.
-        progress: called with the number of computed states.
-        most: number of states after which the search stops with a bound.
+        progress: function called with the number of computed states.
+        most: maximum number of computed states.
 
     Returns:
-        The best order found, with a bound.
+        The best order found, with a lower bound of the objective.
 
     Raises:
-        BadInput: the plan does not fit the robot, or no order can be assembled.
+        BadInput: the plan is inconsistent with the robot, or the robot cannot be
+            assembled in any order.
     """
     check_plan(plan, posture.robot)
     machine = machine_at(posture)
@@ -118,7 +118,7 @@ def best_order(
 
 @dataclass(eq=False)
 class _Search:
-    """Search with its machine, objective and number of computed states."""
+    """Settings of a search, and the number of computed states."""
 
     machine: Machine
     objective: Objective
@@ -127,7 +127,7 @@ class _Search:
     done: int = 0
 
     def carry_out(self, state: State, step: Step) -> tuple[State, StepResult] | None:
-        """Carry out a step; return None if the machine cannot be assembled."""
+        """Return the state after a step and its result, or None if impossible."""
         self.done += 1
         self.progress(self.done)
         try:
@@ -138,7 +138,7 @@ class _Search:
     def closing_forces(
         self, start: State, run: list[Step], chosen: int
     ) -> list[tuple[int, float]]:
-        """Return the closing force [N] of each part in a set if joined last."""
+        """Return the closing force [N] of each closure in a set, if joined last."""
         self.done += 1
         self.progress(self.done)
         joined = [k for k in range(len(run)) if chosen >> k & 1]
@@ -159,7 +159,7 @@ class _Search:
         return list(zip(joined, forces, strict=True))
 
     def value(self, peak: float, state: State) -> float:
-        """Evaluate the objective of a state, given the peak force of its steps."""
+        """Return the objective for a state and the peak force of its steps."""
         if self.objective == "force":
             return peak
         if self.objective == "energy":
@@ -185,7 +185,7 @@ class _Search:
         return float(closed.found.energy[0])
 
     def value_of(self, state: State, steps: tuple[Step, ...]) -> float:
-        """Evaluate the objective of steps in the given order; inf if infeasible."""
+        """Return the objective for steps in a given order; inf if impossible."""
         peak = 0.0
         for step in steps:
             found = self.carry_out(state, step)
@@ -196,14 +196,14 @@ class _Search:
 
 
 def _force(result: StepResult) -> float:
-    """Return the closing force [N] of a step; 0 if the step joins nothing."""
+    """Return the closing force [N] of a step, or 0 if the step is not a join."""
     return float(result.closing_force[0]) if isinstance(result.step, Join) else 0.0
 
 
 def _over_sets(
     search: _Search, state: State, runs: list[list[Step]], given: float
 ) -> BestOrder:
-    """Find the best order if the state depends only on the set of joined parts."""
+    """Return the best order if the state depends only on the set of joined closures."""
     steps: list[Step] = []
     peak = bound = 0.0
     for run in runs:
@@ -224,12 +224,11 @@ def _over_sets(
 def _bottleneck(
     search: _Search, start: State, run: list[Step]
 ) -> tuple[list[Step], float, float]:
-    """Return the order of a sequence with minimum peak force, the force and a bound.
+    """Return the order of joins with minimum peak force, this force and a lower bound.
 
-    The search proceeds backwards from the set of all parts, by increasing peak force:
-    one equilibrium contains the closing forces of all parts that may have been joined
-    last. Once the number of states is exhausted, or after Ctrl-C, the part that
-    requires the smallest force is always placed last.
+    The search starts from the set of all closures and removes closures in the order of
+    increasing peak force.  After ``search.most`` states, or after Ctrl-C, it always
+    removes the closure with the smallest force.
     """
     chosen = (1 << len(run)) - 1
     best, later = {chosen: 0.0}, {chosen: -1}
@@ -257,7 +256,7 @@ def _bottleneck(
 
 
 def _joined_after(chosen: int, later: dict[int, int]) -> list[int]:
-    """Return the parts that are joined after a set, in the order of joining."""
+    """Return the closures that are joined after a set, in the order of joining."""
     order = []
     while (k := later[chosen]) >= 0:
         order.append(k)
@@ -268,8 +267,8 @@ def _joined_after(chosen: int, later: dict[int, int]) -> list[int]:
 def _over_orders(search: _Search, start: State, plan: Plan, given: float) -> BestOrder:
     """Return the best order, found by depth-first branch and bound.
 
-    Once the number of states is exhausted, or after Ctrl-C, the bounds of all orders
-    not yet searched enter the bound of the result.
+    The search stops after ``search.most`` states or after Ctrl-C.  The lower bound of
+    the result then includes the bounds of all other orders.
 
     Raises:
         BadInput: no order can be assembled.
@@ -303,7 +302,7 @@ def _children(
     search: _Search, state: State, peak: float, done: tuple[Step, ...],
     left: tuple[Step, ...],
 ) -> list[_Partial]:  # fmt: skip
-    """Extend a partial order by each step that may come next."""
+    """Return a partial order extended by each step that may be next."""
     children = []
     for step, others in choices(left):
         found = search.carry_out(state, step)

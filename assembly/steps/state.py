@@ -1,4 +1,4 @@
-"""State of a partly assembled machine: its constraints and its equilibrium."""
+"""State of partly assembled machines: constraints and equilibrium."""
 
 from dataclasses import dataclass, field, replace
 
@@ -25,14 +25,15 @@ from forcefit.assembly.steps.plan import (
 
 @dataclass(frozen=True, eq=False)
 class Hold:
-    """Constraint equations of one joined closure or one fixture.
+    """Constraints due to a joined closure or a fixture.
 
     Attributes:
-        rows: (m, 6n) equations for the frame screws, lengths in reference lengths.
+        rows: (m, 6n) coefficients of the screws of all frames, with lengths in
+            reference lengths.
         right: (k, m) right-hand sides.
-        roots: (m, nf) columns of the fixture's springs.
-        part: frame or closure in whose axes the rows are written.
-        components: (m,) components of the screw.
+        roots: (m, nf) coefficients of the fixture's springs.
+        part: frame or closure that is constrained.
+        components: (m,) constrained components of its screw.
     """
 
     rows: NDArray
@@ -48,10 +49,10 @@ class State:
 
     Attributes:
         errors: (k, 6n) [rad, m] geometric errors, including adjustments.
-        found: springs, clearances, free motions and multipliers.
-        holds: rows of closures and fixtures, by step name.
-        loads: acting loads, by step name.
-        bolted: frame whose joint is bolted as it lies, by step name.
+        found: equilibrium.
+        holds: constraints of closures and fixtures, by name of the step.
+        loads: acting loads, by name of the step.
+        bolted: index of the frame whose joint is bolted, by name of the step.
     """
 
     errors: NDArray
@@ -61,11 +62,11 @@ class State:
     bolted: dict[str, int] = field(default_factory=dict)
 
     def is_linear(self, machine: Machine) -> bool:
-        """Return whether no clearance is loose."""
+        """Return whether no joint can move within its clearance."""
         return not machine.movable((), tuple(self.bolted.values()), 1)[1].any()
 
     def multipliers(self) -> dict[str, NDArray]:
-        """Return the multipliers (k, m) of each closure or fixture that holds."""
+        """Return the multipliers of each closure and fixture, (k, m)."""
         ends = np.cumsum([len(hold.rows) for hold in self.holds.values()])[:-1]
         parts = np.split(self.found.multipliers, ends, axis=1) if self.holds else []
         return dict(zip(self.holds, parts, strict=True))
@@ -77,8 +78,8 @@ def first_state(
     """Return the machine before the first step.
 
     Args:
-        machine: columns and rows of the robot.
-        plan: the steps; closures that no step joins are closed.
+        machine: the robot in array form.
+        plan: steps of assembly.  Closures that no step joins are closed initially.
         errors: see :func:`assemble_in_steps`.
         gravity: see :func:`assemble_in_steps`.
 
@@ -110,14 +111,14 @@ def first_state(
 
 
 def settle(machine: Machine, state: State) -> State:
-    """Compute the equilibrium of a state that is closest to the preceding one.
+    """Return a state in equilibrium, as close as possible to the previous equilibrium.
 
     Args:
-        machine: Jacobian columns and constraint rows of the robot.
-        state: new supports, loads and errors, with the unknowns of the preceding state.
+        machine: the robot in array form.
+        state: new constraints, loads and errors, with the previous equilibrium.
 
     Returns:
-        The state with its unknowns at equilibrium.
+        The state in equilibrium.
     """
     k, held = len(state.errors), list(state.holds.values())
     rows = np.vstack([np.zeros((0, state.errors.shape[1])), *(h.rows for h in held)])
@@ -141,7 +142,7 @@ def settle(machine: Machine, state: State) -> State:
 
 
 def _blocks(blocks: list[NDArray], count: int) -> NDArray:
-    """Stack all fixture springs in a block matrix over all constraint rows."""
+    """Return a block-diagonal matrix with ``count`` rows."""
     columns = np.zeros((count, sum(block.shape[1] for block in blocks)))
     row = column = 0
     for block in blocks:
@@ -152,14 +153,14 @@ def _blocks(blocks: list[NDArray], count: int) -> NDArray:
 
 
 def closed_rows(machine: Machine, state: State, closure: tuple[str, str]) -> Hold:
-    """Return the constraint equations of a closed closure."""
+    """Return the constraints of a closed loop."""
     rows = machine.rows(closure)
     none = np.zeros((len(state.errors), 6)), np.zeros((6, 0))
     return Hold(rows, *none, closure, np.arange(6))
 
 
 def fixture_rows(machine: Machine, state: State, step: Fix) -> Hold:
-    """Return the constraint equations of a fixture."""
+    """Return the constraints of a fixture."""
     k, rows = len(state.errors), machine.rows(step.frame)
     if step.position is None:
         chosen = np.arange(6)
@@ -177,12 +178,15 @@ def fixture_rows(machine: Machine, state: State, step: Fix) -> Hold:
 
 
 def with_hold(state: State, name: str, hold: Hold) -> State:
-    """Add a closure or fixture to a state, without computing the equilibrium."""
+    """Return a state with additional constraints, without computing its equilibrium."""
     return replace(state, holds=state.holds | {name: hold})
 
 
 def without(state: State, names: tuple[str, ...]) -> State:
-    """Remove the constraints of some steps, without computing the equilibrium."""
+    """Return a state without the constraints and loads of given steps.
+
+    Its equilibrium is not computed.
+    """
 
     def kept(given: dict) -> dict:
         return {name: value for name, value in given.items() if name not in names}
@@ -194,7 +198,7 @@ def without(state: State, names: tuple[str, ...]) -> State:
 
 
 def reading_of(machine: Machine, state: State, step: Measure) -> NDArray:
-    """Evaluate the readings (k, p) [rad or m] of a measurement."""
+    """Return the measured values of a measuring step, (k, p) [rad or m]."""
     chosen = rows_of(step.components)
     if isinstance(step.part, str):
         rows = machine.rows(step.part)

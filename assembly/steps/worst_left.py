@@ -1,22 +1,23 @@
 """Largest pose error over all positions in which a joint may be bolted.
 
-At the pose where the joint is bolted, all minimum-energy positions form a convex set of
-clearances u. At any other pose, the locked-in clearance acts like an error, and the
-platform screw is
+At the pose where the joint is bolted, the minimum-energy positions form a convex set of
+motions u within its clearance.  At any other pose, u is constant and acts like a
+geometric error.  The platform screw is
 
     x = x0 + X (u - u0) + V (v - v0),
 
-which is linear in u and in the clearances v that are loose at that pose.  Convex
-maximisation brackets the largest rotation and translation over the set between a value
-attained and a certified bound:
+where v are the motions within the clearances of all other joints.  The largest rotation
+and translation are computed by convex maximisation, with a lower and an upper bound:
 
-======================  ================================================================
-loose clearances        largest error
-======================  ================================================================
-none, or no springs     attained within the interval: all u and v that close the loops
-with springs            v follows from the minimum energy, so the maximum over v is an
-                        upper bound; equilibria at its corners are attained
-======================  ================================================================
+====================  ==================================================================
+other clearances      bounds of the largest error
+====================  ==================================================================
+none, or no springs   The maximum over all u and v that close the loops is between both
+                      bounds.
+with springs          The maximum over u and v is an upper bound, because minimum energy
+                      determines v.  The lower bound is the largest error of equilibria
+                      at extreme positions u.
+====================  ==================================================================
 """
 
 from dataclasses import dataclass
@@ -42,14 +43,14 @@ from forcefit.assembly.steps.left_anywhere import free_positions
 from forcefit.assembly.steps.machine import Machine
 from forcefit.stiffness.screws import skew
 
-# [-] width of an interval, relative to the largest support function along an axis
+# [-] difference between both bounds, relative to the largest error along an axis
 _TOLERANCE = 5e-4
-_ROUNDING = 1e-10  # rows below this fraction of the largest row are round-off
+_ROUNDING = 1e-10  # [-] threshold of a zero row, relative to the largest row
 
-CONVEX = "the largest of all positions of least energy; a convex set, certified"
+CONVEX = "the largest error of all positions with minimum energy"
 BRACKET = (
-    "between the largest equilibrium found and the bound with the loose clearances "
-    "counted as errors"
+    "between the largest error of the computed equilibria and an upper bound, which "
+    "treats loose clearances as errors"
 )
 
 
@@ -58,8 +59,8 @@ class WorstLeft:
     """Largest pose error over the positions in which joints may be bolted.
 
     Attributes:
-        rotation: (2,) [rad] value attained and certified upper bound.
-        translation: (2,) [m] value attained and certified upper bound.
+        rotation: (2,) [rad] lower and upper bound of the largest rotation.
+        translation: (2,) [m] lower and upper bound of the largest translation.
         assumption: :data:`CONVEX` or :data:`BRACKET`.
     """
 
@@ -69,13 +70,13 @@ class WorstLeft:
 
 
 class _Response(NamedTuple):
-    """Linear response of a posture to errors; clearances act like errors.
+    """Linear response of a posture to errors and to motions within clearances.
 
     Attributes:
-        joints: columns of the clearances.
-        screws: (6, 6n) [rad, m] map from the errors to the platform's screw.
-        rigid: (p, 6n) rows that must be zero, because no spring closes them.
-        elastic: whether clearances deform springs.
+        joints: virtual joints with their clearances.
+        screws: (6, 6n) [rad, m] matrix that converts errors to the platform screw.
+        rigid: (p, 6n) loop-closure equations without springs.
+        elastic: whether motions within clearances deform springs.
     """
 
     joints: VirtualJoints
@@ -86,15 +87,15 @@ class _Response(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class _Positions:
-    """Positions w = (u, v) of clearances in unit cones, with rows (w - start) = 0.
+    """Set of positions w = (u, v) in unit cones with rows (w - start) = 0.
 
     Attributes:
-        start: (nw,) one of these positions.
+        start: (nw,) a position in the set.
         rows: (p, nw) orthonormal rows.
-        group: (nw,) cone number of each clearance.
-        screws: (6, nw) [rad, m] map to the platform's screw.
-        errors: (6n, nw) [rad, m] map to the errors locked in.
-        centre: (6,) [rad, m] platform's screw at ``start``.
+        group: (nw,) index of the cone to which each component of w belongs.
+        screws: (6, nw) [rad, m] matrix that converts w to the platform screw.
+        errors: (6n, nw) [rad, m] matrix that converts w to geometric errors.
+        centre: (6,) [rad, m] platform screw at ``start``.
     """
 
     start: NDArray
@@ -112,7 +113,7 @@ def is_left_worst(robot: Robot) -> bool:
 
 
 def worst_left(posture: Posture, offset: ArrayLike = (0.0, 0.0, 0.0)) -> WorstLeft:
-    """Bracket the largest pose error over all positions of joints left ``"worst"``.
+    """Return bounds of the largest pose error over all positions of bolted joints.
 
     Args:
         posture: unloaded posture of a robot with a joint that has ``left = "worst"``.
@@ -120,7 +121,7 @@ def worst_left(posture: Posture, offset: ArrayLike = (0.0, 0.0, 0.0)) -> WorstLe
             translation is bounded, base axes.
 
     Returns:
-        Value attained and certified bound for both rotation and translation.
+        Lower and upper bounds of the largest rotation and translation.
 
     Raises:
         BadInput: another joint is bolted after those with ``left = "worst"``.
@@ -139,7 +140,7 @@ def worst_left(posture: Posture, offset: ArrayLike = (0.0, 0.0, 0.0)) -> WorstLe
 
 
 def _response(posture: Posture) -> _Response:
-    """Compute the linear response of an unloaded posture to errors."""
+    """Return the linear response of an unloaded posture to errors."""
     robot = posture.robot
     lin, joints = linearise(posture), virtual_joints(robot)
     reduced = reduce_problem(lin, joints, no_loads(robot.errors.size))
@@ -156,7 +157,7 @@ def _response(posture: Posture) -> _Response:
 
 
 def _positions(posture: Posture, response: _Response, offset: NDArray) -> _Positions:
-    """Return the positions of bolted and loose clearances, with their screws."""
+    """Return the set of possible positions within all clearances."""
     robot, cones = posture.robot, response.joints.cones
     frames, machine, state = last_bolt(robot)
     u, free, Z = free_positions(machine, state, 0)
@@ -184,13 +185,13 @@ def _positions(posture: Posture, response: _Response, offset: NDArray) -> _Posit
 
 
 def _locked_in(machine: Machine, frames: list[int]) -> NDArray:
-    """Return the map (6n, nu) from clearances to the errors of the bolted frames."""
+    """Return the screws of the bolted joints' motions in clearances, (6n, nu)."""
     bolted = np.isin(np.arange(len(machine.cones)) // 6, frames)
     return machine.cones * bolted[:, None]
 
 
 def _largest(at: _Positions, half: int) -> tuple[tuple[float, float], list[NDArray]]:
-    """Bracket the largest rotation or translation, and return the visited corners."""
+    """Return bounds of the largest rotation or translation, and extreme positions."""
     corners: list[NDArray] = [at.start]
     starts, right = cone_starts(at.group), (at.rows @ at.start)[None]
 
@@ -221,7 +222,7 @@ def _attained(
     posture: Posture, at: _Positions, corners: list[NDArray], half: int,
     offset: ArrayLike,
 ) -> float:  # fmt: skip
-    """Compute the largest pose error with joints bolted at the given corners."""
+    """Return the largest pose error with joints bolted at given positions."""
     moved = (np.array(corners) - at.start) @ at.errors.T
     errors = posture.robot.errors + moved.reshape(len(moved), -1, 6)
     bounds = bound_pose_error(solve_assembly(posture, errors=errors), offset=offset)

@@ -1,4 +1,4 @@
-"""Robots for the worked examples of assembly orders."""
+"""Robots for the tests of assembly in steps."""
 
 import numpy as np
 
@@ -6,18 +6,18 @@ from forcefit.assembly.kinematics.posture import home_posture
 from forcefit.assembly.model.robot import BeamLink, Frame, MatrixLink, Robot
 from forcefit.stiffness.screws import rotation_vector
 
-STIFF = 1e9  # [N m/rad, N/m] of directions in which no worked case moves
+STIFF = 1e9  # [N m/rad, N/m] stiffness of all other directions
 
 
 def spring(k, component):
-    """Return a link of stiffness k along one component."""
+    """Return a link with stiffness k along one component."""
     diagonal = np.full(6, STIFF)
     diagonal[component] = k
     return MatrixLink(np.diag(diagonal))
 
 
 def leg(name, k, error, s=0.0, clearance=None):
-    """Return a leg from the base, elastic along z, at x = s."""
+    """Return a leg at x = s that is elastic along z."""
     return Frame(
         name, "base", translation=[s, 0, 0], link=spring(k, 5), clearance=clearance,
         geometric_error=[0, 0, 0, 0, 0, error],
@@ -25,7 +25,7 @@ def leg(name, k, error, s=0.0, clearance=None):
 
 
 def three_legs(clearances=(None, None, None)):
-    """Three legs on a platform that a guide allows to move along z."""
+    """Return a platform that moves along z, with three elastic legs."""
     legs = zip((1e6, 2e6, 3e6), (30e-6, -20e-6, 50e-6), clearances, strict=True)
     frames = [
         Frame("guide", "base", joint="prismatic"),
@@ -40,7 +40,7 @@ Y_AXIS = rotation_vector(np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]]))
 
 
 def planar_platform(places, errors, k=1e6):
-    """A platform that is free along z and about y, on legs at x = places."""
+    """Return a platform that moves along z and about y, with legs at x = places."""
     frames = [
         Frame("guide", "base", joint="prismatic"),
         Frame("turn", "guide", rotation=Y_AXIS, joint="revolute"),
@@ -59,7 +59,7 @@ def planar_platform(places, errors, k=1e6):
 
 
 def two_bars(gap):
-    """Two collinear bars between walls, whose total length is too short."""
+    """Return two collinear bars between walls, which are too short by a gap."""
     frames = (
         Frame("bar1", "base", translation=[0, 0, 0.5], link=spring(1e6, 5)),
         Frame("joint", "bar1", geometric_error=[0, 0, 0, 0, 0, -gap]),
@@ -70,7 +70,7 @@ def two_bars(gap):
 
 
 def portal():
-    """A portal of beams on a base beam, all without axial and shear strain."""
+    """Return a portal frame of beams on a base beam."""
 
     def bar(width, height, up):
         area = {"area": 10.0, "I_z": width**3 * height / 12}
@@ -94,7 +94,7 @@ def portal():
 
 
 def gough_points():
-    """Return the joint centres (6, 3) of a Gough platform, at base and platform."""
+    """Return the joint centres of a Gough platform on base and platform, (6, 3)."""
     low = np.radians([-10, 10, 110, 130, 230, 250])
     high = np.radians([310, 50, 70, 170, 190, 290])
     base = np.c_[0.5 * np.cos(low), 0.5 * np.sin(low), np.zeros(6)]

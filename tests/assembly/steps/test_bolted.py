@@ -1,5 +1,7 @@
-"""Joints bolted at one pose, against cvxpy with independent kinematics. The robot is a
-four-bar on a stand with slotted holes, and an error tilts one of its pins.
+"""Tests of joints that are bolted at one pose.
+
+The robot is a four-bar mechanism on a stand with slotted holes, and one of its pins is
+tilted.
 """
 
 from dataclasses import replace
@@ -97,9 +99,9 @@ def at_angle(angle):
 
 
 def energy_by_cvxpy(robot, posture, errors, locked=None):
-    """Compute the minimum energy and the smallest clearance of the stand by cvxpy. Uses
-    chains of finite transforms and screws at the base origin; ``locked`` fixes the
-    clearance of the stand.
+    """Return the minimum energy and the motion of the stand, computed by cvxpy.
+
+    With ``locked``, the motion of the stand within its clearance is given.
     """
     at = {"base": np.eye(4)}
     carried, signs = {}, {}
@@ -151,17 +153,15 @@ def energy_by_cvxpy(robot, posture, errors, locked=None):
             moved = moved + u
             stand = u if frame.name == "stand" else stand
         total = total + signs[frame.name] * (A @ moved)
-    scale = 1e3  # springs of sqrt(2 J) are small numbers
+    scale = 1e3  # improves the scaling of the cone program
     problem = cp.Problem(cp.Minimize(scale * energy), [total * scale == 0, *cones])
     problem.solve(solver=cp.CLARABEL)
     return problem.value / scale, None if stand is None else stand.value
 
 
 @pytest.mark.parametrize("angle", [0.4, 1.2, 2.0])
-def test_energy_over_the_stroke_includes_the_wrenches_from_bolting_at_one_pose(
-    tmp_path, angle
-):
-    """The locked-in screw is compared through the resulting energies."""
+def test_energy_of_bolted_robot_agrees_with_cvxpy(tmp_path, angle):
+    """Energies at the pose of bolting and at other poses are compared."""
     robot = load_robot(four_bar(tmp_path, at_angle(angle)))
     errors, screw = robot.declared_errors, robot.frame("stand").locked_at.screw
     assert errors[robot.index("pin2"), 0] == 5e-3
@@ -178,7 +178,7 @@ def test_energy_over_the_stroke_includes_the_wrenches_from_bolting_at_one_pose(
         assert solve_assembly(posture).energy == pytest.approx(expected, abs=2e-6)
 
 
-def test_statistics_bolt_every_drawn_machine_with_its_own_errors(tmp_path):
+def test_statistics_bolt_each_random_machine(tmp_path):
     robot = load_robot(four_bar(tmp_path, at_angle(0.4)))
     sources = tolerance_sources(robot, np.array([1e-3] * 3 + [1e-4] * 3), ("pin2",))
     posture = place_robot(robot, joints={"crank": 2.0})
@@ -192,7 +192,7 @@ def test_statistics_bolt_every_drawn_machine_with_its_own_errors(tmp_path):
         assert np.any(machine.frame("stand").locked_at.screw)
 
 
-def test_sweep_bolts_every_draw_with_its_own_errors(tmp_path):
+def test_sweep_bolts_each_random_machine(tmp_path):
     path = four_bar(tmp_path, at_angle(0.4))
     errors = tmp_path / "errors.toml"
     errors.write_text('[[errors]]\nframes = ["pin2"]\nmost = [5e-3, 0, 0, 0, 0, 0]\n')
@@ -211,7 +211,7 @@ def test_sweep_bolts_every_draw_with_its_own_errors(tmp_path):
         assert energies == pytest.approx(alone, rel=1e-6, abs=1e-12)
 
 
-def test_robot_with_a_bolted_joint_is_unchanged_after_writing_and_reading(tmp_path):
+def test_bolted_joint_is_unchanged_after_writing_and_reading(tmp_path):
     robot = load_robot(four_bar(tmp_path, at_angle(0.4)))
     write_robot(robot, tmp_path / "again.toml")
     again = load_robot(tmp_path / "again.toml")
@@ -227,7 +227,7 @@ def test_robot_with_a_bolted_joint_is_unchanged_after_writing_and_reading(tmp_pa
     ("{ joints = {} }", "found no coordinate"),
     ("{ pose = { tx = 5.0 } }", "locked_at"),
 ])  # fmt: skip
-def test_invalid_pose_of_a_bolt_is_reported_in_one_line(tmp_path, key, text):
+def test_invalid_locked_at_is_rejected(tmp_path, key, text):
     with pytest.raises(BadInput) as caught:
         load_robot(four_bar(tmp_path, key))
     assert text in str(caught.value)
@@ -235,7 +235,7 @@ def test_invalid_pose_of_a_bolt_is_reported_in_one_line(tmp_path, key, text):
     assert "\n" not in str(caught.value)
 
 
-def test_bolting_of_a_joint_without_clearance_is_rejected(tmp_path):
+def test_bolted_joint_without_clearance_is_rejected(tmp_path):
     path = tmp_path / "robot.toml"
     text = FOUR_BAR.replace("LOCKED", "").replace(
         'name = "end"', 'name = "end"\nlocked_at = "home"'
@@ -246,7 +246,7 @@ def test_bolting_of_a_joint_without_clearance_is_rejected(tmp_path):
 
 
 def slot_on_a_spring(gap, stiffness):
-    """A platform on a rigid leg, and on a spring whose slot is bolted at home."""
+    """Return a platform on a rigid leg and on a spring with a bolted slot."""
     bolt = LockedAt(Clearance(axial=gap))
     frames = (
         Frame("guide", "base", joint="prismatic"),
@@ -275,10 +275,11 @@ cost = 1
 """
 
 
-def test_tolerances_of_a_bolted_robot_use_its_slot(tmp_path):
-    """4/a + 1/b is minimal at a = 2 C / 3, b = C / 3 where a + b <= C.
+def test_allocated_tolerances_of_bolted_robot_equal_closed_form(tmp_path):
+    """The cost 4/a + 1/b is minimal at a = 2 C / 3 and b = C / 3 for a + b <= C.
 
-    The slot takes up 50 um, the spring of 1e6 N/m stores 0.8 mJ at 40 um: C is 90 um.
+    The slot compensates 50 um, and the energy limit allows a deflection of 40 um, so C
+    is 90 um.
     """
     robot = slot_on_a_spring(50e-6, 1e6)
     path = tmp_path / "plan.toml"
@@ -290,9 +291,10 @@ def test_tolerances_of_a_bolted_robot_use_its_slot(tmp_path):
 
 
 @pytest.mark.parametrize("key", ["energy", "rotation", "translation"])
-def test_slopes_of_a_bolted_robot_equal_central_differences(tmp_path, key):
-    """Energy and largest pose error are differenced at a pose other than that of
-    bolting. The largest pose error is known to 1e-9 rad or m, with differences of 4e-7.
+def test_derivatives_for_bolted_robot_equal_finite_differences(tmp_path, key):
+    """The pose is not the pose at which the joint is bolted.
+
+    Pose errors have an accuracy of 1e-9 rad or m, which determines the tolerance.
     """
     robot = load_robot(four_bar(tmp_path, at_angle(0.4)))
     response = linear_response(place_robot(robot, joints={"crank": 1.6}))
@@ -337,7 +339,7 @@ actuated = true
 """
 
 
-def test_fixed_joint_of_a_drawn_robot_is_bolted_at_its_pose(tmp_path):
+def test_fixed_joint_in_format_2_is_bolted(tmp_path):
     path = tmp_path / "drawn.toml"
     path.write_text(DRAWN)
     frame = load_robot(path).frame("slot")
@@ -345,14 +347,14 @@ def test_fixed_joint_of_a_drawn_robot_is_bolted_at_its_pose(tmp_path):
     assert frame.locked_at.clearance.radial == 1e-3
 
 
-def test_moving_joint_of_a_drawn_robot_is_not_bolted(tmp_path):
+def test_bolted_revolute_joint_in_format_2_is_rejected(tmp_path):
     path = tmp_path / "drawn.toml"
     path.write_text(DRAWN.replace("actuated = true", 'locked_at = "home"'))
     with pytest.raises(BadInput, match="found a joint that moves"):
         load_robot(path)
 
 
-def test_sweep_notes_a_joint_that_is_loose_at_every_pose(tmp_path, run):
+def test_sweep_reports_loose_fixed_joint(tmp_path, run):
     words = ("--grid", "q.crank=0.4", "--assumption", "none", "-o", tmp_path / "a.nc")
     _, _, loose = run("assembly", "sweep", four_bar(tmp_path), *words)
     assert 'note: bolted_four_bar: the clearance of the fixed joint "stand"' in loose
@@ -363,14 +365,14 @@ def test_sweep_notes_a_joint_that_is_loose_at_every_pose(tmp_path, run):
     assert "fixed joint" not in bolted
 
 
-def test_solve_notes_where_a_joint_is_bolted(tmp_path, run):
+def test_solve_reports_position_of_bolted_joint(tmp_path, run):
     path = four_bar(tmp_path, at_angle(0.4))
     status, out, _ = run("assembly", "solve", path, "--joint", "crank=2.0")
     assert status == 0
     assert out.count('joint "stand" is bolted at') == 1
 
 
-def test_conversion_to_bodies_and_joints_preserves_bolted_joints(tmp_path, run):
+def test_conversion_to_format_2_preserves_bolted_joints(tmp_path, run):
     path, drawn = four_bar(tmp_path, at_angle(0.4)), tmp_path / "bodies.toml"
     status, _, err = run("convert", path, "--format", "2", "-o", drawn)
     assert status == 0, err
@@ -381,7 +383,7 @@ def test_conversion_to_bodies_and_joints_preserves_bolted_joints(tmp_path, run):
     assert energies[1] == pytest.approx(energies[0], rel=1e-6)
 
 
-def test_conversion_of_a_joint_bolted_at_a_rotated_platform_is_rejected(tmp_path, run):
+def test_conversion_of_joint_bolted_at_rotated_platform_is_rejected(tmp_path, run):
     path = four_bar(tmp_path, "{ pose = { rz = 0.5 } }")
     drawn = tmp_path / "bodies.toml"
     status, _, err = run("convert", path, "--format", "2", "-o", drawn)
@@ -390,7 +392,7 @@ def test_conversion_of_a_joint_bolted_at_a_rotated_platform_is_rejected(tmp_path
     assert not drawn.exists()
 
 
-def test_worst_case_of_a_bolted_robot_is_rejected(tmp_path):
+def test_worst_case_of_bolted_robot_is_rejected(tmp_path):
     robot = load_robot(four_bar(tmp_path, at_angle(0.4)))
     sources = tolerance_sources(robot, np.full(6, 1e-4), ("pin2",))
     prepared = linear_response(place_robot(robot, joints={"crank": 2.0}))

@@ -1,5 +1,6 @@
-"""Assembly steps of a robot drawn as bodies and joints, with openings in joint axes. A
-plate on the elastic joint ``foot`` at the origin is joined to a second joint ``peg``.
+"""Tests of assembly steps for a robot file of format 2 (bodies and joints).
+
+A plate on the elastic joint ``foot`` is joined to a second joint ``peg``.
 """
 
 import pytest
@@ -54,20 +55,18 @@ def joined(tmp_path):
     return run
 
 
-def test_slotted_hole_leaves_motion_along_its_joint_axis_free(joined):
-    """The peg's z axis is the base's x axis, its x axis is y, its y axis is z.
+def test_slotted_hole_does_not_constrain_motion_along_joint_axis(joined):
+    """The joint axis is the x axis of the base.
 
-    The errors along y and z of the base are closed: (ky y^2 + kz z^2) / 2.
+    The energy for the errors along y and z is (ky y^2 + kz z^2) / 2.
     """
     step = joined(SLOTTED, JOIN + 'locked = ["tz"]\n')
     assert step.energy == pytest.approx((2e6 * 10e-6**2 + 3e6 * 20e-6**2) / 2)
     assert step.platform_screw[0, 3:] == pytest.approx([0, 10e-6, 20e-6], abs=1e-12)
 
 
-def test_closing_wrench_of_a_ball_joint_is_a_force_through_its_centre(joined):
-    """F = d / (1/kz + r^2/k_ry), without moment, because the ball joint
-    rotates freely.
-    """
+def test_closing_wrench_of_ball_joint_is_a_pure_force(joined):
+    """The closing force is d / (1/kz + r^2/k_ry), and the moment is zero."""
     step = joined(BALL, JOIN)
     force = 30e-6 / (1 / 3e6 + 0.4**2 / 2e3)
     assert step.closing_force == pytest.approx(force)

@@ -1,4 +1,4 @@
-"""Influence coefficients of joins, against hand calculation and all orders."""
+"""Tests of the influence of joins on each other."""
 
 from itertools import permutations
 
@@ -21,7 +21,7 @@ def join(i, locked=()):
 
 
 def after(posture, *done, run=()):
-    """Return the influences of joins after other joins."""
+    """Return the influences of the joins ``run`` after the joins ``done``."""
     plan, machine = Plan((*done, *run)), machine_at(posture)
     state = first_state(machine, plan, None, None)
     for step in done:
@@ -30,10 +30,8 @@ def after(posture, *done, run=()):
 
 
 @pytest.mark.parametrize(("place", "expected"), [(0.3, 3.75e-7), (0.6, 0.0)])
-def test_influence_of_a_pin_on_a_slot_equals_that_of_two_springs(place, expected):
-    """For a platform on springs k at 0 and L, C = ((1 - a/L)(1 - s/L) + a s /
-    L^2) / k.
-    """
+def test_influence_of_pin_on_slot_equals_closed_form(place, expected):
+    """For springs at 0 and L, it is ((1 - a/L)(1 - s/L) + a s / L^2) / k."""
     by_hand = ((1 - 0.1 / 0.4) * (1 - place / 0.4) + 0.1 * place / 0.16) / 1e6
     assert by_hand == pytest.approx(expected, abs=1e-20)
     posture = planar_platform([0.0, 0.4, 0.1, place], [0, 0, 40e-6, 0])
@@ -43,8 +41,8 @@ def test_influence_of_a_pin_on_a_slot_equals_that_of_two_springs(place, expected
     assert pair.zero == (expected == 0.0)
 
 
-def test_influence_through_a_free_motion_is_not_zero():
-    """Before the first leg is joined, each leg moves the entire platform."""
+def test_influence_by_free_motion_is_not_zero():
+    """The platform can move freely before the first leg is joined."""
     run = [Join(f"{i}", ("platform", f"leg{i}"), Z * (i == 3)) for i in (1, 2, 3)]
     for pair in after(three_legs(), run=run):
         assert pair.free
@@ -52,8 +50,8 @@ def test_influence_through_a_free_motion_is_not_zero():
 
 
 @pytest.mark.parametrize("places", [(0.1, 0.6), (0.1, 0.3), (0.2, 0.25)])
-def test_order_changes_the_final_state_only_with_nonzero_influence(places, rng):
-    """For two pins and two slots with drawn errors, every order is carried out."""
+def test_order_matters_only_with_nonzero_influence(places, rng):
+    """The results of all orders of two pins and a slot are compared."""
     posture = planar_platform([0.0, 0.4, *places, 0.1], rng.normal(size=5) * 3e-5)
     first, run = (join(1), join(2)), (join(3), join(4, Z), join(5))
     zero = all(pair.zero for pair in after(posture, *first, run=run))
@@ -66,7 +64,7 @@ def test_order_changes_the_final_state_only_with_nonzero_influence(places, rng):
     assert zero == (places[1] == 0.6)
 
 
-def test_remark_names_the_joining_steps_that_move_a_slot():
+def test_remarks_list_steps_that_move_a_slot():
     slot, pins = join(4, Z), (join(1), join(2))
     still = planar_platform([0.0, 0.4, 0.1, 0.6], [0, 0, 40e-6, 0])
     moved = planar_platform([0.0, 0.4, 0.1, 0.3], [0, 0, 40e-6, 0])

@@ -1,4 +1,4 @@
-"""Random positions of bolted joints, against distributions in closed form."""
+"""Tests of random positions of bolted joints."""
 
 from dataclasses import replace
 
@@ -23,7 +23,7 @@ UNIFORM = {"left": "uniform"}
 
 
 def pin(name, radius, error, **more):
-    """Return a rigid leg on a bolted pin with disc-shaped clearance, and its end."""
+    """Return the frames of a rigid leg on a bolted pin with clearance."""
     bolt = LockedAt(Clearance(**radius), **more)
     return (
         Frame(name, "base", geometric_error=error, locked_at=bolt),
@@ -32,14 +32,14 @@ def pin(name, radius, error, **more):
 
 
 def bolted(robot, count=COUNT, seed=3):
-    """Return the locked-in screws of many machines without any other errors."""
+    """Return the locked motions of random machines."""
     errors = np.repeat(robot.errors[None], count, axis=0)
     rngs = bolt_generators(robot, seed, range(count))
     return bolted_errors(robot, errors, rngs) - errors
 
 
 def platform_of_two_pins(radius, distance):
-    """A platform free along x and y on two pins, offset by an error along x."""
+    """Return a platform on two pins, with an error of their distance along x."""
     frames = [
         Frame("y", "base", rotation=[-np.pi / 2, 0, 0], joint="prismatic"),
         Frame("back", "y", rotation=[np.pi / 2, 0, 0]),
@@ -52,8 +52,8 @@ def platform_of_two_pins(radius, distance):
     return Robot("two pins", "platform", tuple(frames), closures)
 
 
-def test_drawn_positions_in_an_open_slot_are_uniform_over_its_disc():
-    """The squared radius of a uniform disc is uniform; so is the axial clearance."""
+def test_random_positions_in_slot_are_uniform():
+    """The squared radius and the axial position have uniform distributions."""
     frames = pin("slot", {"radial": 1e-3, "axial": 2e-4}, np.zeros(6), **UNIFORM)
     screws = bolted(Robot("slot", "slot.end", frames, ()))[:, 0]
     squares = (screws[:, 3] ** 2 + screws[:, 4] ** 2) / 1e-6
@@ -62,8 +62,8 @@ def test_drawn_positions_in_an_open_slot_are_uniform_over_its_disc():
     assert not screws[:, :3].any()
 
 
-def test_drawn_positions_of_a_platform_on_two_round_pins_fill_the_lens_uniformly(rng):
-    """The reference is uniform in the lens of two discs, sampled by rejection."""
+def test_random_positions_on_two_pins_are_uniform(rng):
+    """Rejection sampling of the intersection of two discs is the reference."""
     robot = platform_of_two_pins({"radial": 1e-4}, 1e-4)
     left = bolted(robot)[:, 4, 3:5] / 1e-4
     points = rng.uniform(-1, 1, (40_000, 2))
@@ -75,17 +75,18 @@ def test_drawn_positions_of_a_platform_on_two_round_pins_fill_the_lens_uniformly
         assert found.pvalue > 1e-3
 
 
-def test_pins_two_radii_apart_are_bolted_where_both_touch():
-    """Only one position closes the loop: two radii apart, both pins touch."""
+def test_single_possible_position_is_found():
+    """The error is twice the clearance, so only one position closes the loop."""
     robot = platform_of_two_pins({"radial": 1e-4}, 2e-4)
     screws = bolted(robot, 20)
     assert screws[:, 4, 3] == pytest.approx(np.full(20, 1e-4), rel=1e-5)
     assert screws[:, 4, 4] == pytest.approx(np.zeros(20), abs=1e-6)
 
 
-def test_loaded_pin_leaves_the_other_clearance_random():
-    """With an offset of 50 um and +- 20 um of clearance, both pins load a leg, whose
-    transverse slot is free.
+def test_pins_with_contact_force_do_not_move_randomly():
+    """An error of 50 um exceeds the clearances of +- 20 um of two pins.
+
+    A third clearance has no contact force.
     """
     frames = [Frame("guide", "base", joint="prismatic"), Frame("platform", "guide")]
     frames += pin("left", {"axial": 20e-6}, np.zeros(6), **UNIFORM)
@@ -107,7 +108,7 @@ def experiment_of(robot):
     return Experiment(posture, sources, 7, "least", margins=False, stress=False)
 
 
-def test_position_of_a_draw_does_not_depend_on_other_drawn_quantities(tmp_path):
+def test_random_position_does_not_depend_on_other_draws(tmp_path):
     key = '{ joints = { crank = 0.4 }, left = "uniform" }'
     robot = load_robot(four_bar(tmp_path, key))
     experiment = experiment_of(robot)
@@ -119,8 +120,8 @@ def test_position_of_a_draw_does_not_depend_on_other_drawn_quantities(tmp_path):
     assert not np.allclose(rows["energy"], least.solve(0, 6)["energy"], rtol=1e-3)
 
 
-def test_bolting_at_a_random_free_position_requires_no_additional_energy(tmp_path):
-    """The random walk preserves the strains at the pose of bolting."""
+def test_random_positions_have_minimum_energy(tmp_path):
+    """All random positions have minimum energy at the pose of bolting."""
     key = '{ joints = { crank = 0.4 }, left = "uniform" }'
     robot = load_robot(four_bar(tmp_path, key))
     experiment = experiment_of(robot)
@@ -134,7 +135,7 @@ def test_bolting_at_a_random_free_position_requires_no_additional_energy(tmp_pat
     assert there["energy"] == pytest.approx(least["energy"], rel=1e-5, abs=1e-9)
 
 
-def test_sweep_and_statistics_bolt_a_draw_at_the_same_position(tmp_path):
+def test_sweep_and_statistics_use_same_random_positions(tmp_path):
     key = '{ joints = { crank = 0.4 }, left = "uniform" }'
     path = four_bar(tmp_path, key)
     errors = tmp_path / "errors.toml"
@@ -148,7 +149,7 @@ def test_sweep_and_statistics_bolt_a_draw_at_the_same_position(tmp_path):
     assert energies == pytest.approx(own.solve(0, 3)["energy"], rel=1e-6, abs=1e-12)
 
 
-def test_rule_for_the_bolting_position_is_equal_after_reading_and_writing(tmp_path):
+def test_rule_left_is_unchanged_after_writing_and_reading(tmp_path):
     robot = load_robot(four_bar(tmp_path, '{ left = "uniform" }'))
     write_robot(robot, tmp_path / "again.toml")
     bolt = load_robot(tmp_path / "again.toml").frame("stand").locked_at
@@ -158,15 +159,15 @@ def test_rule_for_the_bolting_position_is_equal_after_reading_and_writing(tmp_pa
 
 
 @pytest.mark.parametrize("key", ['{ left = "normal" }', "{ left = 3 }"])
-def test_unknown_rule_for_the_bolting_position_is_rejected_in_one_line(tmp_path, key):
+def test_unknown_rule_left_is_rejected(tmp_path, key):
     with pytest.raises(BadInput) as caught:
         load_robot(four_bar(tmp_path, key))
     assert "locked_at.left: found" in str(caught.value)
     assert "\n" not in str(caught.value)
 
 
-def test_single_robot_is_bolted_at_the_smallest_sum_of_squares():
+def test_nominal_robot_is_bolted_at_smallest_sum_of_squares():
     frames = pin("slot", {"radial": 1e-3}, np.zeros(6), **UNIFORM)
     robot = bolt_joints(Robot("slot", "slot.end", frames, ()))
     assert not robot.frame("slot").locked_at.screw.any()
-    assert robot.remarks[-1].endswith("drawn machines anywhere at least energy")
+    assert robot.remarks[-1].endswith("at random positions of minimum energy")

@@ -1,6 +1,6 @@
-"""Spatial machines of random springs, against a dense model in absolute motions. The
-model here has one displacement per leg end, in base axes at the base origin, and 6 x 6
-stiffnesses, whereas the program eliminates unknowns of chains of frames.
+"""Comparison of random machines with a dense stiffness model.
+
+The unknowns of the dense model are the displacements of all leg ends.
 """
 
 import numpy as np
@@ -18,10 +18,10 @@ SIZES = np.repeat([1e-2, 1e-3], 3)
 
 
 def machine(rng):
-    """Return a robot, and the stiffness and error of each leg at the platform.
+    """Return a random robot, the stiffness and the error of each leg, and a rotation.
 
-    A leg is a chain of two elastic links with errors; its far end has the pose of the
-    platform.  In series: compliances and errors, carried to the platform, add up.
+    A leg consists of two elastic links with errors.  Stiffness and error refer to the
+    platform, whose rotation is returned.
     """
     turn = Rotation.from_rotvec(rng.normal(size=3))
     place, frames, legs = rng.normal(size=3), [], []
@@ -53,7 +53,7 @@ def machine(rng):
 
 
 def least_energy(legs, held, springs, load, count=6 * LEGS):
-    """Return ends x (6 each), wrenches of the held rows, and the energy."""
+    """Return the displacements of all leg ends, constraint wrenches, and the energy."""
     K, f, constant = np.zeros((count, count)), np.zeros(count), 0.0
     for i, (own, error) in enumerate(legs):
         here = slice(6 * i, 6 * i + 6)
@@ -75,15 +75,15 @@ def least_energy(legs, held, springs, load, count=6 * LEGS):
 
 
 def opening(i):
-    """Return the rows for the platform screw minus that of the end of leg i."""
+    """Return the matrix of the platform screw minus the screw of the end of leg i."""
     rows = np.zeros((6, 6 * LEGS))
     rows[:, :6], rows[:, 6 * i : 6 * i + 6] = np.eye(6), -np.eye(6)
     return rows
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_machine_of_random_springs_has_the_energies_of_a_dense_model(seed):
-    """Every machine has a fixture with a spring, a slot, a load, and releases."""
+def test_energies_of_random_machine_agree_with_dense_model(seed):
+    """The plan contains a fixture with a spring, a slot, a load and releases."""
     rng = np.random.default_rng(seed)
     robot, legs, turn = machine(rng)
     locked = [int(c) for c in np.sort(rng.choice(6, 3, replace=False))]
@@ -98,7 +98,7 @@ def test_machine_of_random_springs_has_the_energies_of_a_dense_model(seed):
         Release("away", ("load",)),
     ))  # fmt: skip
     results = assemble_in_steps(plan, home_posture(robot))
-    # loads are given in base axes, the ends' screws in those of the platform
+    # the load is transformed from base axes to platform axes
     own = np.concatenate([turn.inv().apply(part) for part in (wrench[:3], wrench[3:])])
     e = np.eye(6 * LEGS)
     fixed, springs = [(e[2], 1e-4)], [(e[3], 2e-5, 1e6)]

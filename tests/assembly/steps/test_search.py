@@ -1,4 +1,4 @@
-"""Best order of joining, against all orders carried out one by one."""
+"""Tests of the search for the best order of joining."""
 
 from itertools import permutations
 
@@ -29,10 +29,8 @@ def outcome(plan, posture, objective):
     return np.linalg.norm(results[-1].platform_screw[0, 3:])
 
 
-def test_minimum_peak_force_of_three_legs_equals_hand_calculation():
-    """Closing forces by hand: the last leg requires 6.7, 86.7 or 80 N; before it, two
-    legs close with k_i k_j / (k_i + k_j) |d_i - d_j|.
-    """
+def test_minimum_peak_force_of_three_legs_equals_closed_form():
+    """Two legs are joined with the force k_i k_j / (k_i + k_j) |d_i - d_j|."""
     steps = tuple(Join(f"{i}", LEG[i]) for i in (1, 2, 3))
     found = best_order(Plan(steps), three_legs(), "force")
     k, d = np.array([1e6, 2e6, 3e6]), np.array([30e-6, -20e-6, 50e-6])
@@ -50,7 +48,7 @@ def test_minimum_peak_force_of_three_legs_equals_hand_calculation():
 
 @pytest.mark.parametrize("objective", OBJECTIVES)
 @pytest.mark.parametrize("slots", [(), (2, 5)])
-def test_order_found_by_the_search_is_the_best_of_all_orders(objective, slots, rng):
+def test_search_finds_the_best_of_all_orders(objective, slots, rng):
     errors = rng.normal(size=5) * 40e-6
     posture = planar_platform([0.0, 0.4, 0.1, 0.3, 0.25], errors)
     locked = {i: ("TZ",) if i in slots else () for i in range(1, 6)}
@@ -65,7 +63,7 @@ def test_order_found_by_the_search_is_the_best_of_all_orders(objective, slots, r
     )
 
 
-def test_search_changes_the_order_only_of_joining_steps_between_other_steps():
+def test_search_permutes_only_consecutive_joins():
     steps = (
         Join("1", LEG[1]), Fix("clamp", "platform", None), Join("3", LEG[3]),
         Join("2", LEG[2]), Release("free", ("clamp",)),
@@ -76,11 +74,10 @@ def test_search_changes_the_order_only_of_joining_steps_between_other_steps():
     assert sorted(names[2:4]) == ["2", "3"]
 
 
-def test_search_exchanges_adjustments_and_joins_to_reduce_the_error():
-    """Two legs of 1e6 N/m, a shim at leg 0 to read 0 at the platform.
+def test_search_permutes_adjustments_and_joins():
+    """A shim at leg 0 moves the platform to the height 0.
 
-    With leg 0 alone, the shim brings the platform to 0, and leg 1, which is 60 um too
-    long, then raises it to 30 um. Once both are joined, the shim brings it to 0.
+    If leg 1 is joined after the adjustment, it raises the platform by 30 um.
     """
     posture = legs_on_a_guide((10e-6, 60e-6))
     shim = Adjust("shim", "leg0", ("TZ",), Measure("z", "platform", ("TZ",)))
@@ -92,10 +89,8 @@ def test_search_exchanges_adjustments_and_joins_to_reduce_the_error():
     assert [step.name for step in found.plan.steps].index("shim") == 2
 
 
-def test_search_for_the_minimum_error_also_changes_the_adjustments():
-    """For leg 6 of the Gough platform, -34.1 um leave 5.4 um, whereas -40 um make TZ
-    zero.
-    """
+def test_search_for_minimum_error_optimises_adjustments():
+    """The adjustment that makes TZ zero does not minimise the translation error."""
     shim = Adjust("shim", "leg6", ("TZ",), Measure("z", "platform", ("TZ",)))
     found = best_order(Plan((shim,)), gough(LENGTHS), "error")
     assert found.given == pytest.approx(6.6e-6, abs=0.05e-6)
@@ -105,9 +100,8 @@ def test_search_for_the_minimum_error_also_changes_the_adjustments():
     assert outcome(found.plan, gough(LENGTHS), "error") == pytest.approx(found.value)
 
 
-def test_search_for_minimum_energy_adjusts_within_the_increments():
-    """A shim of 50 um leaves no energy. One of 40 um leaves a gap of 10 um to two legs
-    of 1e6 N/m in series, 25 uJ."""
+def test_search_for_minimum_energy_respects_increments():
+    """A shim of 50 um closes the gap.  A shim of 40 um leaves a gap of 10 um."""
     posture = legs_on_a_guide((10e-6, 60e-6))
     reading = Measure("z", "platform", ("TZ",))
     joins = tuple(Join(f"{i}", ("platform", f"leg{i}")) for i in range(2))
@@ -119,8 +113,8 @@ def test_search_for_minimum_energy_adjusts_within_the_increments():
         assert found.value == pytest.approx(energy, rel=1e-6, abs=1e-12)
 
 
-def test_adjustment_for_a_closure_is_never_moved_after_the_step_that_joins_it():
-    """Closing requires no force once leg 1 is cut to the opening left by leg 0."""
+def test_search_keeps_adjustment_before_join_of_same_closure():
+    """Leg 1 is joined without a force after its length is adjusted."""
     posture = legs_on_a_guide((10e-6, 60e-6))
     gap = Measure("gap", ("platform", "leg1"))
     shim = Adjust("shim", "leg1", ("TZ",), gap)
@@ -131,8 +125,8 @@ def test_adjustment_for_a_closure_is_never_moved_after_the_step_that_joins_it():
     assert found.value == pytest.approx(0.0, abs=1e-9)
 
 
-def test_minimum_error_search_over_many_joins_stops_early_without_a_bound(rng):
-    """Nine joins have 362 880 orders; no partial order bounds the error."""
+def test_search_for_minimum_error_of_many_joins_stops_early(rng):
+    """There are 362 880 orders of nine joins, and no bound of the error is known."""
     posture = planar_platform(np.linspace(0, 0.4, 9), 40e-6 * rng.normal(size=9))
     locks = [("TZ",) if i % 3 == 0 else () for i in range(1, 10)]
     steps = tuple(join(i, locked=lock) for i, lock in enumerate(locks, 1))
@@ -143,7 +137,7 @@ def test_minimum_error_search_over_many_joins_stops_early_without_a_bound(rng):
 
 @pytest.mark.parametrize("objective", ["force", "energy"])
 @pytest.mark.parametrize("most", [20, 60])
-def test_search_that_stops_early_bounds_the_best_value(objective, most, rng):
+def test_search_that_stops_early_returns_lower_bound(objective, most, rng):
     errors = rng.normal(size=5) * 40e-6
     posture = planar_platform([0.0, 0.4, 0.1, 0.3, 0.25], errors)
     steps = tuple(join(i, locked=("TZ",) if i in (2, 5) else ()) for i in range(1, 6))
@@ -155,7 +149,7 @@ def test_search_that_stops_early_bounds_the_best_value(objective, most, rng):
 
 
 def legs_on_a_guide(lengths, k=1e6):
-    """Legs of equal stiffness on a platform that a guide allows to move along z."""
+    """Return a platform that moves along z, with legs of equal stiffness."""
     legs = (leg(f"leg{i}", k, d) for i, d in enumerate(lengths))
     guide = Frame("guide", "base", joint="prismatic")
     frames = (guide, Frame("platform", "guide"), *legs)
@@ -164,9 +158,7 @@ def legs_on_a_guide(lengths, k=1e6):
 
 
 def legs_along_z(rng, count):
-    """Stiffnesses and errors of legs on a platform that a guide allows to move
-    along z.
-    """
+    """Return a platform that moves along z, a plan, leg stiffnesses and leg errors."""
     k, d = rng.uniform(1e6, 3e6, count), rng.normal(size=count) * 3e-5
     frames = [
         Frame("guide", "base", joint="prismatic"),
@@ -179,7 +171,7 @@ def legs_along_z(rng, count):
 
 
 def least_peak(k, d):
-    """Minimise the peak force over all 2^n sets, where leg i requires k_i (d_i - x)."""
+    """Return the minimum peak force, computed by dynamic programming over all sets."""
     sets = np.arange(1 << len(k))
     chosen = sets[:, None] >> np.arange(len(k)) & 1
     x = chosen @ (k * d) / np.maximum(chosen @ k, 1.0)
@@ -195,7 +187,7 @@ def least_peak(k, d):
     return best[-1]
 
 
-def test_minimum_peak_force_of_twelve_legs_equals_minimum_over_all_subsets(
+def test_minimum_peak_force_of_twelve_legs_equals_dynamic_programming(
     rng,
 ):
     posture, plan, k, d = legs_along_z(rng, 12)
@@ -206,7 +198,7 @@ def test_minimum_peak_force_of_twelve_legs_equals_minimum_over_all_subsets(
 
 
 @pytest.mark.parametrize("most", [12, 20, 40])
-def test_search_over_subsets_that_stops_early_bounds_the_minimum_peak_force(most, rng):
+def test_search_over_sets_that_stops_early_returns_lower_bound(most, rng):
     posture, plan, k, d = legs_along_z(rng, 9)
     found = best_order(plan, posture, "force", most=most)
     least = least_peak(k, d)
@@ -215,7 +207,7 @@ def test_search_over_subsets_that_stops_early_bounds_the_minimum_peak_force(most
     assert outcome(found.plan, posture, "force") == pytest.approx(found.value)
 
 
-def test_interrupted_search_returns_the_best_order_so_far():
+def test_interrupted_search_returns_best_order_found():
     posture = planar_platform([0.0, 0.4, 0.1, 0.3], [0, 3e-5, 4e-5, -2e-5])
     steps = tuple(join(i, locked=("TZ",) if i == 4 else ()) for i in range(1, 5))
 
@@ -227,10 +219,8 @@ def test_interrupted_search_returns_the_best_order_so_far():
     assert found.bound <= found.value <= found.given
 
 
-def test_bolting_the_slot_first_or_last_determines_the_error_of_nine_legs():
-    """Beyond 8 joins, the minimum energy is searched with bounds; it is zero with slots
-    first.
-    """
+def test_search_finds_order_without_energy_for_nine_legs():
+    """The energy is zero if the slots are bolted first."""
     errors = np.array([0, 0, 10, 20, -10, 5, 15, -5, 25]) * 1e-6
     posture = planar_platform(np.linspace(0, 0.4, 9), errors)
     steps = tuple(join(i, locked=("TZ",) if i > 2 else ()) for i in range(1, 10))

@@ -1,4 +1,4 @@
-"""Worst position of a bolted joint, against hand calculation and sampled positions."""
+"""Tests of the largest pose error over all positions of a bolted joint."""
 
 import json
 from dataclasses import replace
@@ -22,14 +22,14 @@ WORST = {"left": "worst"}
 
 
 def assert_bracket(found, expected):
-    """Check that value attained and bound bracket the exact value, each within 1e-3."""
+    """Assert that both bounds agree with the exact value within 1e-3."""
     low, high = found
     assert expected * (1 - 1e-3) <= low <= expected * (1 + 1e-9)
     assert expected * (1 - 1e-9) <= high <= expected * (1 + 1e-3)
 
 
 def left(robot, rule):
-    """Return a robot whose bolted joints are left according to another rule."""
+    """Return a robot whose bolted joints have another rule ``left``."""
     frames = [
         replace(frame, locked_at=replace(frame.locked_at, left=rule))
         if frame.locked_at
@@ -39,8 +39,8 @@ def left(robot, rule):
     return replace(robot, frames=tuple(frames))
 
 
-def test_worst_position_of_a_slot_with_an_arm_is_at_its_corner():
-    """A tilt of 2 mrad on an arm of 0.3 m adds to the radius of 1 mm."""
+def test_largest_error_of_slot_with_arm_equals_closed_form():
+    """A tilt of 2 mrad at an arm of 0.3 m is added to a radial clearance of 1 mm."""
     gaps = Clearance(radial=1e-3, axial=2e-4, tilt=2e-3)
     slot = Frame("slot", "base", locked_at=LockedAt(gaps, **WORST))
     arm = Frame("arm", "slot", translation=[0, 0, 0.3])
@@ -51,8 +51,8 @@ def test_worst_position_of_a_slot_with_an_arm_is_at_its_corner():
     assert_bracket(worst.translation, np.hypot(1e-3 + 0.3 * 2e-3, 2e-4))
 
 
-def test_worst_bolted_position_of_a_platform_on_two_pins_is_at_the_far_end():
-    """Pins at 0 +- 20 um and 30 +- 20 um allow platform positions in [10, 20] um."""
+def test_largest_error_on_two_axial_pins_equals_closed_form():
+    """Pins at 0 +- 20 um and 30 +- 20 um allow positions between 10 and 20 um."""
     frames = [Frame("guide", "base", joint="prismatic"), Frame("platform", "guide")]
     for name, error in (("left", 0.0), ("right", 30e-6)):
         axial = {"axial": 20e-6}
@@ -66,10 +66,8 @@ def test_worst_bolted_position_of_a_platform_on_two_pins_is_at_the_far_end():
 
 
 @pytest.mark.parametrize("distance", [1e-4, 1.6e-4])
-def test_worst_bolted_position_on_two_round_pins_is_at_the_edge_of_the_lens(distance):
-    """The lens of two discs of 0.1 mm, one about the nominal position, ends at
-    0.1 mm.
-    """
+def test_largest_error_on_two_round_pins_equals_closed_form(distance):
+    """The positions are in the intersection of two discs with a radius of 0.1 mm."""
     robot = left(platform_of_two_pins({"radial": 1e-4}, distance), "worst")
     worst = worst_left(home_posture(bolt_joints(robot)))
     assert worst.assumption == CONVEX
@@ -77,10 +75,8 @@ def test_worst_bolted_position_on_two_round_pins_is_at_the_edge_of_the_lens(dist
 
 
 @pytest.mark.parametrize("angle", [0.4, 1.6])
-def test_bounds_of_a_four_bar_contain_all_sampled_positions(tmp_path, angle):
-    """For pins with clearance between springs, no sampled position exceeds the
-    bound.
-    """
+def test_upper_bound_exceeds_errors_of_random_positions(tmp_path, angle):
+    """The errors of random positions do not exceed the upper bound."""
     key = '{ joints = { crank = 1.2 }, left = "worst" }'
     robot = load_robot(str(four_bar(tmp_path, key)))
     posture = place_robot(bolt_joints(robot), joints={"crank": angle})
@@ -98,8 +94,8 @@ def test_bounds_of_a_four_bar_contain_all_sampled_positions(tmp_path, angle):
         assert 0.98 * largest <= low <= high
 
 
-def test_command_error_bounds_the_worst_bolted_position(tmp_path, run):
-    """The values of the command are those of the function."""
+def test_command_error_reports_bounds_of_largest_error(tmp_path, run):
+    """The command and the function return the same values."""
     key = '{ joints = { crank = 1.2 }, left = "worst" }'
     path = four_bar(tmp_path, key)
     status, text, _ = run("assembly", "error", path, "--joint", "crank=0.4")
@@ -115,8 +111,8 @@ def test_command_error_bounds_the_worst_bolted_position(tmp_path, run):
     assert found["assumption"] == BRACKET
 
 
-def test_worst_bolted_position_under_a_load_is_rejected(tmp_path):
-    """The worst position under a load is not defined."""
+def test_load_on_robot_with_worst_position_is_rejected(tmp_path):
+    """The worst position is defined only without a load."""
     key = '{ joints = { crank = 1.2 }, left = "worst" }'
     robot = bolt_joints(load_robot(str(four_bar(tmp_path, key))))
     posture = place_robot(robot, joints={"crank": 0.4})

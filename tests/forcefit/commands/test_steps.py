@@ -106,7 +106,7 @@ def test_quantiles_of_draws_equal_those_of_the_springs(run, files, tmp_path):
     ('[[step]]\njoin = ["platform", "leg9"]\n', "step[1].join: found"),
     ('[[step]]\njoin = "leg1"\n', "no clearance and no motion to bolt"),
     ('[[step]]\nrelease = "clamp"\n', 'step[1] "release clamp".release'),
-    (JOINS + '[[step]]\njoin = ["platform", "leg1"]\n', "is joined already"),
+    (JOINS + '[[step]]\njoin = ["platform", "leg1"]\n', "that is joined already"),
     (2 * '[[step]]\nname = "a"\nmeasure = "leg1"\n', "the name of an earlier"),
     ('[[step]]\nfix = "leg1"\njoin = "leg2"\n', "found fix and join"),
     ('[[step]]\nname = "a"\n', "found no type of step"),
