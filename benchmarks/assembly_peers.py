@@ -1,4 +1,4 @@
-"""Solve problems (22) and (21) by cvxpy, Clarabel and moreau, for assembly_speed."""
+"""Problems (22) and (21) solved by cvxpy, Clarabel and moreau, for comparison."""
 
 import time
 import warnings
@@ -16,14 +16,17 @@ from forcefit.assembly.linear.reference.reduction import reduce_problem
 from forcefit.assembly.model.robot import Robot
 from forcefit.assembly.solvers import conic
 
-LOAD = np.array([1.0, 2.0, 3.0, 30.0, 10.0, -100.0])  # [N m, N] on the platform
+LOAD = np.array([1.0, 2.0, 3.0, 30.0, 10.0, -100.0])  # [N m, N] load on the platform
 GRAVITY = np.array([0.0, 0.0, -9.81])  # [m/s^2]
 
 
 def closure_matrices(
     posture: Posture, springs: bool = True, own_axes_free: bool = False
 ) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-    """Return columns of free motions, clearances and springs, and the scaled misfit."""
+    """Return the scaled coefficients and constants of the loop-closure equations.
+
+    The coefficients belong to free motions, clearances and springs.
+    """
     lin, joints = (
         linearise(posture),
         virtual_joints(posture.robot, springs, own_axes_free),
@@ -38,11 +41,13 @@ def closure_matrices(
 
 
 def loaded_matrices(posture: Posture) -> tuple[NDArray, ...]:
-    """Return the closure matrices and the loads on their columns, scaled alike."""
+    """Return the closure matrices and the loads, with the same scaling."""
     lin, joints = linearise(posture), virtual_joints(posture.robot)
     loads = all_loads(posture, LOAD, None, GRAVITY)
     small = np.abs(lin.rows @ joints.cones).max()
-    soft = np.abs(lin.rows @ joints.elastic).max() / small  # unit of springs
+    soft = (
+        np.abs(lin.rows @ joints.elastic).max() / small
+    )  # scaling factor of the springs
     on_springs = np.where(
         joints.links, loads.body @ joints.elastic, loads.joint @ joints.elastic
     )
@@ -55,8 +60,8 @@ def loaded_matrices(posture: Posture) -> tuple[NDArray, ...]:
 class Dpp:
     """Problem (22) or (21) with cvxpy parameters, which is canonicalised only once.
 
-    Entries that are zero at every posture are not made parameters, because cvxpy would
-    pass them to the solver as explicit zeros, which doubles the time.
+    Entries that are zero at every posture are constants.  As parameters, they would
+    double the time, because cvxpy passes them to the solver as explicit zeros.
     """
 
     def __init__(
@@ -120,7 +125,7 @@ def clarabel_full(posture: Posture) -> object:
 
 
 def clarabel_reduced(posture: Posture) -> object:
-    """Reduce the problem and solve it by Clarabel; timings include the reduction."""
+    """Reduce the problem and solve it by Clarabel."""
     joints = virtual_joints(posture.robot)
     small = reduce_problem(linearise(posture), joints)
     size = max(np.linalg.norm(small.h), np.linalg.norm(small.G, axis=0).max())
@@ -130,10 +135,10 @@ def clarabel_reduced(posture: Posture) -> object:
 
 
 def moreau_batched(postures: list[Posture]) -> float:
-    """Return the processor time [us] per point of moreau for one batch of problems.
+    """Return the processor time [us] of moreau per problem in a batch.
 
-    Matrices are prepared in advance, but passing them is timed.  NaN if moreau is not
-    installed.
+    The time includes passing the matrices, but not their computation.  It is NaN if
+    moreau is not installed.
     """
     try:
         import moreau
@@ -168,6 +173,6 @@ def moreau_batched(postures: list[Posture]) -> float:
 
 
 def cvxpy_rebuilt(posture: Posture) -> object:
-    """Solve the problem as printed, in SI units, with a new model per posture."""
+    """Solve the problem in SI units, with a new cvxpy model for each posture."""
     as_printed._UNIT = 1.0
     return as_printed.energy_as_printed(posture)

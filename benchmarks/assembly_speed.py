@@ -1,27 +1,25 @@
 """Measure the speed of problems (22) and (21) on one core, compared with other solvers.
 
-Run ``python -m benchmarks.assembly_speed``; it takes about ten seconds.  The robot is
-that of the paper, with the errors of the first draw in ``tests/irsbot2_numbers.json``.
-The postures are a 25 mm grid of its workspace.  The program prints:
+Run ``python -m benchmarks.assembly_speed``, which takes about ten seconds.  The robot
+is IRSBot-2 with the first set of errors in ``tests/irsbot2_numbers.json``.  The
+postures are a 25 mm grid of its workspace.  The program prints tables of
 
-- processor time [us] per point for the energy (22), with the errors times 1 and times
-  0.2.  The methods are: cvxpy with a new model per point (SI units); cvxpy with
-  parameters (scaled, DPP, matrices prepared in advance); Clarabel on the full problem;
-  Clarabel on the problem reduced by ``forcefit.assembly.linear.reference.reduction``
-  (reduction included); a batch of moreau on the full problem (to its tolerance of 1e-8,
-  without a certificate); the reference method in numpy; and ``solve_assembly`` for one
-  posture and for many (linearisation, reduction and certificate included).  The ratio
-  of cvxpy's DPP time to each time is also printed;
-- the same for the energy under a force, a moment and weight, with the errors times 1,
-  0.2 and 0, and for draws of the errors at one posture under these loads;
+- the processor time [us] per point for the energy (22), for the errors multiplied by 1
+  and by 0.2;
+- the same under loads, for the errors multiplied by 1, 0.2 and 0, and for random errors
+  at one posture;
 - the same for the margin (21), with compliant joints rigid and free;
-- the time of other single calls, and of placing many poses;
-- the fraction of points with a certified energy at six multiples of the errors, and
-  under four load levels at three of them; and the number of points solved by the
-  reference.
+- the time of other functions;
+- the fraction of points with a certified energy, and the number of points solved by the
+  reference method.
 
-Slow methods run on a sample of the grid, those of forcefit on the whole grid.  Only the
-batches of forcefit are repeated to select the shortest time.
+The methods are cvxpy with a new model for each point, cvxpy with parameters (DPP),
+Clarabel on the full problem and on the reduced problem, moreau on a batch of full
+problems, the reference method in numpy, and ``solve_assembly`` for one and for many
+postures.  The tables contain the ratio of the DPP time to each time.
+
+Slow methods run on a sample of the grid.  Only the batches of forcefit are repeated,
+and the shortest time is used.
 """
 
 # ruff: noqa: E402  one thread must be asked for before numpy is imported
@@ -69,7 +67,7 @@ READINGS = ("rigid", "free")
 
 
 def paper_robot() -> Robot:
-    """Return the robot of the paper with the errors of the first draw."""
+    """Return IRSBot-2 with the first set of errors."""
     robot = irsbot2()
     case = json.loads(NUMBERS.read_text())["cases"][0]
     errors = np.zeros((len(robot.frames), 6))
@@ -88,10 +86,10 @@ def workspace(robot: Robot, step: float = 0.025) -> list[Posture]:
 
 
 def timed(solve: Callable[..., object], postures: Iterable) -> float:
-    """Return the processor time [us] per point, including and counting failures."""
+    """Return the processor time [us] per point, and the number of failures."""
     failed = count = 0
     gc.collect()
-    gc.disable()  # as timeit does; a collection takes as long as a thousand calls
+    gc.disable()  # a garbage collection takes as long as a thousand calls
     start = time.process_time()
     for one in postures:
         count += 1
@@ -107,7 +105,7 @@ def timed(solve: Callable[..., object], postures: Iterable) -> float:
 
 
 def batched(solve: Callable[..., object], postures: list[Posture]) -> float:
-    """Return the processor time [us] per point of a batch, the best of ten runs."""
+    """Return the shortest processor time [us] per point of ten runs of a batch."""
     at, best = together(postures), np.inf
     for _ in range(10):
         start = time.process_time()
@@ -117,7 +115,7 @@ def batched(solve: Callable[..., object], postures: list[Posture]) -> float:
 
 
 def print_table(title: str, rows: dict[str, float]) -> None:
-    """Print the times, and the ratio of cvxpy's DPP time to each of them."""
+    """Print the times, and the ratio of the DPP time to each time."""
     print(f"\n{title}\n{'':38}{'us/point':>10}{'DPP over it':>13}")
     dpp = rows["cvxpy DPP, scaled"]
     for name, value in rows.items():
@@ -193,7 +191,7 @@ def print_margins(postures: list[Posture]) -> None:
 
 
 def print_calls(robot: Robot, postures: list[Posture]) -> None:
-    """Print the table of other single calls and of placing poses."""
+    """Print the table of the times of other functions."""
     some = [solve_assembly(posture) for posture in postures[::8]]
     poses = [{k: v for k, v in p.pose().items() if k in ("tx", "tz")} for p in postures]
     grid = np.full((len(poses), 6), np.nan)
@@ -221,7 +219,7 @@ def print_calls(robot: Robot, postures: list[Posture]) -> None:
 
 
 def print_certified(robot: Robot, postures: list[Posture]) -> None:
-    """Print the fractions of certified points and of points solved by the reference."""
+    """Print the fraction of certified points, and the use of the reference method."""
     at = together(postures)
     print(f"\ncertified energies of {len(postures)} points")
     for kappa in (0.0, 0.05, 0.1, 0.2, 0.5, 1.0):

@@ -1,10 +1,9 @@
-"""Inject faults into loaded functions by exchanging their code in a fork.
+"""Inject faults into imported functions in a forked process.
 
-All tests are collected once, and all modules are imported.  For each fault the process
-forks, exchanges the code of the functions with the fault, and runs the tests that
-execute its line.  This adds hundredths of a second to the tests, instead of the seconds
-that starting a new process takes.  Only statements within functions can be exchanged in
-this way, because values computed at import are already in use.
+All tests are collected once, and all modules are imported.  For each fault, the process
+forks, replaces the code of the function with the fault, and runs the tests that execute
+its line.  This is much faster than a new process for each fault.  It is possible only
+for statements within functions.
 """
 
 import functools
@@ -33,11 +32,11 @@ from benchmarks.traced_tests import (
 )
 
 PASSED, FAILED, BROKEN = 0, 1, 2
-WAITS = 10  # largest ratio of wall time to processor time of a test
+WAITS = 10  # [-] largest allowed ratio of wall time to processor time of a test
 
 
 class Session:
-    """A pytest plugin that runs the tests that ``judge`` selects."""
+    """Pytest plugin that runs the tests selected by ``judge``."""
 
     def __init__(self, tree: Path, judge: Callable[["Session"], None]) -> None:
         self.tree, self.judge = tree, judge
@@ -59,11 +58,11 @@ class Session:
                 importlib.import_module(module_of(path))
         self.functions = defaultdict[str, list[FunctionType]](list)
         for found in gc.get_objects():
-            if type(found) is FunctionType:  # isinstance fails for dead weak proxies
+            if type(found) is FunctionType:  # isinstance fails for expired weak proxies
                 self.functions[found.__code__.co_filename].append(found)
             elif type(found) is functools._lru_cache_wrapper:
                 found.cache_clear()
-        # Forks share the memory of objects that they do not modify.
+        # forks share the memory of objects that they do not modify
         gc.collect()
         gc.freeze()
 
@@ -119,8 +118,8 @@ class Session:
         return None if status == 0 else failed
 
     def exchange(self, fault: Fault) -> None:
-        """Replace the code of a file's functions by the code with the fault."""
-        # Python loads assembly, stiffness and validation by the links in forcefit
+        """Replace the code of the functions of a file by the code with the fault."""
+        # the packages are imported through the symbolic links in forcefit
         name = str(self.tree / Path(*module_of(fault.path).split(".")))
         name += "/__init__.py" if fault.path.name == "__init__.py" else ".py"
         right = (self.tree / fault.path).read_text("utf-8")
@@ -134,7 +133,7 @@ class Session:
 
 
 def within(code: CodeType) -> Iterator[CodeType]:
-    """Yield a code object and all code objects that are defined in it."""
+    """Yield a code object and all code objects inside it."""
     yield code
     for constant in code.co_consts:
         if isinstance(constant, CodeType):

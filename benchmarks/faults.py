@@ -1,14 +1,12 @@
-"""Generate random faults: wrong one-line expressions in the numerical modules.
+"""Random faults: changed expressions in the numerical modules.
 
-The probability of a file is proportional to its length.  Pages and pictures
-(``report.py``, ``plot.py``, ``figures.py``, ``scene.py``) are excluded, because their
-numbers are tested where they are computed.
+The probability of a file is proportional to its length.  Reports and pictures
+(``report.py``, ``plot.py``, ``figures.py``, ``scene.py``) are excluded.
 
 An operator is replaced by its opposite (``+`` and ``-``, ``<`` and ``>=``, ``and`` and
-``or``), a sign or a ``not`` is removed, or a number is increased by one, as mutmut and
-cosmic-ray do; a tolerance of 1e-9 becomes 1.  A number above ten becomes one, because
-401 steps instead of 400 would not be a fault.  Sizes that ``reshape`` infers are
-excluded, because any negative number has the same effect.
+``or``), a sign or a ``not`` is removed, or a number is increased by one.  Numbers above
+ten are replaced by one, because 401 steps instead of 400 are not a fault.  The size -1
+in ``reshape`` is not changed.
 """
 
 import ast
@@ -31,7 +29,7 @@ SWAPS: dict[type, type] = {
     ast.Eq: ast.NotEq, ast.NotEq: ast.Eq, ast.And: ast.Or, ast.Or: ast.And,
     ast.MatMult: ast.Add, ast.Pow: ast.Mult,
 }  # fmt: skip
-LARGE = 10  # numbers above this limit are replaced by one
+LARGE = 10  # limit above which numbers are replaced by one
 LEFT_OUT = {
     "report.py", "plot.py", "figures.py", "scene.py", "scenes.py",
 }  # fmt: skip
@@ -39,11 +37,10 @@ LEFT_OUT = {
 
 @dataclass(frozen=True)
 class Fault:
-    """A wrong expression in a line of a file.
+    """A wrong expression in a file.
 
-    ``rows`` are the rows of its statement, which a trace may contain.  ``name`` is the
-    variable that the statement assigns when the module is imported; it is None inside
-    a function.
+    ``rows`` contains the lines of its statement.  ``name`` is the variable that a
+    statement outside functions assigns.  It is None inside a function.
     """
 
     chapter: str
@@ -56,7 +53,7 @@ class Fault:
     within: bool
 
     def put_into(self, source: str) -> str:
-        """Return the text of the file with the fault."""
+        """Return the text of a file with a fault."""
         lines = source.splitlines(keepends=True)
         lines[self.row - 1] = self.line
         return "".join(lines)
@@ -66,7 +63,7 @@ class Fault:
 
 
 def places(tree: ast.Module) -> Iterator[ast.AST]:
-    """Yield nodes that can be changed, except messages, annotations and docstrings."""
+    """Yield the expressions that can be changed."""
     waiting: list[ast.AST] = [tree]
     while waiting:
         node = waiting.pop()
@@ -88,12 +85,12 @@ def places(tree: ast.Module) -> Iterator[ast.AST]:
 
 
 def is_left_open(node: ast.AST) -> bool:
-    """Return whether a node is -1, a size that numpy infers."""
+    """Return whether a node is the size -1, which numpy computes."""
     return isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub)
 
 
 def wrong(node: ast.AST) -> list[ast.AST]:
-    """Return variants of a node that contain one fault each."""
+    """Return variants of an expression, each with a fault."""
     if isinstance(node, ast.Constant):
         value = node.value
         assert isinstance(value, int | float)
@@ -116,7 +113,7 @@ def wrong(node: ast.AST) -> list[ast.AST]:
 
 
 def faults_at(chapter: str, path: Path, node: ast.AST, source: str) -> list[Fault]:
-    """Return the faults of an expression of one line in a file."""
+    """Return the faults of an expression in a file."""
     old = ast.get_source_segment(source, node)
     if old is None or "\n" in old:
         return []
@@ -133,7 +130,7 @@ def faults_at(chapter: str, path: Path, node: ast.AST, source: str) -> list[Faul
 
 
 def drawn(chapter: str, path: Path, random: Random) -> Fault | None:
-    """Return a random fault in a file; None if the drawn expression has no variant."""
+    """Return a random fault in a file, or None if the expression cannot be changed."""
     source = (ROOT / path).read_text(encoding="utf-8")
     nodes = list(places(ast.parse(source)))
     if not nodes:
@@ -143,7 +140,7 @@ def drawn(chapter: str, path: Path, random: Random) -> Fault | None:
 
 
 def all_in(chapter: str, path: Path) -> list[Fault]:
-    """Return all faults of a file in the order of its rows."""
+    """Return all faults of a file in the order of its lines."""
     source = (ROOT / path).read_text(encoding="utf-8")
     faults = [
         fault
@@ -154,7 +151,7 @@ def all_in(chapter: str, path: Path) -> list[Fault]:
 
 
 def statement(tree: ast.Module, row: int) -> tuple[range, str | None, bool]:
-    """Return the rows of the innermost statement, its name, and if in a function."""
+    """Return the lines of a statement, its name, and whether it is in a function."""
     within: list[ast.stmt] = []
     waiting: list[ast.AST] = [tree]
     while waiting:
@@ -168,16 +165,16 @@ def statement(tree: ast.Module, row: int) -> tuple[range, str | None, bool]:
     end = body[0].lineno - 1 if body else last.end_lineno or row
     rows = range(last.lineno, max(end, row) + 1)
     functions = [n for n in within if isinstance(n, ast.FunctionDef)]
-    if functions and functions[-1] is last:  # the row is a default value of an argument
+    if functions and functions[-1] is last:  # the line contains a default argument
         return range(last.body[0].lineno, (last.end_lineno or row) + 1), None, False
     if functions:
         return rows, None, True
     classes = [n.name for n in within if isinstance(n, ast.ClassDef)]
-    if classes:  # the default of a field is used when an object is created
+    if classes:  # the line contains the default of a field, which is used later
         return rows, classes[-1], False
     targets = getattr(last, "targets", None) or [getattr(last, "target", None)]
     names = [n.id for n in targets if isinstance(n, ast.Name)]
-    # A lambda body is executed after the import.
+    # the body of a lambda is executed after the import
     return rows, names[0] if names else path_name(last), False
 
 
@@ -188,7 +185,7 @@ def path_name(node: ast.AST) -> str | None:
 
 
 def files_of(chapters: str) -> list[tuple[str, Path]]:
-    """Return the packages whose names begin with a text, and their files."""
+    """Return the packages whose names start with a text, and their files."""
     return [
         (chapter, path.relative_to(ROOT))
         for chapter in CHAPTERS

@@ -1,18 +1,21 @@
-"""Feed invalid input to every reader and command option, and count failures.
+"""Run commands with random invalid input, and count failures.
 
-Run from the repository's root: ``python benchmarks/fuzz.py [COUNT] [--seed N]
-[--every-option]``.  Each input is a valid command of ``fuzz_seeds.py``,
-``fuzz_foreign.py`` or ``fuzz_machines.py`` whose files or words are changed by
-``fuzz_mutations.py``.  The command runs in a fork of a process that has imported and
-compiled everything.  ``fuzz_faults.py`` checks the result.  Seed and number determine
-an input; ``--only I`` runs input number I. With ``--every-option``, nothing is random:
-each option of each command that takes a value receives each value of EXTREMES once.
+Run ``python benchmarks/fuzz.py [COUNT] [--seed N] [--every-option]`` in the root of the
+repository.  Each input is a valid command of ``fuzz_seeds.py``, ``fuzz_foreign.py`` or
+``fuzz_machines.py``, whose files or arguments are changed by ``fuzz_mutations.py``.
+The command runs in a fork of this process.  ``fuzz_faults.py`` checks the result.  The
+seed and the number of an input determine the input, and ``--only I`` runs only the
+input with the number I.  With ``--every-option``, each option of each command is tested
+with each value of EXTREMES.
 
-Requirements on each command: the exit status is 0, 1, 2 or 130; with status 2, stderr
-contains one line that begins with ``forcefit: ``, and no new file exists; stderr
-contains nothing else except progress; all files are complete, and existing files are
-unchanged; no temporary files remain.  A command that takes more than LIMIT of processor
-time is interrupted as by Ctrl-C, and must then satisfy the same requirements.
+The requirements on each command are:
+
+- The exit status is 0, 1, 2 or 130.
+- With status 2, stderr contains one line that starts with ``forcefit: ``, and no new
+  file exists.  Otherwise, stderr contains only progress.
+- All files are complete, existing files are unchanged, and no temporary files remain.
+
+A command that takes more than LIMIT of processor time is interrupted as by Ctrl-C.
 """
 
 import argparse
@@ -35,7 +38,7 @@ from typing import NamedTuple
 
 from forcefit.commands import app as forcefit_command
 
-os.environ["OPENBLAS_NUM_THREADS"] = "1"  # before numpy; children are many
+os.environ["OPENBLAS_NUM_THREADS"] = "1"  # must be set before numpy is imported
 sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parent.parent)]
 
 import typer  # noqa: E402
@@ -46,9 +49,9 @@ from fuzz_mutations import change_file, change_words  # noqa: E402
 from fuzz_seeds import COMMANDS, KILLED, MADE, write_seeds  # noqa: E402
 
 LIMIT = 2.0  # [s] processor time after which a command receives Ctrl-C
-PATIENCE = 60.0  # [s] time after which a command is killed, because it hangs
+PATIENCE = 60.0  # [s] time after which a command is killed
 BATCH = 50  # number of inputs for each process
-MEMORY = 8 << 30  # [byte] largest address space of a process
+MEMORY = 8 << 30  # [byte] limit of the address space of a process
 EXTREMES = [
     "nan", "inf", "-inf", "0", "-1", "1e300", "-1e300", "1e-300", "1e15", "9" * 400, "",
 ]  # fmt: skip
@@ -56,16 +59,16 @@ _HEAD = struct.Struct("<Q")
 
 
 class Asked(NamedTuple):
-    """Settings of a run, which determine the input of each number."""
+    """Settings of a run."""
 
     seed: int
     options: dict[str, list[tuple[str, bool]]]
     commands: list[tuple[int, str]]
-    fixed: list[list[str]]  # words of each input if none is drawn
+    fixed: list[list[str]]  # arguments of all inputs with --every-option
 
 
 def options_of() -> dict[str, list[tuple[str, bool]]]:
-    """Return the options of each command, and whether each requires a value."""
+    """Return the options of each command, and whether they require a value."""
     faults = {}
 
     def walk(command, path):
@@ -83,7 +86,7 @@ def options_of() -> dict[str, list[tuple[str, bool]]]:
 
 
 def every_option(asked: Asked) -> list[list[str]]:
-    """Return valid commands with one additional option, for each option and value."""
+    """Return commands with an additional option, for each option and each value."""
     sound: dict[str, list[str]] = {}
     for _, command in asked.commands:
         words = shlex.split(command)
@@ -105,7 +108,7 @@ def command_name(words: list[str]) -> str:
 
 
 def prepare(folder: Path, commands: list[str]) -> None:
-    """Write valid files and run each valid command once, which compiles the code."""
+    """Write valid files, and run each valid command once."""
     write_seeds(folder)
     write_foreign(folder)
     write_machines(folder)
@@ -140,7 +143,7 @@ def prepare(folder: Path, commands: list[str]) -> None:
             took = time.process_time() - began
             if took > 0.5:
                 print(f"{took:6.1f} s  {command[:90]}", flush=True)
-            # An invalid word makes some commands stop early, which saves time.
+            # commands with an invalid argument stop early, which saves time
             if status not in {0, 1} and ",x" not in command and "solid" not in command:
                 print(f"not sound, {status}: {command}\n   {err[-300:]}")
     os.chdir(folder)
@@ -159,7 +162,7 @@ def run(words: list[str]) -> tuple[object, str, str]:
         os.dup(2), "w", encoding="utf-8", errors="backslashreplace", buffering=1
     )
     sys.argv = ["forcefit", *words]
-    sys.warnoptions[:] = ["default"]  # a warning on stderr is a fault here
+    sys.warnoptions[:] = ["default"]  # warnings are failures
     try:
         forcefit_command.main()
         status: object = 0
@@ -188,7 +191,7 @@ def run(words: list[str]) -> tuple[object, str, str]:
 
 
 def changed(number: int, asked: Asked) -> tuple[list[str], list[str]]:
-    """Return the words of an input, after changing files in the current folder."""
+    """Return the arguments of an input, after changing files in the current folder."""
     if asked.fixed:
         return asked.fixed[number], ["an option"]
     random = Random(f"{asked.seed}:{number}")
@@ -219,7 +222,7 @@ def changed(number: int, asked: Asked) -> tuple[list[str], list[str]]:
 
 
 def snapshot() -> dict[str, bytes]:
-    """Return the contents of all files here by name; empty folders end with a slash."""
+    """Return the contents of all files in the current folder by name."""
     return {
         str(p) if p.is_file() else f"{p}/": p.read_bytes() if p.is_file() else b""
         for p in sorted(Path().rglob("*"))
@@ -228,7 +231,7 @@ def snapshot() -> dict[str, bytes]:
 
 
 def one(number: int, asked: Asked, seeds: Path) -> dict:
-    """Run one input and return the faults of its result."""
+    """Run an input and return the faults of its result."""
     place = Path(tempfile.mkdtemp(dir=f"{seeds}.inputs"))
     folder_of_run, temporary = place / "here", place / "tmp"
     shutil.copytree(seeds, folder_of_run)
@@ -266,7 +269,7 @@ def one(number: int, asked: Asked, seeds: Path) -> dict:
 
 
 def tell(numbers: list[int], asked: Asked, seeds: Path, say: int) -> None:
-    """Run inputs one after the other in a child process; write results to a pipe."""
+    """Run inputs in a child process, and write the results to a pipe."""
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     with os.fdopen(say, "wb") as file:
@@ -277,7 +280,7 @@ def tell(numbers: list[int], asked: Asked, seeds: Path, say: int) -> None:
 
 
 def batch(numbers: list[int], asked: Asked, seeds: Path) -> list:
-    """Run inputs in a forked process, and in another one if an input kills it."""
+    """Run inputs in forked processes."""
     results = []
     while numbers:
         listen, say = os.pipe()

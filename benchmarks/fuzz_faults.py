@@ -4,7 +4,7 @@ import json
 import re
 from pathlib import Path
 
-# Lines of progress, verdicts, and messages of the mesher.
+# lines of progress, of verdicts and of the mesher on stderr
 _OURS = re.compile(
     r"forcefit: |warning: |[^\n]*[━╸╺]|\s*$|[^\n]*: not written, |mesh \d"
     r"|([a-z -]+|\S+) *\d+/\d+|\S+ +\d+% |\d[\d,]* unknowns|[a-z -]+: \d+ of \d+"
@@ -12,7 +12,7 @@ _OURS = re.compile(
 
 
 def faults(words, status, out, err, before, after, left) -> list[str]:
-    """Return the faults of a result, an empty list if it is correct."""
+    """Return the faults of a result, or an empty list."""
     faults = []
     if status not in {0, 1, 2, 130}:
         faults.append(f"status {status}")
@@ -51,17 +51,14 @@ def faults(words, status, out, err, before, after, left) -> list[str]:
         if status == 2 and not journal and not library:
             faults.append(f"written although refused: {name}")
         elif words[:2] == ["stiffness", "convert"]:
-            pass  # a text file for another program may have any ending
+            pass  # text files of other programs are not checked
         elif not journal and not is_whole(name, content):
             faults.append(f"not whole: {name}")
     return faults
 
 
 def may_change(name: str, after: dict[str, bytes]) -> bool:
-    """Return whether an existing file may be replaced by one of the same kind.
-
-    An empty folder may be filled.
-    """
+    """Return whether a command may replace an existing file or fill an empty folder."""
     if name.endswith("/"):
         return any(other.startswith(name) for other in after)
     journal = name.endswith((".journal", ".journal.lock"))
@@ -69,7 +66,7 @@ def may_change(name: str, after: dict[str, bytes]) -> bool:
 
 
 def is_whole(name: str, content: bytes) -> bool:
-    """Return whether a file is complete and of a kind that commands write."""
+    """Return whether a file is complete."""
     path = Path(name)
     if path.suffix == ".json":
         try:

@@ -1,7 +1,7 @@
-"""Provide valid files of other programs and commands that read them.
+"""Valid files of other programs, and commands that read them.
 
-They are used by ``fuzz.py --foreign``.  Commands of forcefit write the robots and
-matrices; this file creates the exports of measuring devices.
+They are used by ``fuzz.py --foreign``.  Commands of forcefit write robots and matrices,
+and this module writes the exports of measuring devices.
 """
 
 from pathlib import Path
@@ -98,8 +98,7 @@ C = [0.0, 0.07, 0.03]
 """
 NODES = "1,0,0,0\n2,0.3,0,0\n"
 
-# probability weight and words of each command; its files are written by the functions
-# below or by the commands of MADE_FOREIGN
+# probability weight and arguments of each command
 FOREIGN = [
     (6, "convert five.urdf -o new.toml"),
     (3, "convert five.urdf --loops loops.yaml --overlay overlay.toml -o new.toml"),
@@ -140,7 +139,7 @@ MADE_FOREIGN = [
 
 
 def write_foreign(folder: Path) -> None:
-    """Write all foreign files except those that commands write.
+    """Write all files except those that commands write.
 
     Args:
         folder: folder that contains the robot ``arm.toml``.

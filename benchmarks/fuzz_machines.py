@@ -1,8 +1,8 @@
-"""Provide valid files of robots with loops and of measured robots, with commands.
+"""Valid files of robots with loops and of measured robots, and commands that read them.
 
-The files are: robots with loops, one of them with loops that rounded dimensions leave
-open; a campaign, with the robot and the covariance that its diagnosis saves; exports of
-several measuring devices; and surfaces in every format.
+The files include robots with loops, a robot whose loops are open because of rounded
+dimensions, a campaign with its identified robot, exports of measuring devices, and
+surfaces in all formats.
 """
 
 from importlib.util import find_spec
@@ -10,7 +10,7 @@ from pathlib import Path
 
 from fuzz_seeds import BAR, OBJECT
 
-# A parallelogram linkage with a pin 20 um out of plane, so that no loop closes.
+# parallelogram linkage with a pin 20 um out of plane, so that its loops are open
 ROUNDED = BAR.replace(
     "translation = [0.5, 0.0, 0.0]", "translation = [0.5, 0.0, 2e-5]", 1
 )
@@ -61,7 +61,7 @@ MACHINES = [
     (3, "stiffness fea solid.msh --base z=0 --tip z=7 --young 7e10 --poisson 0.3"),
 ]  # fmt: skip
 
-# the optional package gmsh reads STEP files; without it, these commands are omitted
+# commands for STEP files, which are omitted without the optional package gmsh
 STEP = [
     (4, "stiffness fea two.step --part list --json -"),
     (3, "stiffness fea two.step#solid1 --base z=0 --tip z=7 --young 7e10 --poisson "
@@ -102,7 +102,7 @@ def write_machines(folder: Path) -> None:
 
 
 def _exports(folder: Path) -> dict[str, str]:
-    """Return readings of three targets in the export formats of four devices."""
+    """Return measurements of three targets in the formats of four devices."""
     rows = [line.split(",") for line in (folder / "timed.csv").read_text().split()]
     rows = [row for row in rows if len(row) > 4 and row[0] in VECTORS]
     leica = ["X  [mm],Y  [mm],Z  [mm],U(95)  [mm],Target,Temperature  [\xb0C],"
@@ -127,7 +127,7 @@ def _exports(folder: Path) -> dict[str, str]:
 
 
 def _surfaces() -> dict[str, str]:
-    """Return the tetrahedron of the OBJ file in other formats, by file name."""
+    """Return a tetrahedron in several formats, by file name."""
     lines = [line.split() for line in OBJECT.split("\n") if line]
     points = [" ".join(words[1:]) for words in lines if words[0] == "v"]
     faces = [[int(i) - 1 for i in w[1:]] for w in lines if w[0] == "f"]
@@ -152,7 +152,7 @@ def _surfaces() -> dict[str, str]:
 
 
 def _write_step(path: Path) -> None:
-    """Write two boxes to one STEP file."""
+    """Write a STEP file with two boxes."""
     import gmsh
 
     gmsh.initialize(interruptible=False)

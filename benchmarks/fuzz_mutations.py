@@ -1,4 +1,4 @@
-"""Mutate the files and the words of a command at random, for ``fuzz.py``."""
+"""Random changes of the files and the arguments of a command, for ``fuzz.py``."""
 
 import csv
 import io
@@ -51,14 +51,14 @@ _TOKEN = re.compile(r"-?\d[\d.eE+_-]*|\"[^\"\n]*\"|\w+")
 
 
 def change_file(path: Path, random: Random) -> str:
-    """Change one file in place.
+    """Change a file in place.
 
     Args:
         path: path of the file.
-        random: generator of random numbers.
+        random: random number generator.
 
     Returns:
-        A word that describes the change.
+        Name of the kind of change.
     """
     content = path.read_bytes()
     ways = [_bytes, _bytes, _cut]
@@ -76,7 +76,7 @@ def change_file(path: Path, random: Random) -> str:
 
 
 def _bytes(content: bytes, random: Random, _: str) -> bytes:
-    """Remove, repeat or replace some bytes, or flip a bit."""
+    """Remove, repeat or replace bytes, or flip a bit."""
     start = random.randrange(len(content) + 1)
     stop = min(len(content), start + random.choice([0, 1, 1, 4, 40]))
     piece = content[start:stop]
@@ -87,7 +87,7 @@ def _bytes(content: bytes, random: Random, _: str) -> bytes:
 
 
 def _cut(content: bytes, random: Random, _: str) -> bytes:
-    """Cut the file at a random place."""
+    """Truncate the file at a random position."""
     return content[: random.randrange(len(content) + 1)]
 
 
@@ -100,7 +100,7 @@ def _coded(text: str) -> bytes:
 
 
 def _token(content: bytes, random: Random, _: str) -> bytes:
-    """Replace a number, string or name by one of the file or an unusual one."""
+    """Replace a number, string or name by another value."""
     text = _text(content)
     tokens = list(_TOKEN.finditer(text))
     if not tokens:
@@ -132,7 +132,7 @@ def _lines(content: bytes, random: Random, _: str) -> bytes:
 
 
 def _coding(content: bytes, random: Random, _: str) -> bytes:
-    """Change line ends or the encoding, or add a byte order mark."""
+    """Change line endings or the encoding, or add a byte order mark."""
     text = _text(content)
     how = random.randrange(6)
     if how < 2:
@@ -144,7 +144,7 @@ def _coding(content: bytes, random: Random, _: str) -> bytes:
 
 
 def _units(content: bytes, random: Random, _: str) -> bytes:
-    """Replace a unit everywhere."""
+    """Replace all occurrences of a unit."""
     units = ["mm", "um", "in", "m", "deg", "rad", "mrad", "K", "furlong", ""]
     text = _text(content)
     found = [u for u in units if u and re.search(rf"\b{u}\b", text)]
@@ -155,7 +155,7 @@ def _units(content: bytes, random: Random, _: str) -> bytes:
 
 
 def _nested(content: bytes, random: Random, _: str) -> bytes:
-    """Open a bracket, tag or table many times; close all of them in half the cases."""
+    """Insert many nested brackets, tags or tables."""
     times = random.choice([20, 300, 3000, 200_000])
     pairs = {b"[": b"]", b"{": b"}", b"(": b")", b"<body>": b"</body>",
              b"<frame>": b"</frame>", b"<a>": b"</a>"}  # fmt: skip
@@ -167,7 +167,7 @@ def _nested(content: bytes, random: Random, _: str) -> bytes:
 
 
 def _rename(content: bytes, random: Random, _: str) -> bytes:
-    """Replace a name everywhere."""
+    """Replace all occurrences of a name."""
     text = _text(content)
     names = re.findall(r'name = "([^"\n]+)"', text) or re.findall(r"[A-Za-z_.]+", text)
     if not names:
@@ -185,7 +185,7 @@ def _rename(content: bytes, random: Random, _: str) -> bytes:
 
 
 def _tree(content: bytes, random: Random, suffix: str) -> bytes:
-    """Remove, rename, repeat or replace a value of the tables."""
+    """Remove, rename, repeat or replace a value of a TOML or JSON file."""
     try:
         text = content.decode("utf-8")
         data = tomllib.loads(text) if suffix == ".toml" else json.loads(text)
@@ -221,7 +221,7 @@ def _places(value: Any, path: tuple = ()) -> Any:
 
 
 def _toml(data: dict) -> str:
-    """Return tables as TOML text; lists of tables at the root become blocks."""
+    """Return nested tables as TOML text."""
     lines, blocks = [], []
     for key, value in data.items():
         if (
@@ -250,7 +250,7 @@ def _written(value: Any) -> str:
 
 
 def _cells(content: bytes, random: Random, _: str) -> bytes:
-    """Replace cells of a table, or move a row or a column."""
+    """Replace cells of a CSV table, or move a row or a column."""
     try:
         rows = list(csv.reader(io.StringIO(_text(content))))
     except csv.Error:
@@ -275,15 +275,16 @@ def _cells(content: bytes, random: Random, _: str) -> bytes:
 def change_words(
     words: list[str], options: list[tuple[str, bool]], random: Random
 ) -> list[str]:
-    """Change one to three words of a command.
+    """Change one to three arguments of a command.
 
     Args:
-        words: words of a valid command.
-        options: names of the command's options, and whether they require a value.
-        random: generator of random numbers.
+        words: arguments of a valid command.
+        options: options of the command, and whether they require a value.
+        random: random number generator.
 
     Returns:
-        The changed words; the first two, which name the command, stay unchanged.
+        The changed arguments.  The first two are the name of the command and do not
+        change.
     """
     words = list(words)
     for _ in range(random.choice([1, 1, 1, 2, 3])):
@@ -304,7 +305,7 @@ def change_words(
 
 
 def _value(old: str, random: Random) -> str:
-    """Return an unusual value in place of a value."""
+    """Return an unusual value for an argument."""
     if "." in old and not old.replace(".", "").isdigit() and random.random() < 0.6:
         return random.choice(PATHS)
     pieces = re.split(r"([=,:])", old)

@@ -1,4 +1,4 @@
-"""Provide valid files of every kind and commands that read them, for ``fuzz.py``."""
+"""Valid files of all kinds, and commands that read them, for ``fuzz.py``."""
 
 from pathlib import Path
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from tests.robot_files_for_tests import FOUR_BAR
 
-# The parallelogram linkage of the tests, whose loop does not close with errors.
+# parallelogram linkage of the tests with geometric errors
 BAR = FOUR_BAR.replace(
     "mass = 1.2", "mass = 1.2\ngeometric_error = [1e-4, 1e-4, 1e-4, 1e-5, 1e-5, 1e-5]"
 )
@@ -146,7 +146,7 @@ f 2 3 4
 f 1 4 3
 """
 
-# Relative frequency and words of each command; names of output files begin with "new".
+# relative frequency and arguments of each command; output files start with "new"
 COMMANDS = [
     (9, "assembly solve bar.toml --quantities margin"),
     (9, "assembly solve bar.toml --load fx=10,mz=1 --gravity y=-9.81 --json -"),
@@ -209,7 +209,7 @@ COMMANDS = [
 
 
 def write_seeds(folder: Path) -> None:
-    """Write all files that the commands read, except those that commands write.
+    """Write all input files except those that commands write.
 
     Args:
         folder: empty folder.
@@ -229,7 +229,7 @@ def write_seeds(folder: Path) -> None:
 
 
 def _measurements() -> str:
-    """Return eight rows of an arm's simulated readings with noise as CSV text."""
+    """Return eight simulated measurements of an arm as CSV text."""
     rng = np.random.default_rng(4)
     lines = ["id,q.one,q.two,load.fx,meas.tx,meas.ty,meas.tz,cov.temperature,cov.time"]
     for i in range(8):
@@ -241,7 +241,7 @@ def _measurements() -> str:
 
 
 def _stl() -> bytes:
-    """Return a tetrahedron as the bytes of a binary STL file."""
+    """Return a tetrahedron as a binary STL file."""
     corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]])
     faces = corners[[[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]]
     record = np.zeros(4, dtype=[("normal", "<f4", 3), ("corners", "<f4", (3, 3)),
@@ -250,13 +250,13 @@ def _stl() -> bytes:
     return bytes(80) + np.uint32(4).tobytes() + record.tobytes()
 
 
-# commands that write the files that other commands read
+# commands whose output files are read by other commands
 MADE = [
     "stiffness library links.toml",
     "assembly sweep bar.toml --grid q.crank=1:1.2:0.1 -o swept.nc --near 0.1",
     "assembly statistics bar.toml --errors errors.toml --draws 40 -o draws.nc",
 ]
-# Commands that are killed between solution and output, so that their journals remain.
+# commands that are killed before their output is written, so that journals remain
 KILLED = [
     "assembly sweep bar.toml --grid q.crank=1:1.2:0.1 -o kept.nc --near 0.1",
     "assembly statistics bar.toml --errors errors.toml --draws 40 -o drawn.nc",

@@ -1,16 +1,16 @@
-"""Interrupt commands at random moments and count lost results.
+"""Interrupt commands at random times and count lost results.
 
-Run from the repository's root: ``python benchmarks/kills.py [KILLS] [--seed N]``.  The
-four commands are ``assembly sweep``, ``statistics``, ``tolerances`` and ``validation
-diagnose``.  They run in forks of a process that has imported and compiled everything.
-They are stopped by SIGKILL, SIGTERM, Ctrl-C or a full disk, which is simulated by a
-limit on file sizes or, where one may be mounted, by a small tmpfs.  Between runs, a
-journal is truncated or one of its bits is flipped.  Finally, the same command runs to
-completion, and its files are compared with those of an undisturbed run.
+Run ``python benchmarks/kills.py [KILLS] [--seed N]`` in the root of the repository.
+The commands are ``assembly sweep``, ``statistics``, ``tolerances`` and ``validation
+diagnose``.  They run in forks of this process and are interrupted by SIGKILL, SIGTERM,
+Ctrl-C or a full disk.  A full disk is simulated by a limit on file sizes or by a small
+tmpfs.  Between runs, a journal is truncated, or a bit is flipped.  Finally, the command
+runs without an interruption, and its files are compared with those of an undisturbed
+run.
 
-A point is lost if it had been written to the journal, was not affected by a truncation
-or flipped bit, and is nevertheless missing or solved again.  A file is half-written if
-it exists under its final name but differs from that of the undisturbed run.
+A point is lost if it was stored in the intact part of the journal and is missing or
+computed again.  A file is incomplete if it has its final name and differs from the file
+of the undisturbed run.
 """
 
 import argparse
@@ -36,7 +36,7 @@ from random import Random
 from forcefit.commands import app as forcefit_command
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
-os.environ["OPENBLAS_NUM_THREADS"] = "1"  # before numpy; children are many
+os.environ["OPENBLAS_NUM_THREADS"] = "1"  # must be set before numpy is imported
 
 import numpy as np
 
@@ -48,22 +48,22 @@ from forcefit.assembly.sweeps import journal
 WAYS = {signal.SIGKILL: 12, signal.SIGTERM: 2, signal.SIGINT: 3, "full": 3}
 
 
-SOLVED, KEPT = 0, 8  # [byte] offsets of two numbers that a child and its parent share
+SOLVED, KEPT = 0, 8  # [byte] offsets of two counters in shared memory
 shared = mmap.mmap(-1, 16)
 
 
 def count(place: int, more: int) -> None:
-    """Increase a counter that the parent reads after the child has died."""
+    """Increase a counter in shared memory."""
     struct.pack_into("<q", shared, place, counted(place) + more)
 
 
 def counted(place: int) -> int:
-    """Read a counter of the last child."""
+    """Return a counter of the last child process."""
     return struct.unpack_from("<q", shared, place)[0]
 
 
 def watch() -> None:
-    """Count the points solved and the points confirmed by the journal."""
+    """Count the computed points and the points stored in the journal."""
     solve, draw, add = (
         sweeps.solve_points,
         monte_carlo.Experiment.solve,
@@ -90,7 +90,7 @@ def watch() -> None:
 
 
 def start(words: list[str], limit: int | None = None) -> int:
-    """Run a command in a child process in the current folder; return its pid."""
+    """Start a command in a child process, and return its process id."""
     shared[:] = bytes(16)
     child = os.fork()
     if child:
@@ -107,7 +107,9 @@ def start(words: list[str], limit: int | None = None) -> int:
         forcefit_command.main()
     except SystemExit as done:
         status = done.code if isinstance(done.code, int) else 98
-        if status not in {0, 130} and limit is None:  # a full disk allows no message
+        if (
+            status not in {0, 130} and limit is None
+        ):  # there is no message if the disk is full
             os.write(2, printed.getvalue()[-300:].encode())
     except BaseException:
         with suppress(OSError):
@@ -117,7 +119,7 @@ def start(words: list[str], limit: int | None = None) -> int:
 
 
 def run_here(words: list[str]) -> None:
-    """Run a command in this process, so that its code is compiled for the children."""
+    """Run a command in this process."""
     before = sys.argv, sys.stdout, sys.stderr
     sys.argv, sys.stdout, sys.stderr = (
         ["forcefit", *words],
@@ -136,12 +138,12 @@ def run_here(words: list[str]) -> None:
 
 
 def finish(child: int) -> int:
-    """Wait for a child; return its exit status, or minus the signal that killed it."""
+    """Wait for a child process, and return its exit status or minus its signal."""
     return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
 
 
 def records(content: bytes, case: Case) -> list[tuple[int, int, int]]:
-    """Return the start, the end and the points of each valid record of a journal."""
+    """Return the start, the end and the number of points of each valid record."""
     owner = zlib.crc32(case.header)
     places, _ = journal._scan(content, len(case.header), owner)
     head = journal._HEAD.size
@@ -152,14 +154,14 @@ def records(content: bytes, case: Case) -> list[tuple[int, int, int]]:
 
 
 def points_in(path: Path, case: Case) -> int:
-    """Return the number of points in a journal; zero if it does not exist."""
+    """Return the number of points in a journal, or 0 if it does not exist."""
     if not case.header or not path.exists():
         return 0
     return sum(points for *_, points in records(path.read_bytes(), case))
 
 
 def undisturbed(command: str) -> Case:
-    """Run a command here to compile, once for its files, once for its journal."""
+    """Return the files and the journal of an undisturbed run of a command."""
     case = Case(shlex.split(command))
     run_here(case.words)
     began = time.monotonic()
@@ -192,7 +194,7 @@ def points_in_all(case: Case) -> int:
 
 
 def spoil(path: Path, case: Case, random: Random, counts: Counter) -> int:
-    """Truncate a journal, flip a bit or do nothing; return the intact points."""
+    """Truncate a journal, flip a bit or do nothing, and return the intact points."""
     content = bytearray(path.read_bytes())
     sound = records(bytes(content), case)
     everything = sum(points for *_, points in sound)
@@ -207,14 +209,14 @@ def spoil(path: Path, case: Case, random: Random, counts: Counter) -> int:
     counts["journals with a bit turned"] += 1
     content[at] ^= 1 << random.randrange(8)
     if not sound and (at <= content.find(b"\n") or b"\n" not in content):
-        path.unlink()  # a journal without its header is refused and must be removed
+        path.unlink()  # a journal without its header must be removed
         return 0
     path.write_bytes(content)
     return sum(points for start, end, points in sound if not start <= at < end)
 
 
 def trial(case: Case, random: Random, counts: Counter, small: bool) -> None:
-    """Disturb a command several times, let it finish, and compare its files."""
+    """Interrupt a command several times, complete it, and compare its files."""
     path, standing = Path("out.nc.journal"), 0
     while random.random() < 0.75:
         (way,) = random.choices(list(WAYS), list(WAYS.values()))
@@ -222,7 +224,10 @@ def trial(case: Case, random: Random, counts: Counter, small: bool) -> None:
         if way == "full" and not small:
             largest = max(map(len, case.files.values()))
             limit = int(np.exp(random.uniform(0, np.log(1.2 * largest))))
-        before = {*Path().glob("*.part"), *Path().glob("*.lock")}  # of a killed child
+        before = {
+            *Path().glob("*.part"),
+            *Path().glob("*.lock"),
+        }  # files of a killed child
         child = start(case.words, limit)
         if way == "full":
             status = finish(child)
@@ -233,7 +238,9 @@ def trial(case: Case, random: Random, counts: Counter, small: bool) -> None:
             os.kill(child, way)
             status = finish(child)
             counts[f"stopped by {way.name}"] += status != 0
-            right = {0, -way, 130} | ({2} if small else set())  # 2: the disk is full
+            right = {0, -way, 130} | (
+                {2} if small else set()
+            )  # status 2 if the disk is full
             counts["wrong exit status"] += wrong(status, right, case, way)
         counts["lost"] += solved_again(case, standing)
         counts["half-written"] += check(case, counts, status, before)
@@ -241,7 +248,7 @@ def trial(case: Case, random: Random, counts: Counter, small: bool) -> None:
             standing = 0
             counts["half-written"] += any(not Path(n).exists() for n in case.files)
             continue
-        if case.header:  # without a header, only the final files are compared
+        if case.header:  # the command has a journal
             standing += counted(KEPT)
             counts["lost"] += max(0, standing - points_in(path, case))
         standing = spoil(path, case, random, counts) if path.exists() else 0
@@ -258,7 +265,7 @@ def trial(case: Case, random: Random, counts: Counter, small: bool) -> None:
 
 
 def wrong(status: int, right: set[int], case: Case, way: object) -> bool:
-    """Return whether an exit status is wrong; print a wrong one."""
+    """Return whether an exit status is wrong, and print it."""
     if status in right:
         return False
     print(f"exit status {status} of {case.words[1]} after {way}")
@@ -272,7 +279,7 @@ def removed(case: Case, standing: int) -> bool:
 
 
 def solved_again(case: Case, standing: int) -> int:
-    """Return the points that the last child solved despite the journal."""
+    """Return the number of stored points that the last child computed again."""
     return max(0, counted(SOLVED) - (case.points - standing)) if case.header else 0
 
 
@@ -289,13 +296,13 @@ def check(case: Case, counts: Counter, status: int, before: set[Path]) -> int:
 
 
 def mounted(folder: Path, kilobytes: int) -> bool:
-    """Return whether a small tmpfs could be mounted on a folder."""
+    """Mount a small tmpfs on a folder, and return whether this succeeded."""
     command = ["mount", "-t", "tmpfs", "-o", f"size={kilobytes}k", "none", str(folder)]
     return subprocess.run(command, check=False, capture_output=True).returncode == 0
 
 
 def main() -> int:
-    """Disturb the commands, print the counts, and return the exit status."""
+    """Interrupt the commands, print the counts, and return the exit status."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("kills", nargs="?", type=int, default=200)
     parser.add_argument("--seed", type=int, default=1)

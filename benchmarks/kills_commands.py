@@ -1,4 +1,4 @@
-"""Define the commands that ``kills.py`` disturbs and their input files."""
+"""Commands that ``kills.py`` interrupts, and their input files."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -33,14 +33,14 @@ SHARES = {"sweep": 6, "statistics": 5, "tolerances": 3, "diagnose": 3}
 
 @dataclass
 class Case:
-    """A command together with the results of its undisturbed run.
+    """A command and the results of its undisturbed run.
 
     Attributes:
-        words: words of the command.
+        words: arguments of the command.
         seconds: [s] duration of the command.
-        files: contents of the files that it writes, by name.
-        header: first line of its journal; empty if there is no journal.
-        points: number of points in the journal at the end.
+        files: contents of its output files, by name.
+        header: first line of its journal, or an empty string without a journal.
+        points: number of points in the complete journal.
     """
 
     words: list[str]
@@ -51,7 +51,7 @@ class Case:
 
 
 def inputs(folder: Path) -> None:
-    """Write the files that the commands read."""
+    """Write the input files of the commands."""
     from tests.planar_arm_for_tests import measure
 
     (folder / "errors.toml").write_text(ERRORS)

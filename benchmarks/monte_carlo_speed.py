@@ -1,11 +1,10 @@
-"""Measure the rate of certified energy problems at one posture.
+"""Measure the number of certified energy problems per second at one posture.
 
-All errors delta l of section IV of the paper's robot are drawn uniformly with random
-signs, up to a fraction of their size in the paper.  For each fraction, the program
-prints how many draws store no energy, how many are certified, and how many the
-reference solved.  It also prints the draws per second of processor time, the time for
-1e7 draws on two cores at this rate, and the draws per second of wall time on two
-threads. ``python benchmarks/monte_carlo_speed.py [DRAWS]``.
+Run ``python benchmarks/monte_carlo_speed.py [DRAWS]``.  The geometric errors of
+IRSBot-2 have uniform distributions up to a fraction of the errors in the paper.  For
+each fraction, the program prints the fractions of draws without energy, of certified
+draws, and of draws that the reference method solved.  It also prints the number of
+draws per second of processor time and of wall time, and the time for 1e7 draws.
 """
 
 import sys
@@ -25,12 +24,12 @@ from forcefit.assembly.statistics.linear_response import LinearResponse, linear_
 FRAMES = ("elbow_a", "link_a", "elbow_b", "link_b", "loop2_platform", "tip")
 PAPER = np.array([2e-2] * 3 + [2e-4] * 3)  # [rad, m]
 SHARES = (1.0, 0.5, 0.2, 0.1, 0.05, 0.02)
-# Number of draws per block; target number of draws and target time [s].
+# number of draws per block, target number of draws, and target time [s]
 BLOCK, TARGET, GOAL = 4096, 1e7, 600.0
 
 
 def paper_sources(share: float) -> ErrorSources:
-    """Return the errors of the paper, scaled, with random signs."""
+    """Return random errors with a multiple of the widths of the paper."""
     robot = load_robot("irsbot2")
     rows = [robot.index(name) for name in frames_named(robot, FRAMES)]
     count = 6 * len(rows)
@@ -43,7 +42,7 @@ def paper_sources(share: float) -> ErrorSources:
 
 
 def solve_block(one: LinearResponse, sources: ErrorSources, block: int) -> NDArray:
-    """Count the draws of a block: no energy, certified, solved by the reference."""
+    """Return the numbers of draws without energy, certified, and by the reference."""
     errors = sources.errors(sources.draw(block * BLOCK, BLOCK, seed=1))
     draws = one.solve(errors)
     reference = draws.method == "reference"
@@ -52,7 +51,7 @@ def solve_block(one: LinearResponse, sources: ErrorSources, block: int) -> NDArr
 
 
 def run(one: LinearResponse, sources: ErrorSources, blocks: int, threads: int) -> tuple:
-    """Return draws per second of processor and wall time, and fractions of draws."""
+    """Return the draws per second of processor time and wall time, and fractions."""
     clock, processor = time.perf_counter(), time.process_time()
     with threadpool_limits(1), ThreadPoolExecutor(threads) as pool:
         counts = list(pool.map(lambda b: solve_block(one, sources, b), range(blocks)))
@@ -74,7 +73,7 @@ def main() -> None:
     )
     for share in SHARES:
         sources = paper_sources(share)
-        solve_block(one, sources, 0)  # load everything before the time is measured
+        solve_block(one, sources, 0)  # the first call imports modules
         single, _, (without, certified, reference) = run(one, sources, blocks, 1)
         _, double, _ = run(one, sources, blocks, 2)
         print(

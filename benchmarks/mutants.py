@@ -1,21 +1,18 @@
-"""Inject random one-line faults in the numerical modules and find detecting tests.
+"""Inject random faults into the numerical modules, and find tests that detect them.
 
     python -m benchmarks.mutants [COUNT] [--seed N] [--only FOLDER] [--files PATH ...]
         [--seconds S] [--traced FOLDER]
 
-The default tests of all folders and ``tests/test_answers.py`` are run once and traced:
-which test executes which line, and how long it takes.  The trace is stored in the
-folder after --traced.  It is repeated for folders with changed tests, and ignored for
-changed files.  Then the tests that execute the line of a fault are run, nearest and
-shortest first, for up to S seconds or until the first failure.  A fault that only
-longer or other tests would detect counts as surviving.
+The tests are run once, and the lines and the time of each test are recorded.  This
+trace is stored in the folder after --traced, and updated for folders with changed
+tests.  For each fault, the tests that execute its line are run until the first failure,
+for up to S seconds.  Near and short tests are run first.  If no test fails, the fault
+survives.
 
-Faults within functions are injected into a process that has loaded everything
-(``exchanged_code.py``).  Other faults are written into a copy of the source tree. Their
-tests run in a fork of this process, which has imported all libraries, at first for an
-eighth of S seconds.  C++ code is excluded.
+Faults within functions are injected into an imported module (``exchanged_code.py``).
+All other faults are written into a copy of the source tree.  C++ code is excluded.
 
-With --files, every fault of these files is tested instead of COUNT random ones.  The
+With --files, all faults of these files are tested instead of COUNT random faults.  The
 program prints the fraction of detected faults and lists all others.
 """
 
@@ -34,18 +31,18 @@ from benchmarks.exchanged_code import Session
 from benchmarks.faults import ROOT, Fault, all_in, drawn, files_of
 from benchmarks.traced_tests import Run, Trace, traced
 
-# libraries that are imported once, before the process forks
+# libraries that are imported before the process forks
 LIBRARIES = (
     "scipy.linalg", "scipy.optimize", "scipy.sparse.linalg", "scipy.spatial",
     "scipy.stats", "scipy.ndimage", "cvxpy", "clarabel", "skfem", "xarray", "pandas",
     "h5netcdf", "matplotlib.figure", "pyvista", "meshio", "typer.testing", "hypothesis",
     "hypothesis.extra.numpy",
 )  # fmt: skip
-LEAST_SECONDS = 15  # [s] processor time allowed for the collection of tests
+LEAST_SECONDS = 15  # [s] limit of the processor time to collect tests
 
 
 def chosen(tests: list[str], trace: Trace, seconds: float) -> list[str]:
-    """Return as many of the first tests as fit into the given time."""
+    """Return the first tests whose total time does not exceed a limit."""
     total = 0.0
     some: list[str] = []
     for test in tests:
@@ -57,7 +54,7 @@ def chosen(tests: list[str], trace: Trace, seconds: float) -> list[str]:
 
 
 def caught(fault: Fault, tree: Path, trace: Trace, seconds: float) -> str | None:
-    """Return the test that detects a fault, "" if it has no name, or None."""
+    """Return the test that detects a fault, or None."""
     path = tree / fault.path
     whole, times = path.read_bytes(), path.stat()
     path.write_text(fault.put_into(whole.decode()), encoding="utf-8")
@@ -69,7 +66,7 @@ def caught(fault: Fault, tree: Path, trace: Trace, seconds: float) -> str | None
 
 
 def seen(fault: Fault, tree: Path, trace: Trace, seconds: float) -> str | None:
-    """Return the first test that detects the fault in the tree, or None."""
+    """Return the first test that detects a fault in a copy of the tree, or None."""
     tests = trace.nearest(fault)
     for share in (seconds / 8, seconds):
         some = chosen(tests, trace, share)
@@ -83,9 +80,9 @@ def seen(fault: Fault, tree: Path, trace: Trace, seconds: float) -> str | None:
 def judged(
     faults: list[Fault], tree: Path, trace: Trace, seconds: float
 ) -> Iterator[tuple[Fault, str | None]]:
-    """Yield each fault and the test that detects it, exchangeable faults first."""
+    """Yield each fault and the test that detects it."""
     some = [fault for fault in faults if fault.within]
-    # chosen before the fork, because a child cannot use the data base of the trace
+    # tests are selected before the fork, because children cannot read the trace
     tests = [chosen(trace.nearest(fault), trace, seconds) for fault in some]
     reading, writing = Pipe(duplex=False)
 
@@ -106,7 +103,7 @@ def judged(
 
 
 def asked_for(asked: argparse.Namespace) -> list[Fault]:
-    """Return all faults of the given files, or the requested number of random ones."""
+    """Return all faults of given files, or a number of random faults."""
     files = files_of(asked.only)
     if asked.files:
         named = [(c, path) for c, path in files if path in asked.files]
@@ -136,7 +133,7 @@ def main() -> None:
     began, survived = time.monotonic(), 0
     with tempfile.TemporaryDirectory() as scratch:
         tree = Path(scratch) / "forcefit"
-        # The copy includes the compiled modules.
+        # the copy includes the compiled modules
         left_out = shutil.ignore_patterns(".git", ".venv", ".*_cache", "*_study")
         shutil.copytree(ROOT, tree, symlinks=True, ignore=left_out)
         kept = asked.traced or Path(scratch)

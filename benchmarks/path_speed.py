@@ -1,12 +1,11 @@
-"""Time a path of 1000 points with inertial loads, compared with single points.
+"""Measure the time of errors along a path, compared with single points.
 
-Three built-in robots, whose beams and platform have mass, move over 0.1 m with the
-quintic profile at 20 G.  Both methods compute motion, loads, problem (22) with and
-without acceleration, and K_C.  ``point by point`` calls the same public functions for
-each instant in a loop.  Stress, verdicts on the postures, and the first natural
-frequency at five postures are computed only for the whole path.  The table shows the
-minimum wall and processor times of several runs, and the ratio of processor times. Run
-``python -m benchmarks.path_speed``.
+Run ``python -m benchmarks.path_speed``.  Three built-in robots with masses move by 0.1
+m with an acceleration of up to 20 G.  The path has 1000 points.  The motion, the loads,
+problem (22) and K_C are computed for all points together and ``point by point``, by the
+same functions for each instant.  Stress, verdicts and natural frequencies are
+computed only for the whole path.  The table contains the shortest wall and processor
+times of several runs, and the ratio of processor times.
 """
 
 import time
@@ -56,7 +55,7 @@ def heavy(name: str) -> Robot:
 
 
 def path_of(robot: Robot, names: tuple[str, ...]) -> Trajectory:
-    """Return a path of 0.1 m along x about home, with an acceleration of 20 G."""
+    """Return a path of 0.1 m along x, with an acceleration of up to 20 G."""
     pose = home_posture(robot).pose()
     rows = np.array([[pose[name] for name in names]] * 2)
     rows[:, 0] += [-0.05, 0.05]
@@ -65,7 +64,7 @@ def path_of(robot: Robot, names: tuple[str, ...]) -> Trajectory:
 
 
 def solve_instant(robot: Robot, path: Trajectory, row: int) -> None:
-    """Solve one instant of a path by the functions of one posture."""
+    """Compute an instant of a path by the functions for single postures."""
     parts = (part[row : row + 1] for part in (path.values, path.first, path.second))
     values, first, second = parts
     placed, _ = place_many(robot, goals_of(path.names, robot, values))
@@ -86,13 +85,13 @@ def solve_instant(robot: Robot, path: Trajectory, row: int) -> None:
 
 
 def solve_some(robot: Robot, path: Trajectory) -> None:
-    """Solve selected instants of a path one by one."""
+    """Compute selected instants of a path one by one."""
     for row in np.linspace(0, POINTS - 1, ONE_BY_ONE).astype(int).tolist():
         solve_instant(robot, path, row)
 
 
 def least(run: Callable[[], object], runs: int) -> tuple[float, float]:
-    """Return the minimum wall and processor times [s] of several runs."""
+    """Return the shortest wall and processor times [s] of several runs."""
     spent = []
     for _ in range(runs):
         start = time.perf_counter(), time.process_time()
@@ -103,7 +102,7 @@ def least(run: Callable[[], object], runs: int) -> tuple[float, float]:
 
 
 def main() -> None:
-    """Print a line for each robot."""
+    """Print a row of the table for each robot."""
     head = f"{'robot':10}{'path [s]':>10}{'(clock)':>10}{'point by point [s]':>20}"
     print(f"{head}{'ratio':>8}")
     for name, names in MOVES.items():

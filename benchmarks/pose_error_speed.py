@@ -1,26 +1,22 @@
 """Measure the speed of problem (27) on one core, compared with global solvers.
 
-Run ``python benchmarks/pose_error_speed.py``; it takes some minutes, mainly for SCIP.
-The robot and the grid are those of ``benchmarks/assembly_speed.py``.  Rotation and
-translation are bounded for two cases:
+Run ``python benchmarks/pose_error_speed.py``, which takes some minutes.  The robot and
+the grid are those of ``benchmarks/assembly_speed.py``.  Rotation and translation errors
+are computed
 
-- clearances only (no errors), with the assumption ``frozen``;
-- the errors of the first draw, with the assumption ``free``, at the points inside the
-  assembly zone, where clearance remains, and at all points, most of which have little.
+- without geometric errors, with the assumption ``frozen``;
+- with geometric errors and the assumption ``free``, at the points inside the assembly
+  zone and at all points.
 
-The program prints the processor time [ms] per point until the bounds differ by 1e-6 rad
-or 1e-6 m, for SCIP, Gurobi, a simple branch and bound in this file (secants above the
-squares, Clarabel at every node), ``bound_pose_error`` for single points, and
-``bound_pose_error`` for all points together; and the ratios to the last.  Then it
-prints the time [s] of a complete study with four quantities, two assumptions and 1113
-points.
+The program prints the processor time [ms] per point until both bounds differ by 1e-6
+rad or 1e-6 m, and its ratio to the time of ``bound_pose_error`` for all points
+together.  The other methods are SCIP, Gurobi, a simple branch and bound in this module,
+and ``bound_pose_error`` for single points.  The program also prints the time [s] of a
+complete study with four quantities, two assumptions and 1113 points.
 
-The other solvers receive the reduced problem with unit cones and with poses in mrad or
-mm, so their times include no modelling except creating their own objects.  The times of
-forcefit include everything after the frames are placed: problem (22), the loaded
-clearances, the reduction and the search.  A solver that is not installed, or whose
-licence does not allow the size, is reported in its line.  ``pip install
-forcefit[benchmarks]`` installs both.
+The times of other solvers include only the solution of the reduced problem.  The times
+of forcefit include problem (22), the reduction and the search.  ``pip install
+forcefit[benchmarks]`` installs the other solvers.
 """
 
 # ruff: noqa: E402  one thread must be asked for before numpy is imported
@@ -49,8 +45,8 @@ from forcefit.assembly.solvers import conic
 from forcefit.assembly.solvers.cones import cone_sizes
 
 SAMPLE = 6  # number of points that the other solvers solve
-UNIT = 1e-3  # [rad, m] the other solvers receive poses in mrad and mm
-TOLERANCE = 1e-6  # [rad or m]
+UNIT = 1e-3  # [rad, m] unit of poses for other solvers
+TOLERANCE = 1e-6  # [rad or m] difference between both bounds
 LIMIT = 30.0  # [s] time limit for each point
 PARTS = {"rotation": slice(0, 3), "translation": slice(3, 6)}
 
@@ -67,20 +63,20 @@ class Answer:
 def scaled(
     reach: ReachableSet, part: slice
 ) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-    """Return (c, X, H, k) of x = c + X v with H v = k, poses in units of 1e-3."""
+    """Return (c, X, H, k) of the problem x = c + X v with H v = k, in mrad or mm."""
     X = reach.map[part] / UNIT
     c = reach.centre[part] / UNIT - X @ reach.start
     return c, X, reach.rows, reach.rows @ reach.start
 
 
 def box(c: NDArray, X: NDArray, group: NDArray) -> tuple[NDArray, NDArray]:
-    """Return the bounds of x without the constraints of the closures."""
+    """Return the bounds of x without the loop-closure equations."""
     reach = np.array([cone_sizes(row, group).sum() for row in X])
     return c - reach, c + reach
 
 
 def by_scip(reach: ReachableSet, part: slice, near: float) -> Answer:
-    """Maximise t <= x.x with SCIP, to the gap of t that is 1e-6 of x."""
+    """Maximise x.x with SCIP."""
     import pyscipopt
 
     c, X, H, k = scaled(reach, part)
@@ -115,7 +111,7 @@ def by_scip(reach: ReachableSet, part: slice, near: float) -> Answer:
 
 
 def by_gurobi(reach: ReachableSet, part: slice, near: float) -> Answer:
-    """Maximise t <= x.x with Gurobi, to the gap of t that is 1e-6 of x."""
+    """Maximise x.x with Gurobi."""
     import gurobipy
 
     c, X, H, k = scaled(reach, part)
@@ -149,7 +145,7 @@ def by_gurobi(reach: ReachableSet, part: slice, near: float) -> Answer:
 
 
 def by_branching(reach: ReachableSet, part: slice, near: float) -> Answer:
-    """Maximise x.x by branch and bound, with secants above the squares."""
+    """Maximise x.x by branch and bound with secants as upper bounds of squares."""
     c, X, H, k = scaled(reach, part)
     begin = time.process_time()
     low, high = box(c, X, reach.group)
@@ -181,7 +177,7 @@ def _secant_node(
     c: NDArray, X: NDArray, H: NDArray, k: NDArray, group: NDArray, low: NDArray,
     high: NDArray,
 ) -> tuple[float, NDArray] | None:  # fmt: skip
-    """Return the maximum of the secants in a box, and its place; None if empty."""
+    """Return the maximum of the secants in a box and its position, or None."""
     nu = len(group)
     slope = low + high
     limits, radii = conic._unit_cones(group, np.ones(nu))
@@ -194,7 +190,7 @@ def _secant_node(
     if v is None:
         return None
     x = c + X @ v
-    # The dual value is an upper bound for any solver status.
+    # the dual value is an upper bound even if the solver fails
     dual = X.T @ slope - H.T @ z[: len(k)] - sides.T @ z[len(k) : len(k) + 6]
     value = b[: len(k) + 6] @ z[: len(k) + 6] + cone_sizes(dual, group).sum()
     return float(value + slope @ c - low @ high), x
@@ -222,7 +218,7 @@ def sampled(
 
 
 def print_case(title: str, robot: Robot, postures: list[Posture], reading: str) -> None:
-    """Print the table of one case."""
+    """Print the table for given errors and a given assumption."""
     own = [replace(p, robot=robot) for p in postures]
     at = together(own)
     few = np.arange(0, len(own), len(own) // SAMPLE)[:SAMPLE]
@@ -288,7 +284,7 @@ def print_study(robot: Robot, poses: NDArray) -> None:
 
 
 def main() -> None:
-    """Print the tables of both cases and of the study."""
+    """Print all tables."""
     robot = paper_robot()
     postures = workspace(robot)
     perfect = robot.with_errors(0 * robot.errors)

@@ -2,12 +2,12 @@
 
     python -m benchmarks.scale [LARGEST]
 
-A sweep of the four-bar linkage with twelve errors computes energy, margins and bounds
-of the pose error over 1000 crank angles and 1, 10, 100, ... draws, up to LARGEST points
-(default 10^6).  Then 10^7 energies of the paper's robot at one posture are computed in
-blocks.  Each case runs in a separate process.  The table lists points, processor
-seconds, microseconds of processor time per point (without start-up), peak memory and
-file size.
+A sweep of a four-bar linkage with twelve random errors computes energy, margins and
+pose error bounds for 1000 crank angles and 1, 10, 100, ... draws, up to LARGEST points
+(10^6 by default).  Then 10^7 energies of IRSBot-2 at one posture are computed.  Each
+computation runs in a separate process.  The table contains the number of points, the
+processor time [s], the processor time per point [us], the peak memory and the file
+size.
 """
 
 import resource
@@ -24,7 +24,7 @@ BLOCK, ENERGIES = 100_000, 10_000_000
 
 
 def sweep(draws: int, path: Path) -> int:
-    """Sweep the given number of draws into a file; return the number of points."""
+    """Write a sweep with given draws to a file, and return the number of points."""
     from forcefit.assembly.model.error_distributions import tolerance_sources
     from forcefit.assembly.robots import load_robot
     from forcefit.assembly.sweeps.plan import Sweep
@@ -45,7 +45,7 @@ def sweep(draws: int, path: Path) -> int:
 
 
 def energies(count: int) -> int:
-    """Compute minimum energies at one posture, each with different errors."""
+    """Compute minimum energies at one posture for different errors."""
     from forcefit.assembly.kinematics.posture import place_robot
     from forcefit.assembly.linear.energy import solve_assembly
     from forcefit.assembly.robots import load_robot
@@ -63,7 +63,7 @@ def energies(count: int) -> int:
 
 
 def case(name: str, count: int) -> None:
-    """Run a case in this process; print points, seconds, memory [MB] and file [MB]."""
+    """Run a computation, and print points, time [s], memory [MB] and file size [MB]."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "sweep.nc"
         began = time.process_time()
@@ -75,7 +75,7 @@ def case(name: str, count: int) -> None:
 
 
 def measured(name: str, count: int) -> tuple[int, float, float, float]:
-    """Run a case in a separate process and return what it prints."""
+    """Run a computation in a separate process, and return its printed values."""
     words = [sys.executable, "-m", "benchmarks.scale", name, str(count)]
     done = subprocess.run(words, stdout=subprocess.PIPE, text=True, check=True)
     points, *figures = done.stdout.splitlines()[-1].split()
@@ -85,7 +85,7 @@ def measured(name: str, count: int) -> tuple[int, float, float, float]:
 def main(largest: int = LARGEST) -> None:
     """Print the table."""
     print(f"{'':10}{'points':>10}{'s':>9}{'us/point':>10}{'MB':>8}{'file, MB':>10}")
-    measured("sweep", 1)  # the first run compiles
+    measured("sweep", 1)  # the first run compiles the code
     draws, first = 1, None
     while SMALLEST * draws <= largest:
         points, seconds, memory, size = measured("sweep", draws)

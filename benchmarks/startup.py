@@ -1,10 +1,9 @@
-"""Measure the start-up time of commands relative to importing numpy and scipy.
+"""Measure the start-up time of commands, relative to the import of numpy and scipy.
 
-Run ``python benchmarks/startup.py [RUNS]``.  The user and system time of each command,
-summed over its threads, is divided by that of ``import numpy, scipy.linalg``.  The
-table shows medians of RUNS (7) runs.  The commands alternate, so that other load on the
-machine affects all of them equally. Each command runs once beforehand, so that compiled
-code is on disk.  The exit status is 1 if a ratio exceeds its limit.
+Run ``python benchmarks/startup.py [RUNS]``.  The processor time of each command is
+divided by the processor time of ``import numpy, scipy.linalg``.  The table contains
+medians of RUNS runs (7 by default).  The commands are run alternately.  The exit status
+is 1 if a ratio exceeds its limit.
 """
 
 import os
@@ -14,7 +13,7 @@ import sys
 
 BASE = ["-c", "import numpy, scipy.linalg"]
 AT = ["irsbot2", "--pose", "tx=0.1,tz=-0.5"]
-WANTED = {  # largest allowed ratio
+WANTED = {  # largest allowed ratio of each command
     "--help": 2.5,
     "--version": 2.5,
     "assembly solve": 5.0,
@@ -24,7 +23,7 @@ WANTED = {  # largest allowed ratio
 
 
 def processor_time(arguments):
-    """Return user and system time [s] of Python with these arguments."""
+    """Return the processor time [s] of Python with given arguments."""
     child = subprocess.Popen([sys.executable, *arguments], stdout=subprocess.DEVNULL)
     _, status, used = os.wait4(child.pid, 0)
     child.returncode = os.waitstatus_to_exitcode(status)
@@ -34,7 +33,7 @@ def processor_time(arguments):
 
 
 def main(runs=7):
-    """Run all commands, print the table, and return whether all ratios are allowed."""
+    """Run all commands, print the table, and return whether all limits are met."""
     commands = {"import numpy, scipy.linalg": BASE}
     for words in WANTED:
         place = AT if words.startswith("assembly") else []

@@ -1,9 +1,8 @@
-"""Time the stepwise assembly of 100 000 machines with clearances on one core.
+"""Measure the time of stepwise assembly of 100 000 robots with clearances on one core.
 
-Two built-in robots are assembled with random errors of 50 um and 0.1 mrad.  A fixture
-holds the platform, the five closures are joined one after another, and the fixture is
-released.  The program prints processor times.  Run ``python -m
-benchmarks.steps_speed``.
+Run ``python -m benchmarks.steps_speed``.  Two built-in robots have random errors of 50
+um and 0.1 mrad.  A fixture holds the platform, the five closures are joined one after
+another, and the fixture is released.  The program prints processor times.
 """
 
 import time
@@ -23,14 +22,14 @@ SPREAD = np.repeat([1e-4, 5e-5], 3)  # [rad, m] standard deviation of the errors
 
 
 def plan_of(robot: Robot) -> Plan:
-    """Return a plan that holds the platform, joins all closures and releases it."""
+    """Return a plan that fixes the platform, joins all closures and releases it."""
     fixture = Fix("fixture", robot.platform, dict.fromkeys(SCREW, 0.0))
     joins = [Join(f"join {i}", part) for i, part in enumerate(robot.closures, 1)]
     return Plan((fixture, *joins, Release("release", ("fixture",))))
 
 
 def main() -> None:
-    """Print a line for each robot."""
+    """Print a row of the table for each robot."""
     print("robot     frames  steps  all [s]  machine and step [us]")
     for name in ROBOTS:
         robot = load_robot(name)

@@ -1,16 +1,14 @@
-"""Time a sweep in this process, on one worker process, and on two.
+"""Measure the time of a sweep in this process and on one or two worker processes.
 
-Run ``python -m benchmarks.sweep_scaling [DRAWS]`` from the root of the repository.  The
-sweep is that of the five-bar robot at 100 postures with DRAWS draws of errors each.
-Worker processes are started and run a short sweep before the time is measured.  The
-first ratio, one worker to this process, shows the overhead of Dask.  The second ratio,
-two workers to one, shows how the sweep scales.  The files are compared byte by byte.
+Run ``python -m benchmarks.sweep_scaling [DRAWS]`` in the root of the repository.  The
+five-bar robot has 100 postures with DRAWS sets of random errors each.  The program
+prints the ratio of the times with one worker and without workers, which shows the
+overhead of Dask, and the ratio with two workers and with one.  The files are compared
+byte by byte.
 
-For comparison, the scaling of the machine itself is measured with the same workers,
-alternating with the sweeps.  A loop of sums and products, and the points of the sweep
-without sending, storing or writing, run on one worker and on two simultaneously.  The
-best of five times is used.  If other programs are running, as the printed load shows,
-processor seconds are more reliable.
+For comparison, a loop of sums and products and the points of the sweep without output
+are run on one worker and on two workers simultaneously.  The shortest of five times is
+used.  Processor times are more reliable than wall times if other programs are running.
 """
 
 import os
@@ -37,7 +35,7 @@ TURNS = 5
 
 
 def sweep(draws):
-    """Return a sweep of the five-bar robot over 100 reachable postures."""
+    """Return a sweep of the five-bar robot with 100 postures."""
     robot = load_robot("five_bar")
     targets = grid_targets(parse_grid("tx=-0.018:0.018:0.004,ty=0.11:0.146:0.004"))
     sources = tolerance_sources(robot, np.array([1e-4] * 3 + [1e-5] * 3))
@@ -46,7 +44,7 @@ def sweep(draws):
 
 
 def loop(_):
-    """Return the time [s] of sums and products that need no memory."""
+    """Return the time [s] of a loop of sums and products."""
     start, x = time.perf_counter(), 1.0
     for _ in range(8_000_000):
         x = 0.999999 * x + 1e-9
@@ -54,7 +52,7 @@ def loop(_):
 
 
 def points(draws):
-    """Return the time [s] to solve the sweep's first blocks without storing them."""
+    """Return the time [s] to compute the first blocks of the sweep without output."""
     asked = sweep(draws)
     blocks = [asked.points(block) for block in range(min(asked.blocks, 64))]
     start = time.perf_counter()
@@ -64,7 +62,7 @@ def points(draws):
 
 
 def at_once(client, workers, work, draws):
-    """Return the longest time [s] of equal work on all given workers simultaneously."""
+    """Return the longest time [s] of simultaneous equal work on several workers."""
     asked = [
         client.submit(work, draws, workers=[worker], pure=False) for worker in workers
     ]
@@ -72,7 +70,7 @@ def at_once(client, workers, work, draws):
 
 
 def timed(asked, path, solve, client):
-    """Return the time [s] of a sweep, and processor times here and of the workers."""
+    """Return the wall time [s] of a sweep, and processor times of all processes."""
 
     def spent():
         workers = client.run(time.process_time).values() if client else ()
@@ -84,7 +82,7 @@ def timed(asked, path, solve, client):
 
 
 def main(draws=400):
-    """Run, compare and print."""
+    """Run all sweeps, compare the files, and print the times."""
     asked, short = sweep(draws), sweep(20)
     print(
         f"{asked.size} points in {asked.blocks} blocks; load {os.getloadavg()[0]:.1f}"

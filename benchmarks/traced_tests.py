@@ -1,4 +1,4 @@
-"""Run tests in forks of one process and record which test executes which line."""
+"""Run tests in forked processes, and record the lines that each test executes."""
 
 import json
 import os
@@ -30,13 +30,13 @@ WORDS = [
 
 
 class Run:
-    """A run of tests on a source tree, in a fork of this process."""
+    """Run of tests on a source tree in a forked process."""
 
     def __init__(self, tree: Path, seconds: float) -> None:
         self.tree, self.seconds = tree, seconds
 
     def __call__(self, tests: list[str], plugins: tuple[Any, ...] = ()) -> str | None:
-        """Return the first failing test, "" if it has no name, or None if all pass."""
+        """Return the first test that fails, or None if all pass."""
         printed = self.tree.parent / "printed.txt"
         child = os.fork()
         if not child:
@@ -80,7 +80,7 @@ class Run:
 
 
 class Tracer:
-    """A pytest plugin that records the lines and the processor time of each test."""
+    """Pytest plugin that records the lines and the processor time of each test."""
 
     def __init__(self, data: Path) -> None:
         self.data = data
@@ -88,12 +88,12 @@ class Tracer:
         self.took = 0.0
 
     def start(self) -> None:
-        """Start the trace in the working directory, the source tree."""
+        """Start the trace in the working directory."""
         self.coverage = Coverage(str(self.data), source=[*FOLDERS])
         self.coverage.start()
 
     def stop(self) -> None:
-        """Stop the trace; write the executed lines and the processor times [s]."""
+        """Stop the trace, and write the executed lines and the processor times [s]."""
         self.coverage.stop()
         self.coverage.save()
         self.data.with_suffix(".json").write_text(json.dumps(self.seconds))
@@ -107,14 +107,14 @@ class Tracer:
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_call(self, item: pytest.Item) -> Any:
         """Measure the processor time [s] of a test."""
-        began = time.process_time()  # wall time depends on other programs
+        began = time.process_time()
         try:
             return (yield)
         finally:
             self.took = time.process_time() - began
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        """Only a passing test can detect a fault."""
+        """Record whether a test passes."""
         if report.when == "call" and report.passed:
             self.seconds[report.nodeid] = self.took
 
@@ -127,8 +127,8 @@ class Trace:
     seconds: dict[str, float]
 
     def of(self, path: Path, rows: range | set[int]) -> set[str]:
-        """Return the tests that execute one of the given rows of a file."""
-        # The trace may contain paths of a different copy of the source tree.
+        """Return the tests that execute one of the given lines of a file."""
+        # the trace may contain paths of another copy of the source tree
         files = [f for f in self.lines.measured_files() if f.endswith(f"/{path}")]
         tests = {
             test.partition("|")[0]
@@ -139,7 +139,7 @@ class Trace:
         return tests & self.seconds.keys()
 
     def nearest(self, fault: Fault) -> list[str]:
-        """Return the tests that execute a fault, the nearest and shortest first."""
+        """Return the tests that execute a fault, near and short tests first."""
         tests = self.of(fault.path, fault.rows)
         if fault.name:
             named = re.compile(rf"\b{fault.name}\b")
@@ -150,14 +150,14 @@ class Trace:
         return sorted(tests, key=self.cost(fault))
 
     def cost(self, fault: Fault) -> Callable[[str], float]:
-        """Return the time [s] of a test, reduced if the test is near the fault."""
+        """Return the time [s] of a test, which is reduced for tests near the fault."""
         near = f"tests/{fault.path.parent}/test_{fault.path.stem}"
 
         def cost(test: str) -> float:
             seconds = self.seconds[test] + 0.01
             if test.startswith(near):
                 return seconds / 10
-            if test.startswith(BESIDE):  # these tests compare the most numbers
+            if test.startswith(BESIDE):  # these tests compare many numbers
                 return seconds / 3
             return (
                 seconds if test.startswith(f"tests/{fault.chapter}/") else 3 * seconds
@@ -174,7 +174,7 @@ def sources() -> Iterator[Path]:
 
 
 def module_of(path: Path) -> str:
-    """Return the name of the module of a source file."""
+    """Return the module name of a source file."""
     name = ".".join(path.with_suffix("").parts).removesuffix(".__init__")
     return name if path.parts[0] == "forcefit" else f"forcefit.{name}"
 
@@ -187,9 +187,9 @@ def importers(path: Path) -> list[Path]:
 
 
 def traced(tree: Path, kept: Path) -> Trace:
-    """Return the trace of the default tests of each folder, from storage if possible.
+    """Return the trace of the default tests of each folder.
 
-    A folder is traced again if one of its tests has changed since the stored trace.
+    The stored trace is used if no test of the folder has changed.
     """
     lines = CoverageData(no_disk=True)
     seconds: dict[str, float] = {}
@@ -209,7 +209,7 @@ def traced(tree: Path, kept: Path) -> Trace:
 
 
 def places_of_tests() -> list[str]:
-    """Return the folders of tests, single files next to subfolders, and other tests."""
+    """Return the folders and files of tests that are traced separately."""
     tests, places = ROOT / "tests", set[Path]()
     for path in tests.glob("*/**/test_*.py"):
         folder = path.parent
@@ -218,6 +218,6 @@ def places_of_tests() -> list[str]:
 
 
 def tests_in(place: str) -> list[Path]:
-    """Return the Python files in a folder of tests, or in the folder of a file."""
+    """Return the Python files in a folder, or in the folder of a file."""
     path = ROOT / place
     return sorted(path.parent.glob("*.py") if path.is_file() else path.rglob("*.py"))

@@ -1,13 +1,13 @@
-"""Store the results of every command and compare them after a code change.
+"""Store the results of commands, and compare them after a change of the code.
 
     python benchmarks/unchanged.py store FOLDER     # before the change
-    python benchmarks/unchanged.py compare FOLDER   # after it
+    python benchmarks/unchanged.py compare FOLDER   # after the change
 
-All built-in robots receive random errors and are stored as robot files.  For each of
-them, the program runs ``solve``, its margins, its exact state and ``error``.  It also
-runs one sweep, one statistics run, one diagnosis, one cross-check, and one K_E by
-finite elements and by beams.  If numbers are not bit-identical, the largest relative
-difference is printed.  Times, versions and round-off in certificates are not compared.
+The built-in robots with random errors are written as robot files.  For each robot, the
+program runs ``solve`` with margins and the exact state, and ``error``.  It also runs a
+sweep, statistics, a diagnosis, a cross-check, and K_E by finite elements and by beams.
+If numbers differ, the largest relative difference is printed.  Times, versions and
+round-off in certificates are not compared.
 """
 
 import json
@@ -21,15 +21,15 @@ import numpy as np
 
 ROOT = Path(__file__).parents[1]
 ROBOTS = ("irsbot2", "four_bar", "five_bar", "3rrr", "hexapod", "delta", "orthoglide")
-# Keys whose values differ between identical runs.
+# keys whose values differ between identical runs
 PASSING = ("seconds", "time", "version", "sha256", "created", "path", "file", "output")
-# Keys of certificates, whose values are round-off.
+# keys of certificates, whose values are round-off
 CERTIFICATES = ("certificate", "residual", "gap", "excess", "linearisation_error")
-SMALLEST = 1e-9  # [SI] an array with only smaller numbers counts as rounded zeros
+SMALLEST = 1e-9  # [SI unit] threshold of round-off
 
 
 def questions(folder: Path) -> dict[str, list[str]]:
-    """Return the words of each command; it writes NetCDF files to ``{out}``."""
+    """Return the arguments of each command, with ``{out}`` for its output file."""
     asked = {
         f"{question} {robot}": ["assembly", *words, str(folder / f"{robot}.toml")]
         for robot in (*ROBOTS, "arm6")
@@ -74,25 +74,25 @@ def questions(folder: Path) -> dict[str, list[str]]:
 
 
 def write_robots(folder: Path) -> None:
-    """Write each built-in robot with one draw of errors as a robot file."""
+    """Write a robot file with random errors for each built-in robot."""
     from forcefit.assembly.files.robot_file import write_robot
     from forcefit.assembly.robots import load_robot
 
     folder.mkdir(parents=True, exist_ok=True)
     for name in (*ROBOTS, "arm6"):
         if (folder / f"{name}.toml").exists():
-            continue  # the file of the earlier version is used again
+            continue  # the file of the previous version is used
         robot = load_robot(name)
         rng = np.random.default_rng(sum(map(ord, name)))
         scales = [1e-3, 1e-3, 1e-3, 5e-4, 5e-4, 5e-4]
         errors = rng.uniform(-1, 1, (len(robot.frames), 6)) * scales
-        if name == "irsbot2":  # with errors of its rigid bodies, no loop would close
+        if name == "irsbot2":  # the loops cannot be closed with errors of rigid bodies
             errors[[frame.link is None for frame in robot.frames]] = 0.0
         write_robot(robot.with_errors(errors), folder / f"{name}.toml")
 
 
 def answer(words: list[str]) -> Any:
-    """Return the exit status, the JSON and the arrays of the data set of a command."""
+    """Return the exit status, the JSON output and the data set of a command."""
     with tempfile.TemporaryDirectory() as scratch:
         out = str(Path(scratch) / "out")
         words = [word.replace("{out}", out) for word in words]
@@ -114,7 +114,7 @@ def answer(words: list[str]) -> Any:
 
 
 def leaves(value: Any, place: str = "") -> dict[str, Any]:
-    """Yield the numbers, texts and booleans of a result with their places."""
+    """Yield the numbers, texts and booleans of a result with their keys."""
     if isinstance(value, dict):
         left_out = (*PASSING, *CERTIFICATES)
         kept = {k: v for k, v in value.items() if not any(p in k for p in left_out)}
@@ -133,7 +133,7 @@ def leaves(value: Any, place: str = "") -> dict[str, Any]:
 
 
 def difference(was: Any, now: Any) -> tuple[float, list[str]]:
-    """Return the largest difference relative to its array's maximum, and others."""
+    """Return the largest relative difference of numbers, and all other differences."""
     before, after = leaves(was), leaves(now)
     gap, other = 0.0, sorted(before.keys() ^ after.keys())
     sizes: dict[str, float] = {}
@@ -154,7 +154,7 @@ def difference(was: Any, now: Any) -> tuple[float, list[str]]:
 
 
 def main() -> None:
-    """Store or compare results; return status 1 if differences exceed round-off."""
+    """Store or compare results, and return 1 if differences exceed round-off."""
     what, folder = sys.argv[1], Path(sys.argv[2]).resolve()
     if what == "store":
         write_robots(folder)

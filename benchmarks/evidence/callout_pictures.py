@@ -1,9 +1,9 @@
 """Draw the zone of each callout, for docs/drawing_tolerances.md.
 
-``python benchmarks/evidence/callout_pictures.py docs/pictures/callouts`` writes one SVG
-for each callout.  The shapes are those of :mod:`forcefit.assembly.callouts`, which the
-program uses: the side views show the farthest positions of a feature in its zone, and
-the sections show the outline of all its shifts and tilts.
+``python benchmarks/evidence/callout_pictures.py docs/pictures/callouts`` writes an SVG
+file for each callout.  The zones are computed by :mod:`forcefit.assembly.callouts`.
+Side views show the extreme positions of a feature in its zone.  Sections show the
+outline of all shifts and tilts.
 """
 
 import sys
@@ -35,18 +35,18 @@ from forcefit.assembly.callouts.zones_of_features import (
 )
 
 LENGTH = 0.020  # [m] length of the bore
-SIZES = 0.040, 0.030  # [m] sides of the rectangular face; first is the diameter
+SIZES = 0.040, 0.030  # [m] sides of a rectangular face, or diameter of a round face
 ALONG = np.array([1.0, 0.0])
 GREY, BLUE, RED = "0.85", "tab:blue", "tab:red"
 _CORNERS = ((1.0, 0.0), (0.0, 1.0), (1.0, 1.0), (-1.0, 1.0))
-# Factor to the unit in the pictures, and label, for each screw component.
+# conversion factor and label of each screw component in the pictures
 UNITS = {0: (1e3, "tilt RX [mrad]"), 1: (1e3, "tilt RY [mrad]"),
          3: (1e6, "shift TX [µm]"), 4: (1e6, "shift TY [µm]"),
          5: (1e6, "shift TZ [µm]")}  # fmt: skip
 
 
 def outline(zone: Zone, first: int, second: int) -> np.ndarray:
-    """Return (k, 2) the outline of a zone projected on two components, in their units.
+    """Return the outline of a zone, projected on two components, (k, 2).
 
     Args:
         zone: zone of a feature.
@@ -73,7 +73,7 @@ def section(panel: Axes, zone: Zone, first: int, second: int) -> None:
 
 
 def extremes(zone: Zone, first: int, second: int, arm: float) -> list[np.ndarray]:
-    """Return the farthest screws (6,) along the corners of a shift and a tilt."""
+    """Return the extreme screws of a zone in the plane of a shift and a tilt."""
     found = []
     for shift, tilt in _CORNERS:
         direction = np.zeros(6)
@@ -83,7 +83,7 @@ def extremes(zone: Zone, first: int, second: int, arm: float) -> list[np.ndarray
 
 
 def bore(panel: Axes, zone: Zone, width: float | None) -> None:
-    """Draw the axis of a bore in its extreme positions, from the side."""
+    """Draw a side view of the axis of a bore in its extreme positions."""
     z = np.array([-LENGTH / 2, LENGTH / 2])
     if width is not None:
         panel.fill_betweenx(z * 1e3, -width * 5e5, width * 5e5, color=GREY)
@@ -96,7 +96,7 @@ def bore(panel: Axes, zone: Zone, width: float | None) -> None:
 
 
 def face(panel: Axes, zone: Zone, width: float | None) -> None:
-    """Draw a face in its extreme positions, from the side."""
+    """Draw a side view of a face in its extreme positions."""
     x = np.array([-SIZES[0] / 2, SIZES[0] / 2])
     if width is not None:
         panel.fill_between(x * 1e3, -width * 5e5, width * 5e5, color=GREY)
@@ -110,7 +110,7 @@ def face(panel: Axes, zone: Zone, width: float | None) -> None:
 def of_axis(
     zone: Zone, width: float | None, components: tuple[int, int] = (3, 1)
 ) -> Callable[[Axes, Axes], None]:
-    """Return the function that draws the two panels of an axis."""
+    """Return a function that draws both panels of an axis."""
 
     def draw(left: Axes, right: Axes) -> None:
         bore(left, zone, width)
@@ -122,7 +122,7 @@ def of_axis(
 def of_face(
     zone: Zone, width: float | None, components: tuple[int, int] = (5, 1)
 ) -> Callable[[Axes, Axes], None]:
-    """Return the function that draws the two panels of a face."""
+    """Return a function that draws both panels of a face."""
 
     def draw(left: Axes, right: Axes) -> None:
         face(left, zone, width)
@@ -132,14 +132,14 @@ def of_face(
 
 
 def point(left: Axes, right: Axes) -> None:
-    """Draw the ball of a point."""
+    """Draw the spherical zone of a point."""
     for panel, second in ((left, 4), (right, 5)):
         section(panel, point_position(50e-6), 3, second)
         panel.set_aspect("equal")
 
 
 def length(left: Axes, right: Axes) -> None:
-    """Draw the two meanings of the tolerance of a length to a face."""
+    """Draw both interpretations of the tolerance of a distance to a face."""
     face(left, shift_along(25e-6, np.eye(3)[2]), 50e-6)
     left.set_title("middle of the face", fontsize=8)
     face(right, plane_position(50e-6, *SIZES), 50e-6)
@@ -163,7 +163,7 @@ def maximum_material(left: Axes, right: Axes) -> None:
 
 
 def shifting_datum(left: Axes, right: Axes) -> None:
-    """Draw the shift of a datum hole 12 H7 by its size."""
+    """Draw the possible shift of a datum hole 12 H7."""
     zone = datum_shift("12 H7")
     section(left, zone, 3, 4)
     left.set_aspect("equal")
@@ -174,9 +174,9 @@ def shifting_datum(left: Axes, right: Axes) -> None:
 
 
 def datum_order(left: Axes, right: Axes) -> None:
-    """Draw a plate whose side face B is out of square to A, and its hole."""
+    """Draw a plate with a hole, whose face B is not perpendicular to face A."""
     tilt = plane_orientation(50e-6, 0.060, 0.040).support(np.eye(6)[1])
-    large = 60 * tilt  # the picture shows 60 times the angle
+    large = 60 * tilt  # the angle is magnified by 60
     turns = np.eye(2), np.array([[1.0, -large], [large, 1.0]])
     outer = np.array([[0, 0], [110, 0], [110, 60], [0, 60], [0, 0]])
     side = np.array([[0, 0], [-60 * large, 60]])
@@ -194,7 +194,7 @@ def datum_order(left: Axes, right: Axes) -> None:
 
 
 def form(left: Axes, right: Axes) -> None:
-    """Draw the clearance of a fit without and with the form of its parts."""
+    """Draw the clearance of a fit with and without form errors."""
     for y, text in enumerate(("12 H7/g6", "12 H7/g6 + 5 um")):
         least, most = parse_fit(text).radial
         left.barh(y, (most - least) * 1e6, left=least * 1e6, height=0.4, color=BLUE)

@@ -3,13 +3,15 @@
     python benchmarks/evidence/compensation.py OUT.json --count 20 [--first 0]
         [--robots arm6]
 
-Case k is drawn from seed k: a robot with six drives, or a Delta robot (positions only),
-with one or two hidden effects from the library or outside it, each five times as large
-as the noise.  Readings of the robot are simulated and diagnosed, and the identified
-robot is used to correct commands at configurations that were not measured.  The robot
-is then simulated with the corrected commands.  The error is the distance from the
-target position, without noise and device errors.  It is also given as the reading of a
-device with this noise, divided by the noise, which is 1 for a perfect robot.
+In case k, random numbers have the seed k.  The robot has six drives, or it is a Delta
+robot.  It has one or two hidden effects, whose sizes are five times the noise.
+Measurements are simulated and diagnosed.  The identified robot is used to correct the
+commands at configurations that were not measured, and the robot is simulated with the
+corrected commands.
+
+The error is the distance from the target position, without noise and device errors.
+The program also prints the rms error that a device with this noise would measure,
+divided by the noise.  For a perfect robot, this ratio is 1.
 """
 
 import argparse
@@ -52,19 +54,19 @@ ROBOTS = ("arm6", "hexapod", "delta")
 STRENGTH = 5.0
 TARGETS = 12
 TRIES = 20
-NEAR = 1.2  # largest error after compensation that counts as small, over the noise
-# excluded: self-weight and stiffening, whose size determines the noise, and clearance,
-# whose position follows from the load
+NEAR = 1.2  # [-] threshold of a small error after compensation, relative to the noise
+# self-weight, stiffening and clearance are excluded, because their size cannot be
+# chosen
 NAMES = [
     name for name in (*LIBRARY, *OUTSIDE)
     if acts_on_machine(name)
     and name not in {"joint_clearance", "geometric_stiffening", "body_mass"}
-    and name not in {"delayed_expansion", "_tilting"}  # no command determines them
+    and name not in {"delayed_expansion", "_tilting"}  # they do not depend on commands
 ]  # fmt: skip
 
 
 def draw_case(seed: int, robots: tuple[str, ...]) -> Synthetic:
-    """Return a measured robot; draw again if the robot cannot have the effects."""
+    """Return a random robot with hidden effects, and its measurements."""
     for attempt in range(TRIES):
         rng = np.random.default_rng([seed, attempt])
         robot = without_clearance(load_robot(str(rng.choice(robots))))
@@ -99,7 +101,7 @@ def plan_table(plan: CampaignPlan) -> str:
 
 
 def run_case(seed: int, robots: tuple[str, ...]) -> dict[str, Any]:
-    """Return the errors before and after compensation, in units of the noise."""
+    """Return the errors before and after compensation, divided by the noise."""
     begin = time.process_time()
     case = draw_case(seed, robots)
     design = replace(_design(case.robot), configurations=TARGETS, rows=TARGETS)
@@ -120,7 +122,7 @@ def run_case(seed: int, robots: tuple[str, ...]) -> dict[str, Any]:
                         ("before", targets.coordinates), ("after", answer.coordinates)
                     )
                 }  # fmt: skip
-            except SimulationFailed:  # the simulation has no equilibrium at a target
+            except SimulationFailed:  # there is no equilibrium at a target
                 continue
             break
         else:
@@ -141,7 +143,7 @@ def run_case(seed: int, robots: tuple[str, ...]) -> dict[str, Any]:
 
 
 def _against(error: NDArray, sigma: NDArray, six: bool) -> float:
-    """Return the rms error that a device of this noise would read, over the noise."""
+    """Return the rms error measured by a device with noise, divided by the noise."""
     parts = [error[:, 0] / sigma[3]] + ([error[:, 1] / sigma[0]] if six else [])
     return float(np.sqrt(1.0 + np.mean(np.square(parts)) / 3))
 
@@ -151,7 +153,7 @@ def _rms(values: NDArray) -> float:
 
 
 def main() -> None:
-    """Run the cases, write each result, and print the medians."""
+    """Compute all cases, write the results, and print the medians."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("out", type=Path)
     parser.add_argument("--count", type=int, default=20)

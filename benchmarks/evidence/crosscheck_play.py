@@ -1,7 +1,8 @@
 """Evaluate cross-checks with clearances: convergence rate, time and agreement.
 
-Run ``python benchmarks/evidence/crosscheck_play.py [draws [robot ...]]``; 120 draws of
-each robot take several minutes and print a table of ``docs/crosscheck.md``.
+Run ``python benchmarks/evidence/crosscheck_play.py [draws [robot ...]]``.  With 120
+draws for each robot, it takes several minutes.  It prints a table of
+``docs/crosscheck.md``.
 """
 
 import sys
@@ -23,7 +24,7 @@ from forcefit.validation.multibody.simulation import (
 
 
 def posture(name: str, seed: int) -> Posture:
-    """Return the posture of a case; the paper's robot is at a random pose."""
+    """Return a posture of a robot with random errors.  IRSBot-2 has a random pose."""
     if name != "irsbot2":
         make = {"hexapod": hexapod, "three_rrr": three_rrr}[name]
         return home_posture(drawn(make(play=True), seed, 2e-3, 2e-4))
@@ -37,7 +38,7 @@ def posture(name: str, seed: int) -> Posture:
 
 
 def main() -> None:
-    """Print one row for each robot."""
+    """Print a row of the table for each robot."""
     draws = int(sys.argv[1]) if len(sys.argv) > 1 else 120
     print("robot      converged  seconds, median and most   energy against exact, "
           "median, 90 %, most   against linear")  # fmt: skip

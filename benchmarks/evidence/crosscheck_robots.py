@@ -1,4 +1,4 @@
-"""Define additional robots on which the cross-check is evaluated.
+"""Additional robots for the evaluation of the cross-check.
 
 ``hexapod`` is a Gough-Stewart platform with six legs of steel tubes.  ``three_rrr`` is
 a planar 3-RRR robot, which has an overconstraint of six in space.
@@ -19,7 +19,7 @@ def _vector(R: np.ndarray) -> np.ndarray:
 
 
 def _axes_along(x: np.ndarray) -> np.ndarray:
-    """Return axes whose x axis is along a direction."""
+    """Return axes with the x axis along a direction."""
     x = x / np.linalg.norm(x)
     y = np.cross([0.3, 1.0, 0.2], x)
     y /= np.linalg.norm(y)
@@ -27,13 +27,13 @@ def _axes_along(x: np.ndarray) -> np.ndarray:
 
 
 def hexapod(play: bool = False) -> Robot:
-    """Return a hexapod; each leg has a universal joint, locked slide, tube and pins.
+    """Return a hexapod whose legs have a universal joint, a locked slide and pins.
 
     Args:
         play: whether the last pin has clearances.
 
     Returns:
-        The robot; its platform is 0.6 m above the base.
+        The robot with its platform 0.6 m above the base.
     """
     tube = BeamLink({"radius": 0.012, "inner_radius": 0.008}, 200e9, 0.3)
     bush = np.diag([2e5, 2e5, 50.0, 2e8, 2e8, 2e8])
@@ -45,7 +45,7 @@ def hexapod(play: bool = False) -> Robot:
         b = np.array([0.3 * np.cos(head), 0.3 * np.sin(head), 0.6])
         R = _axes_along(b - a)
         length = float(np.linalg.norm(b - a))
-        turn = np.array([0.0, np.pi / 2, 0.0])  # rotate z onto the leg
+        turn = np.array([0.0, np.pi / 2, 0.0])  # rotates z to the axis of the leg
         back = np.array([0.0, -np.pi / 2, 0.0])
         name = f"leg{k}"
         frames += [
@@ -81,13 +81,13 @@ def hexapod(play: bool = False) -> Robot:
 
 
 def three_rrr(play: bool = False) -> Robot:
-    """Return a robot with three legs of two aluminium bars, joined by stiff pins.
+    """Return a 3-RRR robot with aluminium bars and stiff pins.
 
     Args:
         play: whether the last pins have clearances.
 
     Returns:
-        The robot; its platform is in the middle.
+        The robot with its platform in the middle.
     """
     bar = BeamLink({"width": 0.03, "height": 0.02}, 70e9, 0.33, up=(0.0, 0.0, 1.0))
     frames, closures = [], []
@@ -121,14 +121,14 @@ def three_rrr(play: bool = False) -> Robot:
 
 
 def papers_robot(seed: int, signed: bool) -> Robot:
-    """Return the IRSbot-2 with errors of the paper's size at the frames of the paper.
+    """Return IRSBot-2 with random errors at the frames of the paper.
 
     Args:
-        seed: seed of the draw.
-        signed: whether errors have random signs; otherwise all are positive.
+        seed: seed of the random numbers.
+        signed: whether errors have random signs.  Otherwise, all are positive.
 
     Returns:
-        The robot: up to 2e-2 rad and 2e-4 m about and along each axis.
+        The robot with errors of up to 2e-2 rad and 2e-4 m.
     """
     robot = load_robot("irsbot2")
     rng = np.random.default_rng(seed)
@@ -142,16 +142,16 @@ def papers_robot(seed: int, signed: bool) -> Robot:
 
 
 def drawn(robot: Robot, seed: int, turn: float, shift: float) -> Robot:
-    """Return the robot with drawn errors of every elastic link and closing frame.
+    """Return a robot with random errors of all elastic links and frames of closures.
 
     Args:
         robot: nominal robot.
-        seed: seed of the draw.
+        seed: seed of the random numbers.
         turn: [rad] largest rotation about an axis.
         shift: [m] largest translation along an axis.
 
     Returns:
-        A robot with errors of random signs.
+        The robot with errors.
     """
     rng = np.random.default_rng(seed)
     errors = np.zeros((len(robot.frames), 6))

@@ -1,7 +1,7 @@
-"""Evaluate slopes, limits and residuals of the cross-check over poses and draws.
+"""Evaluate slopes, limits and residuals of the cross-check for random errors.
 
-Run ``python benchmarks/evidence/crosscheck_slopes.py [robot ...]``; it takes a minute
-or two and prints the tables of ``docs/crosscheck.md``.
+Run ``python benchmarks/evidence/crosscheck_slopes.py [robot ...]``, which takes one or
+two minutes.  It prints the tables of ``docs/crosscheck.md``.
 """
 
 import itertools
@@ -21,7 +21,7 @@ POSES = [
 
 
 def postures(name: str) -> list[Posture]:
-    """Return thirty postures of a robot with drawn errors."""
+    """Return thirty postures of a robot with random errors."""
     if name == "irsbot2":
         return [
             place_robot(papers_robot(seed, signed=seed % 2 == 1), {"tx": x, "tz": z})
@@ -32,7 +32,7 @@ def postures(name: str) -> list[Posture]:
 
 
 def main() -> None:
-    """Print a row for each robot and each model of the links."""
+    """Print a row of the table for each robot and each model of the links."""
     print("robot      links   passed  slope            limit    left rotation    "
           "left translation  energy, linear and exact   seconds")  # fmt: skip
     names = sys.argv[1:] or ("irsbot2", "hexapod", "three_rrr")

@@ -1,7 +1,7 @@
-"""Cross-check the paper's robot with its distal links as finite-element solids.
+"""Cross-check IRSBot-2 with distal links that are finite-element solids.
 
-Run ``python benchmarks/evidence/crosscheck_solids.py``.  It takes one or two minutes,
-mainly to condense the mesh, and prints a table of ``docs/crosscheck.md``.
+Run ``python benchmarks/evidence/crosscheck_solids.py``, which takes one or two minutes.
+It prints a table of ``docs/crosscheck.md``.
 """
 
 import time
@@ -18,7 +18,7 @@ SURFACE = Path(__file__).parents[2] / "meshes" / "distal_plain.stl"
 
 
 def main() -> None:
-    """Print a row for each draw and each model of the links."""
+    """Print a row of the table for each set of errors and each model of the links."""
     link = MeshLink(SURFACE, "z=0", "z=0.452", 60e9, 0.3)
     names = [f"leg{leg}.link_{side}" for leg in (1, 2) for side in "ab"]
     print("draw  links   passed  slope   limit    left rotation  left translation  "

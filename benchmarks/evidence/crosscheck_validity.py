@@ -1,12 +1,12 @@
-"""Find where assumptions of the virtual-joint model cause errors above 1 % or 20 um.
+"""Compute errors due to the assumptions of the virtual-joint model.
 
-Run ``python benchmarks/evidence/crosscheck_validity.py``; it takes five minutes.  It
+Run ``python benchmarks/evidence/crosscheck_validity.py``, which takes five minutes.  It
 prints the tables of ``docs/validity.md``, and writes the figures and ``validity.json``
 to ``docs/`` or to a given folder.
 
-Errors are drawn at 5 poses with 4 draws each.  Their largest size is given in rad about
-each axis, and a hundredth of it in m along each axis.  Joints have no clearance, except
-for the comparison of disc and cone.
+There are 4 sets of random geometric errors at each of 5 poses.  The largest error is
+given in rad for rotations, and a hundredth of this number in m for translations.
+Joints have no clearance, except for the comparison of disc and cone.
 """
 
 import itertools
@@ -40,9 +40,9 @@ from forcefit.validation.multibody.simulation import without_clearance
 FORKS = Path(__file__).parents[2] / "meshes" / "distal_forks.stl"
 REFERENCES = Path(__file__).with_name("stiffness_references.json")
 BORES = ("bore=0,0,0/0,1,0/0.011", "bore=0,0,0.452/0,1,0/0.011")
-PAPER = 0.02  # [rad] the paper's errors
+PAPER = 0.02  # [rad] geometric errors of the paper
 SIZES = (0.001, 0.002, 0.005, 0.01, 0.02, 0.04)  # [rad]
-BARS = (3.0, 5.0, 8.0, 11.3, 16.0, 24.0)  # [-] length over radius
+BARS = (3.0, 5.0, 8.0, 11.3, 16.0, 24.0)  # [-] ratio of length to radius
 WEIGHT_BARS = (5.0, 10.0, 20.0, 40.0, 80.0)
 DENSITY = {"irsbot2": 2700.0, "hexapod": 7850.0}
 DOWN = np.array([0.0, 0.0, 0.0, 0.0, 0.0, -1000.0])  # [N]
@@ -61,14 +61,14 @@ POSES = {
 
 
 def erring(name: str, seed: int) -> Robot:
-    """Return a robot with errors of the paper's size; odd draws have random signs."""
+    """Return a robot with the errors of the paper, which have random signs if odd."""
     if name == "irsbot2":
         return papers_robot(seed, signed=seed % 2 == 1)
     return drawn(hexapod(play=True), seed, PAPER, PAPER / 100)
 
 
 def postures(name: str, slenderness: float | None = None, play: bool = False) -> list:
-    """Return twenty postures of a robot with the paper's errors."""
+    """Return twenty postures of a robot with the errors of the paper."""
     cases = []
     for pose, seed in itertools.product(POSES[name], range(4)):
         robot = erring(name, seed) if play else without_clearance(erring(name, seed))
@@ -79,7 +79,7 @@ def postures(name: str, slenderness: float | None = None, play: bool = False) ->
 
 
 def free_of_errors(cases: Iterable[Posture]) -> list[Posture]:
-    """Return one posture at each pose without errors; clearances are unchanged."""
+    """Return a posture without errors at each pose."""
     none = [
         replace(c, robot=c.robot.with_errors(np.zeros_like(c.robot.errors)))
         for c in cases
@@ -88,7 +88,7 @@ def free_of_errors(cases: Iterable[Posture]) -> list[Posture]:
 
 
 def resized(cases: Iterable[Posture], factor: float) -> list[Posture]:
-    """Return the postures with errors times a factor; clearances are unchanged."""
+    """Return the postures with errors multiplied by a factor."""
     return [
         replace(c, robot=c.robot.with_errors(factor * c.robot.errors)) for c in cases
     ]
@@ -98,7 +98,7 @@ def row(
     head: tuple[str, str, str, float], cases: Iterable[Posture],
     cost: Callable[..., Cost], *arguments: object,
 ) -> dict:  # fmt: skip
-    """Return the median and largest error over the postures as a row of a table."""
+    """Return the median and the largest error of all postures as a row of a table."""
     costs = []
     for posture in cases:
         try:
@@ -114,7 +114,7 @@ def row(
 
 
 def closures(name: str) -> Iterable[dict]:
-    """Yield errors of (a), linear closures, over errors, loads and slenderness."""
+    """Yield errors of assumption (a), linear loop closures."""
     kinds = (("as built", None, None), ("1 kN", None, DOWN), ("L / r = 40", 40.0, None))
     for case, slenderness, load in kinds:
         cases = postures(name, slenderness)
@@ -124,7 +124,7 @@ def closures(name: str) -> Iterable[dict]:
 
 
 def beams(name: str) -> Iterable[dict]:
-    """Yield errors of (b), beams for solids, over slenderness of the links."""
+    """Yield errors of assumption (b), links as beams, for different slenderness."""
     for slenderness in BARS:
         cases = postures(name, slenderness)
         none = free_of_errors(cases)
@@ -136,7 +136,7 @@ def beams(name: str) -> Iterable[dict]:
 
 
 def weights(name: str) -> Iterable[dict]:
-    """Yield errors of (c), weight at the ends of links, over their slenderness."""
+    """Yield errors of assumption (c), weight at the ends of links."""
     for slenderness in WEIGHT_BARS:
         cases = postures(name, slenderness)
         none = free_of_errors(cases)
@@ -151,7 +151,7 @@ def weights(name: str) -> Iterable[dict]:
 
 
 def discs(name: str) -> Iterable[dict]:
-    """Yield errors of (d), disc and cone, over the size of the errors and the load."""
+    """Yield errors of assumption (d), clearances as discs and cones."""
     cases = postures(name, play=True)
     for case, load in (("no load", None), ("1 kN", DOWN)):
         for size in SIZES:
@@ -160,7 +160,7 @@ def discs(name: str) -> Iterable[dict]:
 
 
 def print_margins(name: str) -> None:
-    """Print the factor by which two bushes raise the margin: least, median, largest."""
+    """Print the factor by which the model with two bushes increases the margin."""
     for compliant in ("rigid", "free"):
         factors = []
         for at in postures(name, play=True):
@@ -174,7 +174,7 @@ def print_margins(name: str) -> None:
 
 
 def forks() -> Iterable[dict]:
-    """Yield errors of (b) for realistic links: tubes with forks and bearing bores."""
+    """Yield errors of assumption (b) for tubes with forks and bearing bores."""
     mesh = MeshLink(FORKS, *BORES, 60e9, 0.3)
     cases = postures("irsbot2")
     names = [f.name for f in cases[0].robot.frames if f.link is not None]
@@ -195,10 +195,10 @@ def forks() -> Iterable[dict]:
 
 
 def rods() -> Iterable[dict]:
-    """Yield (b) for the hexapod: 400 mm of each leg are a steel tube with solid heads.
+    """Yield errors of assumption (b) for a hexapod with steel tubes as legs.
 
-    ``meshes/delta_forearm.stl``; K_E of its exact geometry by
-    ``stiffness_references.py``, there of 60 GPa and along z.
+    The stiffness of ``meshes/delta_forearm.stl`` is computed by
+    ``stiffness_references.py`` for 60 GPa.
     """
     kept = json.loads(REFERENCES.read_text())["delta_forearm"]["stiffness"]
     z_to_x = np.kron(np.eye(2), [[0, 0, 1], [1, 0, 0], [0, 1, 0]])
@@ -222,7 +222,7 @@ def rods() -> Iterable[dict]:
 
 
 def over_poses(name: str) -> dict:
-    """Return median errors over the workspace, from 3 draws of the paper's errors."""
+    """Return median errors over the workspace for 3 sets of random errors."""
     if name == "irsbot2":
         xs, zs = np.arange(-0.4, 0.41, 0.1), np.arange(-0.6, -0.19, 0.1)
     else:
@@ -246,7 +246,7 @@ def over_poses(name: str) -> dict:
 
 
 def print_table(rows: list[dict]) -> None:
-    """Print the median (largest) errors over the cases as Markdown."""
+    """Print the median and largest errors as a Markdown table."""
     print(
         "| robot | case | x | position [um] | rotation [urad] | energy [%] | beyond |"
     )
@@ -262,7 +262,7 @@ def print_table(rows: list[dict]) -> None:
 
 
 def main() -> None:
-    """Compute everything, print it, and write it to a folder."""
+    """Compute, print and write all results."""
     folder = Path(
         sys.argv[1] if len(sys.argv) > 1 else Path(__file__).parents[2] / "docs"
     )

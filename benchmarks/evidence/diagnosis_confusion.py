@@ -3,13 +3,14 @@
     python benchmarks/evidence/diagnosis_confusion.py FOLDER --count 200  # make
     python benchmarks/evidence/diagnosis_confusion.py FOLDER --score      # count
 
-Case k is drawn from seed k: a robot (``random_robots``), a design, and hidden effects.
-The hidden effects are one public effect at 2, 5 or 9 times the noise, two effects, no
-effect, an effect outside the library, or an effect that the design cannot distinguish
-from another.  Readings are simulated by ``forcefit.validation.synthetic.generator``,
-and ``forcefit.validation.synthetic.equivalents`` finds other effects that explain them
-equally well.  FOLDER stores campaigns, hidden effects and results, so that a run can be
-interrupted and continued.
+In case k, random numbers have the seed k.  They determine a robot (``random_robots``),
+a design of measurements, and hidden effects.  The hidden effects are one effect of the
+library at 2, 5 or 9 times the noise, two effects, no effect, an effect outside the
+library, or an effect that the design cannot distinguish from another effect.
+Measurements are simulated by ``forcefit.validation.synthetic.generator``.  Other
+effects that explain them equally well are found by
+``forcefit.validation.synthetic.equivalents``.  FOLDER contains all campaigns and
+results, so that an interrupted run can be continued.
 
 ``diagnosis_score.py`` defines which results are correct.
 """
@@ -55,14 +56,14 @@ from forcefit.validation.synthetic.truth import truth_of
 
 MIX = {"single": 0.52, "none": 0.12, "pair": 0.16, "outside": 0.12, "confounded": 0.08}
 STRENGTHS = (2.0, 5.0, 9.0)
-TRIES = 12  # largest number of draws per case
-FINE = 2e-7  # [m] lower limit of the noise, below that of any device
-VISIBLE = 200.0  # minimum chi-square not explained by public effects
-SMALL = 1e-2  # scale of errors and load at which the machine is linear
+TRIES = 12  # maximum number of attempts per case
+FINE = 2e-7  # [m] lower limit of the noise
+VISIBLE = 200.0  # [-] minimum chi-square that effects of the library do not explain
+SMALL = 1e-2  # [-] factor of errors and load for which the robot is linear
 
 
 def finite_part(campaign: Synthetic) -> NDArray:
-    """Return (rows, 6) [rad, m] finite minus linear readings of the declared robot."""
+    """Return the linearisation error of the measurements, (rows, 6) [rad, m]."""
     robot, rows = campaign.robot, campaign.plan.rows
 
     def readings(scale: float) -> NDArray:
@@ -75,7 +76,7 @@ def finite_part(campaign: Synthetic) -> NDArray:
 
 
 def draw_case(seed: int, only: str | None = None) -> tuple[str, Synthetic]:
-    """Return the kind and campaign of a case; draw again if effects are impossible."""
+    """Return the kind of a case and its campaign."""
     for attempt in range(TRIES):
         rng = np.random.default_rng([seed, attempt])
         kind = str(rng.choice(list(MIX), p=list(MIX.values())))
@@ -96,7 +97,7 @@ def _measure(kind: str, rng: np.random.Generator) -> Synthetic:
     kinds |= dict.fromkeys(("joint_clearance", "_torque_backlash"), "arm")
     drawn = draw_robot(rng, next((kinds[n] for n in names if n in kinds), None))
     robot, load = drawn.robot, drawn.load
-    # Robots with many legs are slow, so half as many rows are simulated.
+    # fewer rows are simulated for robots with many legs, which are slow
     many = len(robot.frames) > 20
     design = CampaignDesign(
         configurations=12 if many else 24,
@@ -114,7 +115,7 @@ def _measure(kind: str, rng: np.random.Generator) -> Synthetic:
         return generate_campaign(
             robot, wanted, design, Noise(), int(rng.integers(2**31)), "springs"
         )
-    # A longer beam cannot be distinguished from a permanently warmer one.
+    # a longer beam and a permanently warmer beam cannot be distinguished
     hidden = Hidden(names[0], _one_beam(names[0], robot, rng))
     fixed = replace(design, temperature="constant")
     return generate_campaign(
@@ -148,7 +149,7 @@ def _one_beam(name: str, robot: Any, rng: np.random.Generator) -> Parameters:
 def truth_with_rivals(kind: str, campaign: Synthetic) -> dict[str, Any]:
     """Return the hidden effects, and other sets that explain the data equally well."""
     names = sorted(effect.name for effect in campaign.effects)
-    # two public effects together may explain an effect that is not public
+    # two effects of the library may explain an effect outside it
     most = 2 if len(names) == 2 or kind == "outside" else 1
     rivals = alternatives(campaign, most) if names else []
     same = {
@@ -156,7 +157,7 @@ def truth_with_rivals(kind: str, campaign: Synthetic) -> dict[str, Any]:
         for one in rivals
         if one.residual < SAME and tuple(sorted(_plain(one))) != tuple(names)
     }
-    # If the hidden effects are hardly visible, the empty set also explains the data.
+    # without effects, the data are explained if the hidden effects are very small
     unseen = float(np.nansum((campaign.added / campaign.sigma) ** 2)) < SAME
     accept = [list(one) for one in sorted(same)] + ([[]] if unseen else [])
     if kind == "none":  # near a singularity, declared errors may cause finite motions
@@ -169,7 +170,7 @@ def truth_with_rivals(kind: str, campaign: Synthetic) -> dict[str, Any]:
         truth["accept_effects"] = [[]]
         truth["hidden_from_library"] = least
         truth["accept_verdicts"] = ["outside_library"]
-        if least < VISIBLE:  # a public effect explains nearly all of the hidden one
+        if least < VISIBLE:  # effects of the library explain the hidden effect
             truth["accept_verdicts"] = list(VERDICTS)
             hidden = [one for one in rivals if one.residual < VISIBLE]
             truth["accept_effects"] += [_plain(one) for one in hidden]
@@ -186,7 +187,7 @@ def truth_with_rivals(kind: str, campaign: Synthetic) -> dict[str, Any]:
 
 
 def _plain(one: Alternative) -> list[str]:
-    """Return the names of effects without the time constants of drifts."""
+    """Return the names of effects, with drifts of all time constants as one effect."""
     return [name.partition("(")[0] for name in one.names]
 
 
@@ -195,7 +196,7 @@ def make(
 ) -> None:
     """Write the campaign and the hidden effects of a case unless they exist.
 
-    The campaign states a sigma that is too small by the factor ``understated``.
+    The standard deviation in the campaign is too small by the factor ``understated``.
     """
     name = f"c{seed:04d}"
     if (folder / "truths" / f"{name}.json").exists():
@@ -222,14 +223,14 @@ def answer(folder: Path, seed: int) -> None:
     try:
         found = diagnose(campaign)
         diagnosis = table(found) | _saved(found, campaign)
-    except Exception:  # a crash is stored as a result and counted
+    except Exception:  # exceptions are results, which are counted
         diagnosis = {"verdict": "crashed", "why": traceback.format_exc()}
     diagnosis["seconds"] = time.process_time() - started
     write_json(diagnosis, str(target))
 
 
 def _saved(found: Diagnosis, campaign: Campaign) -> dict[str, Any]:
-    """Return the error of the saved file on all rows, over the printed and declared."""
+    """Return the error of the saved robot file, relative to two other errors."""
     if not found.better:
         return {}
     with tempfile.TemporaryDirectory() as folder:
@@ -246,7 +247,7 @@ def _saved(found: Diagnosis, campaign: Campaign) -> dict[str, Any]:
 
 
 def main() -> None:
-    """Make campaigns, diagnose them, and score the results."""
+    """Create campaigns, diagnose them, and evaluate the results."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder", type=Path)
     parser.add_argument("--count", type=int, default=200)

@@ -3,13 +3,15 @@
     python -m benchmarks.evidence.diagnosis_points [--first 710000] [--count 10]
         [--hidden library|outside] [--common 1.0] [--device 5e-6]
 
-Case k is drawn from seed k: a robot (``random_robots``) and 128 rows of 64
-configurations.  The device noise is 5 um in each reading.  All points of a row share a
-noise motion of 20 um and 200 urad times ``--common``.  Either no effect is hidden, or
-one effect at five times the common noise.  The declared device noise is always 5 um.
-The program prints verdict, reported effects, functions, errors in declared sigma and
-estimated noise.  It also prints in how many cases a function was added, in how many the
-hidden effect was named, and how many 90 % intervals contain the true parameter.
+In case k, random numbers have the seed k.  They determine a robot (``random_robots``)
+and 128 measurements at 64 configurations.  The device noise is 5 um.  In addition, all
+points of a measurement have a common random motion of 20 um and 200 urad, multiplied by
+``--common``.  There is no hidden effect, or a hidden effect at five times the common
+noise.  The declared device noise is 5 um.
+
+For each case, the program prints the verdict, the reported effects and functions, the
+errors and the estimated noise.  It also counts the cases with a function, the cases
+with the correct effect, and the 90 % intervals that contain the true parameter.
 """
 
 import argparse
@@ -34,13 +36,13 @@ from tests.points_for_tests import DEVICE, MACHINE, simulated, write_points
 sys.path.insert(0, str(Path(__file__).parent))
 from random_robots import draw_robot
 
-# Effects that are not drawn, because their size cannot be scaled.
+# effects that are excluded, because their size cannot be chosen
 LEFT_OUT = {"joint_clearance", "geometric_stiffening", "self_weight"}
 TRIES = 12
 
 
 def machine(seed: int, hidden: str | None, common: float) -> Synthetic:
-    """Return a simulated robot; draw again if it cannot have the effect."""
+    """Return a random robot with a hidden effect."""
     for attempt in range(TRIES):
         rng = np.random.default_rng([seed, attempt])
         listed = list(OUTSIDE) if hidden == "outside" else list(LIBRARY)
@@ -60,7 +62,7 @@ def machine(seed: int, hidden: str | None, common: float) -> Synthetic:
 
 
 def covered(found: Diagnosis, made: Synthetic) -> tuple[int, int]:
-    """Return the number of 90 % intervals that contain the truth, and their number."""
+    """Return the number of 90 % intervals with the true value, and of all intervals."""
     true = {e.name: e.parameters for e in made.effects}
     inside = [
         abs(p["value"] - true[e["name"]][p["name"]]) < 1.645 * p["std"]
@@ -71,7 +73,7 @@ def covered(found: Diagnosis, made: Synthetic) -> tuple[int, int]:
 
 
 def main() -> None:
-    """Draw the cases, diagnose them, and count the results."""
+    """Diagnose all cases and count the results."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--first", type=int, default=710000)
     parser.add_argument("--count", type=int, default=10)

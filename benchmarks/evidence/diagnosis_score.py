@@ -1,8 +1,8 @@
-"""Score the results of ``diagnosis_confusion.py``.
+"""Evaluate the results of ``diagnosis_confusion.py``.
 
-A result is correct if its verdict is definite and names the hidden effects, or a set
-that explains the data equally well.  A definite verdict with any other set is a false
-claim.
+A result is correct if its verdict is definite and contains the hidden effects, or other
+effects that explain the data equally well.  A definite verdict with other effects is a
+false claim.
 """
 
 import json
@@ -19,17 +19,17 @@ VERDICTS = (
     "explained", "learned", "none_needed", "ambiguous", "outside_library",
     "not_enough_rows",
 )  # fmt: skip
-UNNAMED = ("geometric_errors", "springs")  # parts of a model that are not effects
+UNNAMED = ("geometric_errors", "springs")  # parameters of a model that are not effects
 
 
 def score(folder: Path) -> dict[str, Any]:
-    """Compute all scores of the results in a folder.
+    """Return the scores of the results in a folder.
 
     Args:
         folder: folder with hidden effects and results.
 
     Returns:
-        Scores as plain values; see the head of this file.
+        Numbers of correct and false results, and other statistics, by name.
     """
     confusion: dict[str, Counter] = defaultdict(Counter)
     outcome: dict[str, Counter] = defaultdict(Counter)
@@ -94,7 +94,7 @@ def score(folder: Path) -> dict[str, Any]:
 
 
 def _judge(truth: dict, diagnosis: dict) -> str:
-    """Return right, abstained, false claim, false outside, missed or crashed."""
+    """Return the class of a result, for example right or false claim."""
     verdict = diagnosis["verdict"]
     if verdict == "crashed":
         return "crashed"
@@ -117,13 +117,13 @@ def _judge(truth: dict, diagnosis: dict) -> str:
 
 
 def _claimed(diagnosis: dict) -> list[str]:
-    """Return the library effects that a result names."""
+    """Return the effects of the library in a result."""
     names = (effect["name"] for effect in diagnosis.get("effects", []))
     return sorted(name for name in names if name not in UNNAMED)
 
 
 def _place_and_variable(truth: dict, diagnosis: dict) -> tuple[bool, bool]:
-    """Return whether a function has the place and the variable of the effect."""
+    """Return whether a function has the frame and the variable of the hidden effect."""
     (effect,) = truth["effects"]
     name, frames = effect["name"], set(effect["where"])
     at_reading = name in ("_stand", "_sag")
@@ -146,14 +146,14 @@ def _place_and_variable(truth: dict, diagnosis: dict) -> tuple[bool, bool]:
 
 
 def _told(diagnosis: dict) -> str:
-    """Summarise a reported result in a few words."""
+    """Return a short description of a result."""
     if diagnosis["verdict"] == "explained":
         return "+".join(_claimed(diagnosis)) or "geometry or springs"
     return str(diagnosis["verdict"])
 
 
 def _band(strength: float) -> str:
-    """Return the range of the strength, in sigma, of the weakest hidden effect."""
+    """Return the class of the size of the smallest hidden effect, in sigma."""
     return (
         "none"
         if not strength
@@ -165,7 +165,7 @@ def _band(strength: float) -> str:
 
 
 def _inside(truth: dict, diagnosis: dict) -> list[bool]:
-    """Return for each parameter found whether its 90 % interval covers the truth."""
+    """Return for each parameter whether its 90 % interval contains the true value."""
     known = {
         (effect["name"], parameter["name"]): parameter["value"]
         for effect in truth["effects"]
@@ -182,7 +182,7 @@ def _inside(truth: dict, diagnosis: dict) -> list[bool]:
 
 
 def _share(right: list[bool]) -> list[float | int | None]:
-    """Return the fraction of correct results, and their number."""
+    """Return the fraction of correct results, and the number of results."""
     return [float(np.mean(right)) if right else None, len(right)]
 
 

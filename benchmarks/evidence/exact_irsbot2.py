@@ -1,9 +1,9 @@
-"""Compute exact equilibria of the paper's robot at full errors over its workspace.
+"""Compute exact equilibria of IRSBot-2 over its workspace.
 
 Run ``python -m benchmarks.evidence.exact_irsbot2 [STEP_MM]``.  It prints the tables of
-``docs/exact.md``: convergence, residuals of the solutions, errors of the linear model,
-and times.  The draws are those of the reference reconstruction: all components positive
-(``literal``) or with random signs (``signed``).
+``docs/exact.md``: convergence, residuals, errors of the linear model, and times.  The
+robot has the geometric errors of the paper, which are positive (``literal``) or have
+random signs (``signed``).
 """
 
 import sys
@@ -32,7 +32,7 @@ COLUMNS = {
 
 
 def workspace(step: float) -> np.ndarray:
-    """Return (k, 6) poses of a grid over z <= 0, whether reachable or not."""
+    """Return the poses of a grid with z <= 0, (k, 6)."""
     x = step * np.arange(-round(0.7 / step), round(0.7 / step) + 1)
     z = step * np.arange(-round(0.8 / step), 1)
     X, Z = np.meshgrid(x, z)
@@ -42,7 +42,7 @@ def workspace(step: float) -> np.ndarray:
 
 
 def measure(case: dict, poses: np.ndarray) -> tuple[dict[str, np.ndarray], list[str]]:
-    """Return the results at every reachable point, and a message for each failure."""
+    """Return the results at all reachable points, and the error messages."""
     rows, failed = [], []
     for posture in place_many(irsbot2_with(case), poses)[0]:
         if posture is None:
@@ -68,7 +68,7 @@ def measure(case: dict, poses: np.ndarray) -> tuple[dict[str, np.ndarray], list[
 
 
 def main() -> None:
-    """Print a table for each draw."""
+    """Print a table for each set of errors."""
     step = float(sys.argv[1]) * 1e-3 if len(sys.argv) > 1 else 0.025
     poses = workspace(step)
     for case in NUMBERS["cases"]:

@@ -1,12 +1,12 @@
-"""Determine how many rows a planned campaign saves compared with random rows.
+"""Compare the number of measurements of planned campaigns and of random campaigns.
 
     python benchmarks/evidence/plan_rows.py OUT.json --count 50 [--first 0]
 
-Case k is drawn from seed k: a robot and one effect of the library.  The effect is
-scaled so that its rms in the readings of random rows is STRENGTH sigma.  Campaigns of
-increasing size are simulated from the model with this effect and noise.  The rows are
-either planned, or random within the same ranges.  Each campaign is diagnosed.  The
-required number of rows is the smallest beyond which all results name only this effect.
+In case k, random numbers have the seed k.  They determine a robot and an effect of the
+library, whose rms in random measurements is STRENGTH sigma.  Campaigns of increasing
+size are simulated with this effect and noise.  Their measurements are planned, or
+random within the same ranges.  Each campaign is diagnosed.  The required number of
+measurements is the smallest number beyond which all diagnoses are correct.
 """
 
 import argparse
@@ -35,19 +35,18 @@ ROBOTS = ("arm6", "five_bar")
 ROWS = (8, 12, 16, 24, 32, 48)
 STRENGTH = 1.0  # [sigma]
 SIGMA = (1e-5, 5e-6)
-# excluded: the pose of the base, which is as declared, and finite motions, which have
-# no parameter
+# excluded effects, because they are not estimated or their size cannot be chosen
 NOT_DRAWN = {"joint_clearance", "registration", "self_weight", "geometric_stiffening"}
 NAMES = [name for name in LIBRARY if name not in NOT_DRAWN]
 
 
 def design_of(robot: Robot) -> CampaignDesign:
-    """Return the design, which states what may be varied."""
+    """Return the design of the measurements."""
     return CampaignDesign(120, 120, 0.2 if robot.closures else 0.6, load=60.0)
 
 
 def random_rows(robot: Robot, rows: int, rng: np.random.Generator) -> Campaign:
-    """Return a campaign of random rows."""
+    """Return a campaign with random measurements."""
     design = replace(design_of(robot), configurations=rows, rows=rows)
     plan = plan_campaign(robot, design, rng)
     return rows_as_campaign(robot, plan, design, SIGMA)
@@ -56,7 +55,7 @@ def random_rows(robot: Robot, rows: int, rng: np.random.Generator) -> Campaign:
 def draw_effect(
     campaign: Campaign, rng: np.random.Generator
 ) -> tuple[str, dict[str, float]]:
-    """Return an effect with parameters for which its rms is STRENGTH sigma."""
+    """Return an effect whose rms is STRENGTH sigma."""
     conditions = conditions_of(campaign)
     every = hypotheses(conditions, loaded_components(campaign))
     name = str(rng.choice([n for n in NAMES if any(h.effect == n for h in every)]))
@@ -88,7 +87,7 @@ def draw_effect(
 
 def is_right(campaign: Campaign, name: str, values: dict[str, float],
              rng: np.random.Generator) -> bool:  # fmt: skip
-    """Return whether the diagnosis of a campaign names only the given effect."""
+    """Return whether the diagnosis of a campaign contains only the given effect."""
     conditions = apply_effects(conditions_of(campaign), {name: values})
     noise = campaign.sigma * rng.normal(size=campaign.measured.shape)
     found = diagnose(replace(campaign, measured=predict(conditions).deviation + noise))
@@ -96,14 +95,14 @@ def is_right(campaign: Campaign, name: str, values: dict[str, float],
 
 
 def needed(right: list[bool]) -> int:
-    """Return the smallest number of rows beyond which every result is right."""
+    """Return the smallest number of rows beyond which all diagnoses are correct."""
     wrong = [k for k, good in enumerate(right) if not good]
     first = wrong[-1] + 1 if wrong else 0
     return ROWS[first] if first < len(ROWS) else 2 * ROWS[-1]
 
 
 def run_case(seed: int) -> dict[str, Any]:
-    """Return the required numbers of planned and of random rows."""
+    """Return the required numbers of planned and random rows."""
     begin = time.process_time()
     rng = np.random.default_rng([seed, 14])
     robot: Robot = without_clearance(load_robot(str(rng.choice(ROBOTS))))
@@ -125,7 +124,7 @@ def run_case(seed: int) -> dict[str, Any]:
 
 
 def summary(answers: list[dict[str, Any]]) -> str:
-    """Return the medians and the fraction of right results at every number of rows."""
+    """Return the medians, and the fraction of correct diagnoses by number of rows."""
     rows = {h: np.array([a[h] for a in answers]) for h in ("planned", "random")}
     lines = [
         f"{how}: median {np.median(count):g} rows, mean {count.mean():.1f}"
@@ -144,7 +143,7 @@ def summary(answers: list[dict[str, Any]]) -> str:
 
 
 def main() -> None:
-    """Run the cases, write each result, and print the saved rows."""
+    """Compute all cases, write the results, and print a summary."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("out", type=Path)
     parser.add_argument("--count", type=int, default=50)

@@ -1,8 +1,8 @@
-"""Time K_C of the paper's robot over half of its workspace, compared with (22).
+"""Measure the time of K_C for IRSBot-2, compared with problem (22).
 
-``python -m benchmarks.evidence.platform_stiffness`` prints the time [us] per posture,
-the minimum over several alternating runs, and the difference of K_C from single
-postures.
+``python -m benchmarks.evidence.platform_stiffness`` prints the shortest time [us] per
+posture of several runs.  It also prints the largest difference of K_C from the results
+for single postures.
 """
 
 import time
@@ -19,12 +19,12 @@ from forcefit.assembly.platform_stiffness.platform_stiffness import platform_sti
 from forcefit.assembly.robots import load_robot
 
 _RUNS = 9
-# frames of the paper's geometric errors
+# frames with geometric errors in the paper
 _DRAWN = ("elbow_a", "link_a", "elbow_b", "link_b", "loop2_platform", "tip")
 
 
 def least(function: Callable[[], object], count: int) -> float:
-    """Return the time [us] per point of the fastest run."""
+    """Return the shortest time [us] per point of several runs."""
     times = []
     for _ in range(_RUNS):
         start = time.perf_counter()
@@ -72,7 +72,7 @@ def main() -> None:
 
 
 def everything(postures: Posture) -> None:
-    """Compute everything that a sweep stores about the stiffness."""
+    """Compute all quantities of the stiffness that a sweep stores."""
     found: Any = platform_stiffness(postures)
     _ = found.eigen_stiffnesses, found.eigen_screws
     for axis in np.eye(6):

@@ -1,15 +1,14 @@
-"""Reproduce the published solids of the Princeton beam with 500 x 12 x 4 bricks.
+"""Reproduce the published solid model of the Princeton beam.
 
 ``python -m benchmarks.evidence.princeton_bricks`` takes two minutes.  If angles are
-given, for example ``90 75``, the bricks are also bent with large rotations at these
-angles, which takes ten minutes each.
+given, for example ``90 75``, large deflections at these angles are also computed, which
+takes ten minutes each.
 
-The published results were computed with 500 x 12 x 4 bricks in Ansys.  Bricks of eight
-nodes with B-bar (mean dilatation) are too stiff across the thickness, where only four
-of them represent the bending.  The program prints their excess stiffness relative to
-bricks with exact bending (incompatible modes), refined and extrapolated.  It then
-prints by how many per cent the published solids differ from a beam of 8 pieces with the
-same excess stiffness, and from these bricks.
+The published solid model has 500 x 12 x 4 bricks in Ansys.  Bricks with eight nodes and
+the B-bar method are too stiff in bending, because only four bricks are used across the
+thickness.  The program prints their excess stiffness relative to refined bricks with
+incompatible modes.  It also prints the differences between the published deflections, a
+beam of 8 elements with the same excess stiffness, and these bricks.
 
 Sources:
     Hughes (1980), Generalization of selective integration procedures (B-bar); Wilson,
@@ -42,8 +41,8 @@ from forcefit.assembly.model.links import link_compliance
 from forcefit.assembly.model.robot import BeamLink, Frame, MatrixLink
 from forcefit.stiffness.beam.sections import declared_section
 
-COUNTS = (500, 12, 4)  # numbers of bricks of the published solids
-_COARSE = ((120, 2, 1), (250, 6, 2))  # coarse boxes, from which a bent shape is refined
+COUNTS = (500, 12, 4)  # numbers of bricks of the published solid model
+_COARSE = ((120, 2, 1), (250, 6, 2))  # numbers of bricks for the initial guesses
 _CORNERS = np.array(list(product((-1, 1), repeat=3)))
 _POINTS = _CORNERS / np.sqrt(3)
 _PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
@@ -53,7 +52,7 @@ _STEPS, _ITERATIONS = 6, 60
 
 @dataclass(frozen=True, eq=False)
 class Bricks:
-    """A box of equal bricks with eight nodes, clamped at x = 0.
+    """Box of equal bricks with eight nodes, clamped at x = 0.
 
     Attributes:
         counts: numbers of bricks along length, height and width.
@@ -75,7 +74,7 @@ class Bricks:
 
 
 def bricks(counts: tuple[int, int, int]) -> Bricks:
-    """Return the box divided into the given numbers of bricks."""
+    """Return a box with given numbers of bricks."""
     sides = np.array([LENGTH, HEIGHT, WIDTH]) / counts
     nodes = [n + 1 for n in counts]
     number = np.arange(np.prod(nodes)).reshape(nodes)
@@ -105,7 +104,7 @@ def bricks(counts: tuple[int, int, int]) -> Bricks:
 
 
 def strains(F: NDArray, gradients: NDArray) -> NDArray:
-    """Return (e, 6, 3 m) Green's strains, shears doubled, for displacements."""
+    """Return the Green strains with engineering shear strains, (e, 6, 3 m)."""
     rows = [
         np.einsum("n,ek->enk", gradients[:, j], F[:, :, i])
         + (0 if i == j else np.einsum("n,ek->enk", gradients[:, i], F[:, :, j]))
@@ -115,15 +114,16 @@ def strains(F: NDArray, gradients: NDArray) -> NDArray:
 
 
 def equations(box: Bricks, u: NDArray, exact: bool = False) -> tuple[NDArray, NDArray]:
-    """Return (e, 24) forces of each brick, and (e, 24, 24) their derivatives.
+    """Return the nodal forces of each brick (e, 24), and their derivatives.
 
     Args:
         box: the bricks.
         u: (nodes, 3) [m] displacements.
-        exact: use incompatible modes instead of B-bar; only for an undeformed box.
+        exact: whether to use incompatible modes instead of B-bar, for a box without
+            deformation.
 
     Returns:
-        Both, in the order of a brick's nodes.
+        Forces (e, 24) and derivatives (e, 24, 24), in the order of the nodes.
     """
     moved = u[box.elements]
     F = [np.eye(3) + np.einsum("eni,nj->eij", moved, g) for g in box.gradients]
@@ -161,7 +161,7 @@ def equations(box: Bricks, u: NDArray, exact: bool = False) -> tuple[NDArray, ND
 
 
 def deviatoric(B: NDArray) -> NDArray:
-    """Return (e, 6, k) [N/m^2] stresses of strains without the volumetric part."""
+    """Return the deviatoric stresses for given strains, (e, 6, k) [N/m^2]."""
     out = _SHEAR * B
     out[:, :3] *= 2
     out[:, :3] -= 2 * _SHEAR / 3 * B[:, :3].sum(axis=1, keepdims=True)
@@ -169,13 +169,13 @@ def deviatoric(B: NDArray) -> NDArray:
 
 
 def solved(box: Bricks, K: NDArray, right: NDArray) -> NDArray:
-    """Return (nodes, 3, k) displacements under forces, with the first face held."""
+    """Return the displacements under forces with a clamped end, (nodes, 3, k)."""
     dofs = (3 * box.elements[:, :, None] + np.arange(3)).reshape(len(K), 24)
     rows, columns = np.repeat(dofs, 24, axis=1).ravel(), np.tile(dofs, 24).ravel()
     size = 3 * len(box.places)
     free = np.arange(3 * (box.counts[1] + 1) * (box.counts[2] + 1), size)
     matrix = csc_matrix((K.ravel(), (rows, columns)), shape=(size, size))[free][:, free]
-    # nodes are numbered along the bar, so that the natural order has a small bandwidth
+    # the bandwidth is small, because nodes are numbered along the bar
     factors = splu(
         matrix, permc_spec="NATURAL", diag_pivot_thresh=0.0,
         options={"SymmetricMode": True},
@@ -186,7 +186,7 @@ def solved(box: Bricks, K: NDArray, right: NDArray) -> NDArray:
 
 
 def compliances(counts: tuple[int, int, int], exact: bool) -> NDArray:
-    """Return the compliances along the height, across [m/N], in twist [rad/(N m)]."""
+    """Return the compliances in bending (two planes) and in torsion."""
     box = bricks(counts)
     y, z = box.places[:, 1], box.places[:, 2]
     loads = np.zeros((len(y), 3, 3))
@@ -198,7 +198,7 @@ def compliances(counts: tuple[int, int, int], exact: bool) -> NDArray:
 
 
 def bent(box: Bricks, force: NDArray, u: NDArray, tolerance: float) -> NDArray:
-    """Return (nodes, 3) [m] displacements under a dead force on the last face."""
+    """Return the displacements under a dead load on the end face, (nodes, 3) [m]."""
     for _ in range(_ITERATIONS):
         forces, K = equations(box, u)
         inner = np.zeros((len(box.places), 3))
@@ -212,7 +212,7 @@ def bent(box: Bricks, force: NDArray, u: NDArray, tolerance: float) -> NDArray:
 
 
 def refined(box: Bricks, u: NDArray, finer: Bricks) -> NDArray:
-    """Interpolate the displacements of a box at the nodes of a finer box."""
+    """Return the displacements of a box interpolated at the nodes of a finer box."""
     axes = [np.unique(box.places[:, k].round(12)) for k in range(3)]
     grid = u.reshape(*(n + 1 for n in box.counts), 3)
     places = finer.places.round(12)
@@ -220,7 +220,7 @@ def refined(box: Bricks, u: NDArray, finer: Bricks) -> NDArray:
 
 
 def bent_rows(angle: float) -> dict[float, NDArray]:
-    """Return (2,) [m] displacements of the last face (height, across), by force."""
+    """Return the displacements (height, width) of the end face by force, (2,) [m]."""
     coarse, middle, fine = (bricks(counts) for counts in (*_COARSE, COUNTS))
     u, before, rows = np.zeros((len(coarse.places), 3)), 0.0, {}
     axis = np.array([0.0, np.cos(angle), np.sin(angle)])
@@ -235,7 +235,7 @@ def bent_rows(angle: float) -> dict[float, NDArray]:
 
 
 def stiffer_beam(factors: NDArray) -> tuple[BeamLink, MatrixLink]:
-    """Return the bar and its root with increased stiffness (height, across, twist)."""
+    """Return the links of a beam with increased stiffness."""
     section = declared_section({"width": WIDTH, "height": HEIGHT}, NU)
     along, across, twist = factors
     strong, weak = max(section.I_y, section.I_z), min(section.I_y, section.I_z)
@@ -254,7 +254,7 @@ def stiffer_beam(factors: NDArray) -> tuple[BeamLink, MatrixLink]:
 
 
 def main() -> None:
-    """Print the excess stiffness and the two tables."""
+    """Print the excess stiffness and both tables."""
     coarse, fine = (compliances(c, exact=True) for c in (COUNTS, (250, 24, 8)))
     right = fine + (fine - coarse) / 3
     factors = right / compliances(COUNTS, exact=False)

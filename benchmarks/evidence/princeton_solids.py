@@ -1,13 +1,13 @@
-"""Solve the Princeton beam as a finite-element solid with large rotations.
+"""Compute the Princeton beam as a finite-element solid with large rotations.
 
-``python -m benchmarks.evidence.princeton_solids`` (half an hour)
+``python -m benchmarks.evidence.princeton_solids`` takes half an hour.
 
-Published beams and published solids differ by up to 3.5 %.  This program computes a
-third solution: a box of high-order bricks of Saint Venant-Kirchhoff material in the
-total Lagrangian formulation.  One end face is clamped, and the other is loaded
-uniformly.  The program shares no code with forcefit.  It prints by how many per cent
-other results differ from this solution, along the height and across: links of 8 pieces,
-published beams and published solids.
+The published results of beam elements and of solid elements differ by up to 3.5 %.
+This program computes a third solution with high-order bricks, Saint Venant-Kirchhoff
+material and the total Lagrangian formulation.  One end face is clamped, and the other
+is loaded uniformly.  The program does not use the elements of forcefit.  It prints the
+differences [%] of published results and of links with 8 beam elements from this
+solution.
 
 Sources:
     Dowell, Traybar (1975), the experiment; Obrezkov et al., Nonlinear Dynamics (2022),
@@ -35,7 +35,7 @@ LENGTH, HEIGHT, WIDTH = 0.508, 12.3777e-3, 3.2024e-3  # [m]
 E, NU = 71.7e9, 0.31
 BAR = BeamLink({"width": WIDTH, "height": HEIGHT}, E, NU, up=(0, 1, 0))
 ANGLES = (0, 15, 30, 45, 60, 75, 90)  # [deg] angles of the force from the height
-# [m] along the height and across: (beams, solids)
+# published deflections [m] of beams and solids along the height and the width
 PUBLISHED = {
     8.896: (
         ((1.071417630e-2, 1.061328706e-2, 1.011169630e-2, 8.837226265e-3,
@@ -63,13 +63,13 @@ _ITERATIONS = 30
 
 
 def line(order: int) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-    """Return Lagrange polynomials through the Lobatto points of the line from -1 to 1.
+    """Return Lagrange polynomials for the Lobatto points between -1 and 1.
 
     Args:
         order: order of the polynomials, at least 2.
 
     Returns:
-        Values and slopes (order + 1 Gauss points, nodes) of the polynomials, the
+        Values (order + 1 Gauss points, nodes) and derivatives of the polynomials, the
         weights of the Gauss points, and the integrals of the polynomials.
     """
     inner = Legendre.basis(order).deriv().roots()
@@ -84,7 +84,7 @@ def line(order: int) -> tuple[NDArray, NDArray, NDArray, NDArray]:
 
 @dataclass(frozen=True, eq=False)
 class Box:
-    """A box of equal bricks.
+    """Box of equal bricks.
 
     Attributes:
         elements: (e, m) nodes of the bricks.
@@ -102,7 +102,7 @@ class Box:
 
 
 def box(counts: tuple[int, int, int], orders: tuple[int, int, int]) -> Box:
-    """Return a box clamped at x = 0, divided along its length, height and width."""
+    """Return a box with given numbers of bricks, clamped at x = 0."""
     sides = np.array([LENGTH, HEIGHT, WIDTH]) / counts
     nodes = [order * n + 1 for order, n in zip(orders, counts, strict=True)]
     number = np.arange(np.prod(nodes)).reshape(nodes)
@@ -133,7 +133,7 @@ def box(counts: tuple[int, int, int], orders: tuple[int, int, int]) -> Box:
 
 
 def equations(solid: Box, u: NDArray) -> tuple[NDArray, csc_matrix]:
-    """Return internal forces (nodes, 3) and their derivative by the displacements."""
+    """Return the internal forces (nodes, 3), and their derivative."""
     lame, shear = E * NU / (1 + NU) / (1 - 2 * NU), E / 2 / (1 + NU)
     eye, G = np.eye(3), solid.gradients
     F = eye + np.einsum("eni,qnj->eqij", u[solid.elements], G, optimize=True)
@@ -149,7 +149,7 @@ def equations(solid: Box, u: NDArray) -> tuple[NDArray, csc_matrix]:
     A += shear * np.einsum("eqim,eqkm,jl->eqijkl", F, F, eye, optimize=True)
     A *= solid.weights[:, None, None, None, None]
     count, nodes = solid.elements.shape
-    flat = G.transpose(0, 2, 1).reshape(-1, nodes)  # Gauss points and axes, nodes
+    flat = G.transpose(0, 2, 1).reshape(-1, nodes)  # shape (Gauss points x axes, nodes)
     K = np.empty((count, nodes, 3, nodes, 3))
     for e in range(count):
         for i, k in np.ndindex(3, 3):
@@ -164,7 +164,7 @@ def equations(solid: Box, u: NDArray) -> tuple[NDArray, csc_matrix]:
 
 
 def bent(solid: Box, force: NDArray, u: NDArray, start: NDArray) -> NDArray:
-    """Return (nodes, 3) [m] displacements under a uniform dead load on the last face.
+    """Return the displacements under a uniform dead load on the end face.
 
     Args:
         solid: the box.
@@ -173,7 +173,7 @@ def bent(solid: Box, force: NDArray, u: NDArray, start: NDArray) -> NDArray:
         start: (3,) [N] load with a known equilibrium.
 
     Returns:
-        The displacements at equilibrium, followed in steps of the load.
+        (nodes, 3) [m] displacements at equilibrium, computed in steps of the load.
     """
     free = np.ones(u.shape, dtype=bool)
     free[solid.clamped] = False
@@ -195,7 +195,7 @@ def bent(solid: Box, force: NDArray, u: NDArray, start: NDArray) -> NDArray:
 def solid_rows(
     counts: tuple[int, int, int], orders: tuple[int, int, int], angle: float
 ) -> dict[float, NDArray]:
-    """Return (2,) [m] displacements of the last face (height, across), by force."""
+    """Return the displacements (height, width) of the end face by force, (2,) [m]."""
     solid = box(counts, orders)
     u, start, rows = np.zeros((len(solid.pulled), 3)), np.zeros(3), {}
     for size in PUBLISHED:
@@ -206,11 +206,10 @@ def solid_rows(
 
 
 def root_link() -> MatrixLink:
-    """Return the first of 8 pieces with a clamped end that neither warps nor contracts.
+    """Return the first of 8 beam elements with a clamped end that cannot warp.
 
-    A solid with both ends held in this way is stiffer than the beam.  Half of the
-    difference belongs to each end: for moments and tension, the part that does not
-    depend on the position of the other end.
+    A solid with two rigid end faces is stiffer than a beam.  Half of the difference is
+    added to the stiffness of the first element.
     """
     piece = LENGTH / 8
     frame = Frame("tip", translation=[piece, 0, 0], link=BAR)
@@ -225,7 +224,7 @@ def root_link() -> MatrixLink:
 def in_pieces(
     size: float, angle: float, root: MatrixLink | None = None, link: BeamLink = BAR
 ) -> NDArray:
-    """Return (2,) [m] displacements of 8 beam pieces; the first can be replaced."""
+    """Return the tip displacements of 8 beam elements, (2,) [m]."""
     piece = LENGTH / 8
     if root is None:
         whole = replace(link, pieces=8)
@@ -242,7 +241,7 @@ def in_pieces(
 
 
 def main() -> None:
-    """Print the table; six numbers select the counts and orders of the bricks."""
+    """Print the table for given numbers and orders of the bricks."""
     numbers = tuple(int(n) for n in sys.argv[1:7]) or (40, 2, 1, 4, 4, 3)
     counts, orders = numbers[:3], numbers[3:]
     print(f"{counts} bricks of orders {orders}; per cent off, along the height, across")
@@ -262,7 +261,7 @@ def main() -> None:
 
 
 def off(values: NDArray, arbiter: NDArray) -> str:
-    """Return the difference in per cent, where a displacement exists."""
+    """Return the differences in per cent."""
     return "".join(
         f"{100 * (v / a - 1):8.2f}" if abs(a) > 1e-6 else f"{'-':>8s}"
         for v, a in zip(values, arbiter, strict=True)

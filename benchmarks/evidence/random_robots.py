@@ -1,8 +1,8 @@
-"""Draw robots of random dimensions with declared geometric errors.
+"""Robots with random dimensions and geometric errors, for simulated campaigns.
 
-Simulated campaigns use serial arms of 3 to 6 joints, planar 3-RRR and five-bar robots,
-hexapods and delta robots.  Joints have no clearance, some drives are elastic, and
-bodies have masses.
+They are serial arms with 3 to 6 joints, planar 3-RRR and five-bar robots, hexapods and
+Delta robots.  Joints have no clearance, some drives are elastic, and bodies have
+masses.
 """
 
 from dataclasses import dataclass, replace
@@ -26,8 +26,8 @@ from forcefit.validation.synthetic.machine import simulate_readings
 from forcefit.validation.synthetic.springs import rest_on_springs
 
 KINDS = ("arm",) * 5 + ("3rrr",) * 2 + ("five_bar",) * 2 + ("hexapod", "delta")
-_MOST = 1.5e-3  # [rad, m] largest deviation anywhere within reach
-_ALLOWED = np.array([6e-4, 3e-4])  # [rad, m] by errors, by load
+_MOST = 1.5e-3  # [rad, m] largest deviation at all poses
+_ALLOWED = np.array([6e-4, 3e-4])  # [rad, m] largest deviations by errors and by load
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,8 +37,8 @@ class Drawn:
     Attributes:
         kind: kind of the robot.
         robot: robot with its declared errors.
-        reach: [rad] largest change of a revolute drive from home; for a prismatic drive
-            0.1 m for each rad.
+        reach: [rad] largest change of a revolute drive from the home pose.  For a
+            prismatic drive, it is 0.1 m per rad.
         load: [N] largest force.
         point: (3,) [m] measured point, platform axes.
     """
@@ -54,8 +54,8 @@ def draw_robot(rng: np.random.Generator, kind: str | None = None) -> Drawn:
     """Return a random robot.
 
     Args:
-        rng: generator of the random numbers.
-        kind: one of :data:`KINDS`, or ``"gantry"``; drawn if absent.
+        rng: random number generator.
+        kind: a member of :data:`KINDS`, or ``"gantry"``; random by default.
 
     Returns:
         The robot.
@@ -77,7 +77,7 @@ def draw_robot(rng: np.random.Generator, kind: str | None = None) -> Drawn:
 def _of_first_order(
     robot: Robot, point: NDArray, reach: float, load: float
 ) -> tuple[float, float]:
-    """Return the reach [rad] and load [N] for which deviations stay small."""
+    """Return the reach [rad] and load [N] for which deviations are small."""
     for _ in range(8):
         design = CampaignDesign(configurations=30, rows=60, reach=reach, load=load)
         rows = plan_campaign(robot, design, np.random.default_rng(0)).rows
@@ -131,7 +131,10 @@ def _gantry(rng: np.random.Generator) -> tuple[Robot, float]:
             if joint == "revolute"
             else np.diag([np.inf] * 5 + [3e6])
         )
-        along = {"length": 0.3, "axis": (1.0, 0.0, 0.0)}  # of a body on a slide
+        along = {
+            "length": 0.3,
+            "axis": (1.0, 0.0, 0.0),
+        }  # length and axis of a slide's body
         frames.append(
             Frame(
                 f"{'wxyz'[(k + 1) % 4]}", parent, place.round(4), turn, joint=joint,
@@ -146,7 +149,7 @@ def _gantry(rng: np.random.Generator) -> tuple[Robot, float]:
 
 
 def _direction(rng: np.random.Generator) -> NDArray:
-    """Return a (3,) unit vector, more likely across the joint axis than along it."""
+    """Return a random unit vector, which is more probable normal to the joint axis."""
     vector = rng.normal(size=3) * [1, 1, 0.5]
     return vector / np.linalg.norm(vector)
 
@@ -157,7 +160,7 @@ def _tube(radius: float) -> BeamLink:
 
 
 def _about(rng: np.random.Generator, value: float) -> float:
-    """Return a random number within 20 % of a value."""
+    """Return a random number that differs from a value by up to 20 %."""
     return float(value * rng.uniform(0.8, 1.2))
 
 
@@ -205,7 +208,7 @@ _BUILDERS = {
 
 
 def _with_masses(robot: Robot, rng: np.random.Generator) -> Robot:
-    """Return the robot with random masses at the ends of beams and at the platform."""
+    """Return a robot with random masses at the ends of beams and at the platform."""
     heavy = []
     for frame in robot.frames:
         if frame.name == robot.platform or isinstance(frame.link, BeamLink):
@@ -215,14 +218,14 @@ def _with_masses(robot: Robot, rng: np.random.Generator) -> Robot:
 
 
 def _largest_load(tight: Robot) -> float:
-    """Return the load [N] that deflects the platform by about the allowed error."""
+    """Return the load [N] that causes the allowed deflection of the platform."""
     forces = [np.eye(6)[k] for k in (3, 4, 5)]
     softest = (_moved(tight, forces, tight) / _ALLOWED).max()
     return float(f"{np.clip(1 / softest, 0.5, 400):.2g}")
 
 
 def _moved(robot: Robot, forces: list[NDArray], tight: Robot) -> NDArray:
-    """Return (k, 2) [rad, m] displacements of the platform at home under forces."""
+    """Return the platform displacements under forces in the home pose, (k, 2)."""
     home = home_posture(tight)
     names = [frame.name for frame in robot.frames]
     q = dict(zip(names, home.coordinates.tolist(), strict=True))

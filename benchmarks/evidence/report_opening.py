@@ -2,12 +2,11 @@
 
     python benchmarks/evidence/report_opening.py my_study/report.html
 
-The browser is headless Chromium, driven by selenium, which draws without a graphics
-card; a desktop browser is faster.  Times count from the start of loading until the
-headline is readable, the first screen is drawn, and all figures are drawn.  The
-processor time of the page's thread is printed too.  Each page is opened in a browser
-that has already shown an empty page, and in a newly started one, which must still
-initialise its graphics.
+The browser is headless Chromium, which selenium controls.  The program prints the times
+from the start of loading until the headline is visible, until the first screen is
+drawn, and until all figures are drawn.  It also prints the processor time.  Each page
+is opened in a browser that has already shown an empty page, and in a newly started
+browser.
 """
 
 import shutil
@@ -37,7 +36,7 @@ def opened(path: Path, first: str) -> list[float]:
     try:
         if first:
             browser.get(first)
-            time.sleep(1.0)  # wait for processes that are started for the next page
+            time.sleep(1.0)  # the browser starts processes for the next page
         browser.execute_cdp_cmd("Performance.enable", {"timeDomain": "threadTicks"})
         browser.get(path.resolve().as_uri())
         WebDriverWait(browser, 60, 0.05).until(

@@ -1,15 +1,14 @@
-"""Print the true and the estimated error of K_E, mesh by mesh.
+"""Print the true and the estimated error of K_E for each mesh.
 
 ``python benchmarks/evidence/stiffness_accuracy.py [link ...] [--kind rigid]``
 
-Errors refer to the K of each mesh, which is the upper end of the interval whose
-midpoint is returned.  Each link of ``meshes/`` is refined up to 430 k unknowns or seven
-meshes.  Below, the ratio of true error to estimate [%] is printed for each significant
-entry of the last K.  For rigid interfaces, the true K is that of NGSolve in
-``stiffness_references.json``, if it is accurate to a third of the judged error.  For
-other interfaces, it is the finest K minus 0.85 of its estimated error (before the
-safety factor), and the last mesh is not judged.  The program takes about two minutes
-per link.
+Each link of ``meshes/`` is refined up to 430 000 unknowns or seven meshes, which takes
+about two minutes.  The program prints the errors of the K of each mesh, and the ratio
+of true to estimated error [%] for each significant entry of the last K.
+
+For rigid interfaces, the true K is that of NGSolve in ``stiffness_references.json``, if
+it is sufficiently accurate.  For other interfaces, it is extrapolated from the finest
+mesh.
 """
 
 import argparse
@@ -47,7 +46,7 @@ LINKS = {
 
 
 def levels(name, kind, most):
-    """Return stiffness, both indicated errors, unknowns and seconds of each mesh."""
+    """Return stiffness, two estimated errors, unknowns and time [s] of each mesh."""
     surface = read_surface(MESHES / f"{name}.stl")
     faces = [parse_interface(text) for text in LINKS[name]]
     centers = np.array([interface_center(surface, f, "face") for f in faces])
@@ -66,7 +65,7 @@ def levels(name, kind, most):
 
 
 def report(name, kind, most):
-    """Print a row for each mesh: unknowns, true error, estimate, ratio, seconds."""
+    """Print a row of the table for each mesh."""
     meshes = levels(name, kind, most)
     history = [totals for *totals, _, _ in meshes]
     if kind == "rigid":

@@ -1,17 +1,18 @@
-"""Judge the error estimate of K_E on filleted, layered and thin parts drawn at random.
+"""Evaluate the error estimate of K_E for random filleted, layered and thin parts.
 
-Run ``python benchmarks/evidence/stiffness_fresh_parts.py FOLDER [--parts 0:40]`` after
-``python benchmarks/evidence/stiffness_fresh_references.py FOLDER``, which requires
-NGSolve.  The latter writes the STEP files, and stores the reference K in a JSON file
-with the name of this file.
+First run ``python benchmarks/evidence/stiffness_fresh_references.py FOLDER``, which
+requires NGSolve.  It writes the STEP files, and the reference K to a JSON file with the
+name of this file.  Then run ``python benchmarks/evidence/stiffness_fresh_parts.py
+FOLDER [--parts 0:40]``.
 
-Each part is solved from its STEP file at the default accuracy, as ``forcefit stiffness
-fea`` does.  Printed are unknowns, meshes, the true error with the uncertainty of the
-reference, the estimated error, and its ratio to the true error.  Errors are those of
-the largest entry scaled by sqrt(K_ii K_jj).  A part counts as covered if its estimated
-error is at least the true error minus the uncertainty of the reference.  It counts as
-strictly covered if its estimated error is at least the true error.  A part without a
-mesh is not covered.
+Each part is solved from its STEP file with the default accuracy of ``forcefit stiffness
+fea``.  The program prints the true error with the uncertainty of the reference, the
+estimated error, and other properties.  The error is the largest error of an entry,
+relative to sqrt(K_ii K_jj).
+
+A part is covered if its estimated error is at least the true error minus the
+uncertainty of the reference.  It is strictly covered if its estimated error is at least
+the true error.  A part without a mesh is not covered.
 """
 
 import argparse
@@ -34,7 +35,7 @@ REFERENCES = Path(__file__).with_suffix(".json")
 
 
 def solved(path: Path, known: dict) -> tuple[np.ndarray, float, dict]:
-    """Return K of a STEP file's part, its estimated error [1] and the mesh report."""
+    """Return K of a part in a STEP file, its estimated error, and the mesh report."""
     base, tip = (parse_interface(f"z={z!r}") for z in (0.0, known["length"]))
     materials = [Material(known["young"], known["poisson"])]
     materials += [parse_part("--part", text) for text in known["parts"]]
@@ -43,7 +44,7 @@ def solved(path: Path, known: dict) -> tuple[np.ndarray, float, dict]:
 
 
 def judge(number: int, known: dict, folder: Path) -> tuple[float, float, float]:
-    """Print a row; return the true error, its uncertainty and the estimated error."""
+    """Print and return the true error, its uncertainty and the estimated error."""
     start, truth = time.process_time(), np.array(known["stiffness"])
     head = f"{number:2d} {known['kind']:6} {known['note']:28} {known['poisson']:5.3f}"
     try:

@@ -1,17 +1,17 @@
-"""K_E of the parts of ``stiffness_fresh_parts.py`` by NGSolve, and their STEP files.
+"""Compute K_E of the parts of ``stiffness_fresh_parts.py`` by NGSolve.
 
 ``python benchmarks/evidence/stiffness_fresh_references.py FOLDER [--parts 0:40]``
-(``pip install ngsolve``; nothing else of this package is needed)
+requires NGSolve (``pip install ngsolve``).
 
 Each part is written to FOLDER as a STEP file in millimetres.  K is computed on a half
-or a quarter of the part, by its symmetry.  The mesh consists of curved tetrahedra, with
-layers of prisms along the edges of interfaces and material layers.  The result of the
-higher one of two orders (5; 4 for layers and thin walls) is extrapolated by a fraction
-of its difference from the lower order.  The uncertainty is the larger one of this
-extrapolation and of the difference from a coarser mesh with fewer layers of prisms.
+or a quarter of the part because of its symmetry.  The mesh consists of curved
+tetrahedra, with layers of prisms along the edges of interfaces and material layers.
+The result is extrapolated from two polynomial orders.  Its uncertainty is the change by
+the extrapolation, or the difference from a coarser mesh if that is larger.
+
 Walls with sharp edges and round tubes use the references of
-``stiffness_random_references.py``: bricks and Fourier modes.  Results that the JSON
-file already contains are not computed again.
+``stiffness_random_references.py``.  Results that the JSON file already contains are not
+computed again.
 """
 
 import argparse
@@ -29,12 +29,12 @@ from stiffness_random_references import by_symmetry, independent_stiffness
 from stiffness_references import scaled
 
 REFERENCES = Path(__file__).with_name("stiffness_fresh_parts.json")
-FAR = 1e3  # [mm] farther than any part
-MORE = 0.3  # fraction of the difference that is added
+FAR = 1e3  # [mm] length that exceeds all dimensions
+MORE = 0.3  # [-] fraction of the difference of both orders that is extrapolated
 
 
 def cut_shape(part):
-    """Return a half or a quarter of a part, divided into layers, with named faces."""
+    """Return a half or a quarter of a part with layers and named faces."""
     low = [0 if axis in part.mirrors else -FAR for axis in "xyz"]
     shape = part.solid * block(low, (FAR, FAR, FAR))
     pieces = []
@@ -50,7 +50,7 @@ def cut_shape(part):
 
 
 def solid_names(shape, part):
-    """Return the layer to which each solid belongs, by its centre."""
+    """Return the layer to which each solid belongs."""
     found = []
     for solid in shape.solids:
         center, name = np.array([*solid.center]), "m0"
@@ -92,7 +92,7 @@ def mesh_of(part, factor, rows):
 
 
 def lame(mesh, part):
-    """Return Lame's constants of each material [N/mm^2]."""
+    """Return the Lame constants of each material [N/mm^2]."""
     lam = {f"m{n}": E * nu / ((1 + nu) * (1 - 2 * nu))
            for n, (*_, E, nu) in enumerate(part.layers)}  # fmt: skip
     mu = {f"m{n}": E / (2 * (1 + nu)) for n, (*_, E, nu) in enumerate(part.layers)}
@@ -100,7 +100,7 @@ def lame(mesh, part):
 
 
 def stiffness(part, mesh, order):
-    """Return K at the centre of the tip in N m / rad, N and N / m."""
+    """Return K at the centre of the tip, (6, 6) [N m/rad .. N/m]."""
     mesh.Curve(order)
     tips = [f for f in part.solid.faces if corners_of(f)[0][2] > part.L - EPS]
     center = np.average(
@@ -118,7 +118,7 @@ def reference(part):
         known = SimpleNamespace(**empty | part.simple, nu=part.layers[0][4])
         found = independent_stiffness(known, 1e6 * part.layers[0][3])
         return np.array(found["stiffness"]), found["unsure"]
-    # where an interface ends tangentially at a fillet, the field is that of a crack tip
+    # the stress is singular if an interface ends tangentially at a fillet
     rows = 3 if part.mirrors == "x" else 2
     mesh = mesh_of(part, 1.0, rows)
     low, high = (stiffness(part, mesh, order) for order in part.orders)
@@ -129,7 +129,7 @@ def reference(part):
 
 
 def part_texts(part):
-    """Return the layers after the first in the form of the option ``--part``."""
+    """Return the arguments of the option ``--part`` for all layers except the first."""
     return [f"{'xyz'[axis]}={a / 1e3!r}..{b / 1e3!r}/young={1e6 * E!r},poisson={nu!r}"
             for axis, a, b, E, nu in part.layers[1:]]  # fmt: skip
 

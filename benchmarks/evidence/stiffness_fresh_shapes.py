@@ -1,8 +1,8 @@
-"""Draw the parts of ``stiffness_fresh_parts.py``, by a seed and a number.
+"""Random parts of ``stiffness_fresh_parts.py``.
 
-Four kinds in turn: plates with rounded corners and a filleted step or filleted ribs,
-blocks and rods in layers of two or three materials, shafts with filleted shoulders,
-thin walls.  The shapes are those of the OCC kernel of ``pip install ngsolve``.
+There are four kinds: plates with a filleted step or filleted ribs, blocks and rods with
+layers of two or three materials, shafts with filleted shoulders, and thin walls.  The
+shapes are modelled with the OCC kernel of NGSolve.
 """
 
 from dataclasses import dataclass, field
@@ -13,7 +13,7 @@ from stiffness_part_references import corners_of
 
 SEED = 20261126
 KINDS = ("plate", "layers", "shaft", "thin")
-EPS = 1e-4  # [mm] largest distance between positions that count as equal
+EPS = 1e-4  # [mm] tolerance of equal positions
 
 
 @dataclass
@@ -22,16 +22,16 @@ class Part:
 
     Attributes:
         note: description of the part for the table.
-        solid: the whole shape; base at z = 0.
+        solid: shape with its base at z = 0.
         L: [mm] position of the tip along z.
         mirrors: axes that are normal to a plane of symmetry of the part.
         size: [mm] size of elements along the edges, about the smallest thickness.
-        maxh: [mm] size of elements elsewhere.
-        layers: (axis, from, to, Young's modulus, Poisson's ratio); one without an axis
-            is the whole part.
-        simple: [m] ``planes`` and ``full`` bricks or ``profile`` of a part for
-            ``stiffness_random_references.independent_stiffness``.
-        orders: orders of the polynomials of the reference solution.
+        maxh: [mm] size of all other elements.
+        layers: (axis, from, to, Young's modulus, Poisson's ratio) of each layer.  A
+            layer without an axis is the whole part.
+        simple: [m] geometry for ``stiffness_random_references.independent_stiffness``,
+            if it can be used.
+        orders: polynomial orders of the reference solution.
     """
 
     note: str
@@ -46,17 +46,17 @@ class Part:
 
 
 def between(rng, low, high):
-    """Return a number with a uniform logarithm, rounded to three digits."""
+    """Return a random number with a uniformly distributed logarithm."""
     return float(f"{np.exp(rng.uniform(np.log(low), np.log(high))):.3g}")
 
 
 def block(low, high):
-    """Return the box between two corners."""
+    """Return a box between two corners."""
     return Box(Pnt(*low), Pnt(*high))
 
 
 def rounded(solid, radius, chosen):
-    """Return a solid with fillets on the edges that ``chosen`` selects by corners."""
+    """Return a solid with fillets on selected edges."""
     return solid.MakeFillet([e for e in solid.edges if chosen(*corners_of(e))], radius)
 
 
@@ -67,7 +67,7 @@ def along(axis, low, high):
 
 
 def plate(rng):
-    """Return a plate with rounded corners and a step across it or one or two ribs."""
+    """Return a plate with rounded corners, and with a step or with ribs."""
     L = between(rng, 60, 140)
     W = L * between(rng, 0.3, 0.8)
     T = W * between(rng, 0.07, 0.16)
@@ -79,7 +79,7 @@ def plate(rng):
     def corners(low, high):
         return along(1, low, high) and (low[2] < EPS or low[2] > L - EPS)
 
-    count = int(rng.integers(3))  # number of ribs; a plate without ribs has a step
+    count = int(rng.integers(3))  # number of ribs, or 0 for a step
     if count == 0:
         step = L * float(rng.uniform(0.3, 0.6))
         body = body + block((-W / 2, 0, 0), (W / 2, T + height, step))
@@ -104,7 +104,7 @@ def plate(rng):
 
 
 def layers(rng):
-    """Return a block or rod in layers across z, or a sandwich with a core along z."""
+    """Return a block or rod with layers normal to z, or a sandwich along z."""
     L = between(rng, 25, 60)
     W = L * between(rng, 0.4, 1.1)
     D = W * between(rng, 0.6, 1)
@@ -130,7 +130,7 @@ def layers(rng):
 
 
 def shaft(rng):
-    """Return a shaft with one or two filleted shoulders; some shafts have a bore."""
+    """Return a shaft with one or two filleted shoulders, with or without a bore."""
     r = between(rng, 8, 20)
     L = r * between(rng, 3.5, 9)
     radii = [r, r * float(rng.uniform(0.55, 0.85))]

@@ -1,11 +1,14 @@
-"""Compare K_C of three robots by every method.
+"""Compare K_C of three robots by several methods.
 
 ``python -m benchmarks.evidence.stiffness_methods`` prints 1 / C_ii along each axis at
-the platform's origin, and the difference of each method from the first (entries over
-sqrt(C_ii C_jj)).  The methods are: virtual joints; the same compiled; the displacement
-method over all bodies; the tangent of the exact equilibrium; differences of the minimum
-energy (22); load steps in Exudyn with links as springs and as beams; and Exudyn's
-linearised system.
+the platform's origin, and the difference of each method from the first, relative to
+sqrt(C_ii C_jj).  The methods are
+
+- the virtual-joint model, by the reference method and by the compiled method;
+- the displacement method with the displacements of all bodies as unknowns;
+- the tangent stiffness of the exact equilibrium;
+- finite differences of problem (22);
+- load steps and the linearised system of Exudyn, with links as springs and as beams.
 """
 
 from collections.abc import Iterator
@@ -27,7 +30,7 @@ POSES = {"irsbot2": {"tx": 0.1, "tz": -0.5}, "hexapod": None, "orthoglide": None
 
 
 def methods(posture: Posture) -> dict[str, NDArray]:
-    """Return the (6, 6) [rad/(N m) .. m/N] compliance by each method."""
+    """Return the compliance by each method, (6, 6) [rad/(N m) .. m/N]."""
     robot = posture.robot
     frames = tuple(replace(f, clearance=None) for f in robot.frames)
     tight = replace(robot, frames=frames).with_errors(0 * robot.errors)
@@ -44,7 +47,7 @@ def methods(posture: Posture) -> dict[str, NDArray]:
 
 
 def by_simulation(posture: Posture) -> Iterator[tuple[str, NDArray]]:
-    """Yield the results of both simulation methods, with links as springs and beams."""
+    """Yield the results of both methods of simulation for both models of the links."""
     for links in ("spring", "beam"):
         answer = simulated_tangent(posture, link_models(posture.robot, links))
         yield f"load steps, {links}s", answer.stepped

@@ -1,16 +1,14 @@
-"""Compute K_E of the L-bracket and the forked link from a half and an eighth of them.
+"""Compute K_E of the L-bracket and of the link with forks by NGSolve.
 
-``python benchmarks/evidence/stiffness_part_references.py [link ...]`` (``pip install
-ngsolve``)
+``python benchmarks/evidence/stiffness_part_references.py [link ...]`` requires NGSolve
+(``pip install ngsolve``).
 
-Mirror symmetry divides the six motions of the tip into groups that are symmetric or
-antisymmetric about each plane, so that a part of the solid is sufficient.  A half of
-the bracket is meshed by bricks that become geometrically smaller toward clamped and
-re-entrant edges.  An eighth of the link with forks is meshed by curved tetrahedra with
-layers of prisms along these edges.  The order of the polynomials is increased.  K of
-the highest order, and its difference from the previous order, are written to
-``stiffness_references.json``.  The program shares no code with forcefit's elements or
-estimates.
+Because of symmetry, a half of the bracket and an eighth of the link with forks are
+sufficient.  The bracket has bricks whose size decreases towards clamped and re-entrant
+edges.  The link with forks has curved tetrahedra, with layers of prisms along these
+edges.  The polynomial order is increased.  K of the highest order and its difference
+from the previous order are written to ``stiffness_references.json``.  The program does
+not use the finite elements of forcefit.
 """
 
 import argparse
@@ -23,28 +21,29 @@ import numpy as np
 from netgen.occ import Box, OCCGeometry, Pnt
 from stiffness_references import HERE, LAM, MU, L, bar, fork, scaled
 
-PLANES = {"x": "x0", "y": "y0", "z": "z0"}  # names of the cuts
+PLANES = {"x": "x0", "y": "y0", "z": "z0"}  # names of the faces at symmetry planes
 SHRINK, EPS = 0.15, 1e-9
 
 
 def mode_stiffness(mesh, order, even, motions, held="", lame=(LAM, MU)):
-    """Return the energies of tip motions that are even or odd about each cut.
+    """Return the stiffness for tip motions that are even or odd about each plane.
 
     Args:
-        mesh: mesh of the part, with faces named tip, x0, y0, z0; one may be held.
-        order: order of the polynomials.
+        mesh: mesh of the part, with faces named tip, x0, y0 and z0.
+        order: polynomial order.
         even: (x, y, z) whether the motions are symmetric about the plane.
         motions: motions of the tip.
         held: name of a face that is fixed.
-        lame: Lame's constants [Pa].
+        lame: Lame constants [Pa].
 
     Returns:
-        Work of the forces of each field on every other field, and number of unknowns.
+        Work of the forces due to each motion on each other motion, and number of
+        unknowns.
     """
     (lam, mu), fixed = lame, {c: ["tip", held] if held else ["tip"] for c in "xyz"}
     for cut, same in zip("xyz", even, strict=True):
         for c in "xyz":
-            # even: no motion normal to the cut; odd: no motion along the cut
+            # motions normal to a cut are zero if even, and motions along it if odd
             if (c == cut) == same:
                 fixed[c].append(PLANES[cut])
     x, y, z = ("|".join(fixed[c]) for c in "xyz")
@@ -86,12 +85,12 @@ def unit_screws(center):
 
 
 def toward(a, b, layers):
-    """Return positions from a to b that become geometrically closer toward a."""
+    """Return positions from a to b whose spacing decreases towards a."""
     return [a] + [a + (b - a) * SHRINK**k for k in range(layers, -1, -1)]
 
 
 def half_bracket(layers):
-    """Return the bricks of the L in ``meshes/make.py``."""
+    """Return a mesh of bricks of half the L-bracket in ``meshes/make.py``."""
     across = [*toward(-0.02, 0, layers), *toward(0.02, 0, layers)[-2::-1]]
     arm = toward(0.02, 0.05, layers)[1:] + [0.085, *toward(0.15, 0.12, layers)[::-1]]
     leg = toward(0, 0.03, layers) + [0.075, 0.12, *toward(0.18, 0.15, layers)[::-1]]
@@ -101,7 +100,7 @@ def half_bracket(layers):
 
 
 def brick_mesh(x, y, z, empty):
-    """Return hexahedra between positions along the axes, except empty ones (i, k)."""
+    """Return a mesh of bricks between given positions, without empty bricks."""
     mesh = netgen.Mesh()
     mesh.dim = 3
     for n, name in enumerate(("base", "tip", "y0", "side"), start=1):
@@ -142,11 +141,11 @@ def brick_mesh(x, y, z, empty):
 
 
 def bracket(order, layers):
-    """Return K_E of the L-bracket and the unknowns of the largest system."""
+    """Return K_E of the L-bracket, and the largest number of unknowns."""
     mesh, motions = half_bracket(layers), unit_screws((0.15, 0, 0.2))
     K = np.zeros((6, 6))
     for even, group in ((True, [1, 3, 5]), (False, [0, 2, 4])):
-        # There are no cuts across x and z.
+        # there are no symmetry planes normal to x and z
         work, unknowns = mode_stiffness(
             mesh, order, (True, even, True), [motions[i] for i in group], "base"
         )
@@ -158,7 +157,7 @@ def bracket(order, layers):
 
 
 def eighth_of_forks(layers, finer):
-    """Return the base fork and half of the tube, with prisms along singular edges."""
+    """Return a mesh of an eighth of the link with forks."""
     tube = bar(0.040, 0.060, L / 2) - bar(0.034, 0, L)
     solid = (fork() + tube) * Box(Pnt(0, 0, -0.1), Pnt(0.1, 0.1, L / 2))
     solid.faces.name = "side"
@@ -188,17 +187,16 @@ def eighth_of_forks(layers, finer):
 
 
 def corners_of(shape):
-    """Return the lowest and highest corner of the bounding box of a shape."""
+    """Return two opposite corners of the bounding box of a shape."""
     low, high = shape.bounding_box
     return [np.array([p[0], p[1], p[2]]) for p in (low, high)]
 
 
 def forks(order, layers, finer=1.5):
-    """Return K_E of the link with forks, and the unknowns of the largest system.
+    """Return K_E of the link with forks, and the largest number of unknowns.
 
-    Relative to the middle of the link, the base moves by minus half a unit screw and
-    the tip by plus half of it.  The six motions have different symmetries, so that K is
-    diagonal at the middle.
+    The base and the tip move by half a unit screw in opposite directions.  K is
+    diagonal at the middle of the link because of symmetry.
     """
     mesh = eighth_of_forks(layers, finer)
     mesh.Curve(order)
@@ -216,8 +214,7 @@ def forks(order, layers, finer=1.5):
     for i, even in enumerate(evens):
         work, unknowns = mode_stiffness(mesh, order, even, [motions[i]])
         middle[i] = 8 / 4 * work[0, 0]
-    # a screw of the tip is read at the middle, where rotations about x and y add a
-    # translation
+    # transforms screws of the tip to the middle of the link
     A = np.eye(6)
     A[3, 1], A[4, 0] = -L / 2, L / 2
     return A.T @ np.diag(middle) @ A, unknowns

@@ -1,19 +1,20 @@
 """Evaluate the error estimate of K_E on random parts, compared with other solvers.
 
 ``python benchmarks/evidence/stiffness_random_parts.py [--set test] [--parts 0:33]``
-(``pip install ngsolve`` for parts whose reference is not in the JSON file of this name)
+requires NGSolve (``pip install ngsolve``) for parts without a stored reference.
 
-Eleven kinds of parts alternate: plate, bar, box, channel, L-bracket, fork, rod, tube,
-cone, stepped rod, and an eye with a bore.  They are thin and thick, slender and stubby,
-with nu from 0 to 0.45.  The seed of the set and the number of the part determine all
-dimensions.  Each part is solved at the default accuracy, as ``forcefit stiffness fea``
-does, and compared with K of ``stiffness_random_references.py``.  Printed are unknowns,
-meshes, true error with the uncertainty of the reference, estimated error, effectivity
-(estimated / true), and the true error of the mesh's K.  All are largest entries scaled
-by sqrt(K_ii K_jj).  Their distributions and means follow.  A part counts as covered if
-the estimated error is at least the true error.  References and results are stored in
-JSON files, so that an interrupted run continues.  Delete the results file after a code
-change.
+There are eleven kinds of parts: plate, bar, box, channel, L-bracket, fork, rod, tube,
+cone, stepped rod, and eye with a bore.  Poisson's ratio is between 0 and 0.45.  Each
+part is solved with the default accuracy of ``forcefit stiffness fea`` and compared with
+the K of ``stiffness_random_references.py``.
+
+For each part, the program prints the true error with the uncertainty of the reference,
+the estimated error, and their ratio (effectivity).  Errors are the largest errors of an
+entry, relative to sqrt(K_ii K_jj).  A part is covered if the estimated error is at
+least the true error.
+
+References and results are stored in JSON files, so that an interrupted run can be
+continued.  Delete the file of results after a change of the code.
 """
 
 import argparse
@@ -31,8 +32,8 @@ from forcefit.stiffness.link import scaled
 from forcefit.stiffness.surface.interface import parse_interface
 from forcefit.stiffness.surface.surface import Surface, check_surface
 
-YOUNG = 60e9  # [Pa]; errors do not depend on it
-# seed of each set of parts; the factors of the error estimate were fitted to "training"
+YOUNG = 60e9  # [Pa] Young's modulus
+# seed of each set of parts; the error estimate was calibrated with the set "training"
 SEEDS = {"training": 1, "test": 2, "middle": 1142}
 KINDS = ("plate", "bar", "box", "channel", "bracket", "fork",
          "rod", "tube", "cone", "stepped", "eye")  # fmt: skip
@@ -42,17 +43,17 @@ REFERENCES = Path(__file__).with_suffix(".json")
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """A part that consists of bricks, a body of revolution, or a bar with a bore.
+    """Part that consists of bricks, body of revolution, or bar with a bore.
 
     Attributes:
         kind: one of ``KINDS``.
         nu: [-] Poisson's ratio.
-        base: text of the held interface.
-        tip: text of the interface that moves.
-        planes: [m] positions along x, y, z of the faces of the bricks.
-        full: (nx, ny, nz) bool, True for a brick that is filled with material.
-        profile: (k, 2) [m] r and z of the corners of a half section.
-        eye: [m] width, thickness, length up to the bore's axis, radius of the bore.
+        base: definition of the fixed interface.
+        tip: definition of the moving interface.
+        planes: [m] positions of the faces of bricks along x, y and z.
+        full: (nx, ny, nz) bool, True for bricks that belong to the part.
+        profile: (k, 2) [m] coordinates r and z of the corners of a half section.
+        eye: [m] width, thickness, length to the axis of the bore, radius of the bore.
     """
 
     kind: str
@@ -106,7 +107,7 @@ def draw_part(seed: int, number: int) -> Part:
 
 
 def between(rng: np.random.Generator, low: float, high: float) -> float:
-    """Return a random number whose logarithm is uniformly distributed."""
+    """Return a random number with a uniformly distributed logarithm."""
     return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
 
@@ -123,14 +124,14 @@ def plate(rng: np.random.Generator, L: float) -> tuple:
 
 
 def bar(rng: np.random.Generator, L: float) -> tuple:
-    """Return a bar of rectangular section, from stubby to slender."""
+    """Return a bar with a rectangular section."""
     W = L / between(rng, 1.5, 12)
     T = W * between(rng, 0.3, 1)
     return (symmetric(W / 2), symmetric(T / 2), [0, L]), [[[1]]]
 
 
 def box(rng: np.random.Generator, L: float) -> tuple:
-    """Return a bar of hollow rectangular section."""
+    """Return a bar with a hollow rectangular section."""
     W = L / between(rng, 2, 8)
     H = W * between(rng, 0.5, 1)
     t = H * between(rng, 0.07, 0.25)
@@ -139,7 +140,7 @@ def box(rng: np.random.Generator, L: float) -> tuple:
 
 
 def channel(rng: np.random.Generator, L: float) -> tuple:
-    """Return a channel with its web at the smallest x and two flanges."""
+    """Return a channel with a web at the smallest x and two flanges."""
     H = L / between(rng, 2, 7)
     W = H * between(rng, 0.4, 0.9)
     t = H * between(rng, 0.08, 0.2)
@@ -148,7 +149,7 @@ def channel(rng: np.random.Generator, L: float) -> tuple:
 
 
 def fork(rng: np.random.Generator, L: float) -> tuple:
-    """Return a block with two prongs; the ends of the prongs are the tip."""
+    """Return a block with two prongs, whose ends are the tip."""
     W = L / between(rng, 1, 4)
     w, T = W * between(rng, 0.1, 0.35), W * between(rng, 0.15, 1)
     block = L * between(rng, 0.15, 0.6)
@@ -157,7 +158,7 @@ def fork(rng: np.random.Generator, L: float) -> tuple:
 
 
 def bracket(rng: np.random.Generator, L: float) -> tuple:
-    """Return an L-bracket of two perpendicular arms of equal thickness."""
+    """Return an L-bracket whose arms have equal thickness."""
     t = L * between(rng, 0.07, 0.35)
     D = t * between(rng, 0.5, 4)
     arm = t + (L - t) * between(rng, 0.4, 1)
@@ -166,7 +167,7 @@ def bracket(rng: np.random.Generator, L: float) -> tuple:
 
 
 def surface_of(part: Part) -> Surface:
-    """Return the surface of a part; curved sides consist of plane facets.
+    """Return the triangulated surface of a part.
 
     Args:
         part: part of any kind.
@@ -187,7 +188,7 @@ def surface_of(part: Part) -> Surface:
 def brick_surface(
     planes: tuple[list[float], ...], full: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Return the faces between full and empty bricks, each as two triangles."""
+    """Return the faces between full and empty bricks as triangles."""
     counts = [len(p) for p in planes]
     points = np.stack(np.meshgrid(*planes, indexing="ij"), axis=-1).reshape(-1, 3)
     around = np.pad(full, 1)
@@ -208,7 +209,7 @@ def brick_surface(
 
 
 def revolved(profile: tuple[tuple[float, float], ...]) -> tuple[NDArray, NDArray]:
-    """Return the surface that a half section describes when it turns about z."""
+    """Return the surface of revolution of a half section about z."""
     angle = 2 * np.pi * np.arange(FACETS) / FACETS
     rings, points = [], []
     for r, z in profile:
@@ -226,16 +227,16 @@ def revolved(profile: tuple[tuple[float, float], ...]) -> tuple[NDArray, NDArray
 
 
 def eye_surface(W: float, T: float, L: float, r: float) -> tuple[NDArray, NDArray]:
-    """Return a bar with a half-round end about a bore along y."""
+    """Return the surface of a bar with a round end and a bore along y."""
     angle = 2 * np.pi * np.arange(FACETS) / FACETS
     hole = r * np.column_stack([np.cos(angle), np.sin(angle)])
     rim = W / 2 * np.column_stack([np.cos(angle), np.sin(angle)])
-    # below the bore's axis, the outline consists of the sides and the end of the bar
+    # below the bore, the outline consists of the sides and the end of the bar
     low = np.arange(FACETS) > FACETS // 2
     way = np.minimum(W / 2 / np.maximum(np.abs(hole[:, 0] / r), 1e-9),
                      L / np.maximum(np.abs(hole[:, 1] / r), 1e-9))  # fmt: skip
     rim[low] = hole[low] / r * way[low, None]
-    for x in (-1, 1):  # the nearest points become the corners of the bar's end
+    for x in (-1, 1):  # move the nearest points to the corners of the bar
         corner = np.array([x * W / 2, -L])
         toward = (hole / r) @ corner
         rim[np.where(low, toward, -np.inf).argmax()] = corner
@@ -254,7 +255,7 @@ def eye_surface(W: float, T: float, L: float, r: float) -> tuple[NDArray, NDArra
 
 
 def answer(part: Part) -> dict:
-    """Return K of the command ``stiffness fea`` and its error estimates."""
+    """Return K by the command ``stiffness fea``, and its error estimates."""
     start = time.process_time()
     faces = [parse_interface(text) for text in (part.base, part.tip)]
     solved = solve_link(surface_of(part), *faces, [Material(YOUNG, part.nu)])
@@ -270,7 +271,7 @@ def answer(part: Part) -> dict:
 
 
 def kept(path: Path, key: str, make) -> dict:
-    """Return the value that a JSON file stores under a key; compute it if absent."""
+    """Return a value stored in a JSON file, or compute and store it."""
     stored = json.loads(path.read_text()) if path.exists() else {}
     if key not in stored:
         made = make()
@@ -281,7 +282,7 @@ def kept(path: Path, key: str, make) -> dict:
 
 
 def reference(part: Part) -> dict:
-    """Return K by another solver, and the uncertainty of this K."""
+    """Return K by another solver, and its uncertainty."""
     from stiffness_random_references import independent_stiffness
 
     return independent_stiffness(part, YOUNG)
@@ -290,7 +291,7 @@ def reference(part: Part) -> dict:
 def judge(
     name: str, number: int, references: Path, answers: Path
 ) -> tuple[float, float, float]:
-    """Print a row of one part: effectivity, true error, true error of the mesh's K."""
+    """Print a row of the table for a part."""
     part = draw_part(SEEDS[name], number)
     known = kept(references, f"{name}-{number}", lambda: reference(part))
     kept_rows = kept(answers, f"{name}-{number}",

@@ -1,12 +1,11 @@
 """Compute K_E of the parts of ``stiffness_random_parts.py`` by NGSolve.
 
-Bodies of revolution are solved by Fourier modes in their half section, with polynomials
-of order 8.  Parts that consist of bricks are meshed by bricks that become geometrically
-smaller toward every edge.  Their symmetry allows the program to solve a half or a
-quarter of them, with orders 3 and 4 or 4 and 5.  A quarter of the eye is meshed by
-curved tetrahedra, with layers of prisms along the edges of its interfaces, and solved
-with orders 3 and 4.  The program shares no code with forcefit's elements, meshes or
-error estimates.
+Bodies of revolution are solved by Fourier modes in their half section, with polynomial
+order 8.  Parts that consist of bricks have a mesh of bricks whose size decreases
+towards each edge.  Because of symmetry, a half or a quarter of them is sufficient.  A
+quarter of the eye has a mesh of curved tetrahedra, with layers of prisms along the
+edges of its interfaces.  The program does not use the finite elements, meshes and error
+estimates of forcefit.
 """
 
 import netgen.meshing as netgen
@@ -19,22 +18,21 @@ from stiffness_round_references import AXIS, BASE, FREE, TIP, half_section
 from stiffness_round_references import stiffness as round_stiffness
 
 SHRINK = 0.15
-MOST = 50e3  # largest number of unknowns at the highest order
-# for each motion RX .. TZ about a point of the z axis: whether it equals its mirror
-# image in x = 0 and in y = 0
+MOST = 50e3  # maximum number of unknowns
+# whether the motions RX .. TZ are symmetric about the planes x = 0 and y = 0
 EVEN = {"x": (1, 0, 0, 0, 1, 1), "y": (0, 1, 0, 1, 0, 1)}
 
 
 def independent_stiffness(part, young):
-    """Return K_E of a part at the centre of its tip; the base is held.
+    """Return K_E of a part at the centre of its tip, with a fixed base.
 
     Args:
         part: part of ``stiffness_random_parts``.
         young: [Pa] Young's modulus.
 
     Returns:
-        ``stiffness`` (6, 6), extrapolated by the change of the last order, and its
-        uncertainty ``unsure`` [1], the total of this extrapolation.
+        ``stiffness`` (6, 6), extrapolated from the last two orders, and its relative
+        uncertainty ``unsure``.
     """
     nu = part.nu
     lame = young * nu / ((1 + nu) * (1 - 2 * nu)), young / (2 * (1 + nu))
@@ -50,7 +48,7 @@ def independent_stiffness(part, young):
 
 
 def round_part(part, lame):
-    """Return K_E of a body of revolution from modes 0 and 1, with orders 6 and 8."""
+    """Return K_E of a body of revolution from the Fourier modes 0 and 1."""
     corners = list(part.profile)
     L = max(z for _, z in corners)
     kinds = []
@@ -66,16 +64,15 @@ def round_part(part, lame):
 
 
 def bricks(part, lame):
-    """Return K_E of a part of bricks from its half y > 0, or a quarter if symmetric."""
+    """Return K_E of a part of bricks from a half or a quarter of it."""
     x, y, z = part.planes
     mirrors = "xy" if np.allclose(x, -np.array(x[::-1])) else "y"
     thin = min(np.diff(p).min() for p in part.planes)
-    # slender arms are divided into pieces that are not much longer than their width
+    # slender arms are divided into elements of limited length
     arm = x[1] - x[0]
     wide = max(arm if part.kind == "fork" else x[-1] - x[0], y[-1] - y[0])
     wide = 2 * arm if part.kind == "bracket" else wide
-    # The re-entrant edge of a bracket governs its K, so an additional layer is used
-    # there.
+    # an additional layer of elements is used at the re-entrant edge of a bracket
     least = 2 if part.kind == "bracket" else 1
     lines, kept = [], part.full
     for axis, places in zip("xyz", part.planes, strict=True):
@@ -100,12 +97,12 @@ def bricks(part, lame):
 
 
 def graded(places, thin, wide, cut, least):
-    """Return positions graded toward each plane, and their number in each gap."""
+    """Return positions whose spacing decreases towards each plane, and their counts."""
     found, counts = [places[0]], []
     for k, (a, b) in enumerate(zip(places, places[1:], strict=False)):
         whole = cut and k == 0  # the fields are smooth at the cut
         size = (b - a) / (1 if whole else 2)
-        # layers at free edges decay as exp(-pi s / thin), and need several cells each
+        # edge effects decay as exp(-pi s / thin) and require several elements
         layers = max(least, round(np.log(size / (SHRINK * thin)) / np.log(4)))
         ends = [size * (0.25 if layers > 2 else SHRINK) ** n
                 for n in range(layers, 0, -1)]  # fmt: skip
@@ -121,7 +118,7 @@ def graded(places, thin, wide, cut, least):
 
 
 def center_of_tip(part):
-    """Return the centroid of the faces of full bricks at the largest z."""
+    """Return the centroid of the end face at the largest z."""
     x, y, z = (np.array(p) for p in part.planes)
     area = np.outer(np.diff(x), np.diff(y)) * part.full[:, :, -1]
     middle = (x[1:] + x[:-1]) / 2
@@ -129,7 +126,7 @@ def center_of_tip(part):
 
 
 def brick_mesh(places, full, axis, mirrors):
-    """Return a mesh of hexahedra; the base is at z = 0, the tip at an axis' end."""
+    """Return a mesh of bricks with named faces at the base and the tip."""
     mesh = netgen.Mesh()
     mesh.dim = 3
     names = ["base", "tip", "x0", "y0", "side"]
@@ -171,7 +168,7 @@ def brick_mesh(places, full, axis, mirrors):
 
 
 def by_symmetry(mesh, order, mirrors, tip, lame):
-    """Return K from motions that are even or odd about each plane of symmetry."""
+    """Return K, computed separately for even and odd motions about symmetry planes."""
     (lam, mu), space = lame, ng.VectorH1(mesh, order=order)
     u, v = space.TnT()
     e, f = ng.Sym(ng.Grad(u)), ng.Sym(ng.Grad(v))
@@ -198,11 +195,11 @@ def by_symmetry(mesh, order, mirrors, tip, lame):
 
 
 def free_unknowns(mesh, order, mirrors, kind):
-    """Return the unknowns that neither an interface nor a symmetry plane holds."""
+    """Return the unknowns that are not fixed at an interface or a symmetry plane."""
     held = {c: ["base", "tip"] for c in "xyz"}
     for cut, even in zip(mirrors, kind, strict=True):
         for c in "xyz":
-            # even: no motion normal to the cut; odd: no motion along the cut
+            # motions normal to a cut are zero if even, and motions along it if odd
             if (c == cut) == bool(even):
                 held[c].append(f"{cut}0")
     names = {f"dirichlet{c}": "|".join(held[c]) for c in "xyz"}
@@ -210,7 +207,7 @@ def free_unknowns(mesh, order, mirrors, kind):
 
 
 def eye(part, lame):
-    """Return K_E of the eye from its quarter x > 0, y > 0."""
+    """Return K_E of an eye from a quarter of it."""
     W, T, L, r = part.eye
     solid = Box(Pnt(0, 0, 0), Pnt(W / 2, T / 2, L)) + Cylinder(
         Pnt(0, 0, L), Y, W / 2, T / 2

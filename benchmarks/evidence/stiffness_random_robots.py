@@ -2,33 +2,27 @@
 
 ``python -m benchmarks.evidence.stiffness_random_robots``
 
-The program draws 100 random robots that can move, with one to three legs, clearances,
-errors and loads.  Each robot is evaluated at home and at two other poses that its
-drives reach.  The built-in robots follow; those that cannot move are evaluated at three
-sizes of their errors.  ``--seed 10000 --robots 100`` draws other robots.  The
-comparisons are:
+There are 100 random robots with one to three legs, clearances, errors and loads.  Each
+robot is evaluated in its home pose and at two other poses.  The built-in robots follow.
+``--seed 10000 --robots 100`` selects other random robots.  The comparisons are:
 
 - the exact tangent with finite differences of the exact equilibrium;
-- the classical matrix with the minimum energy (22) without clearances, with the
-  compiled matrix, and with Exudyn (links as springs; load steps, and its linearised
-  system);
-- the exact tangent with errors and a load with Exudyn's linearised system.
+- the classical matrix with problem (22) without clearances, with the compiled method,
+  and with Exudyn (load steps, and the linearised system);
+- the exact tangent with errors and a load with the linearised system of Exudyn.
 
-For each robot, the program prints the differences of the matrices, as entries over
+For each robot, the program prints the differences of the matrices, relative to
 sqrt(C_ii C_jj), or the reason why there is no matrix.
 
-The finite differences are extrapolated from several steps of the load.  The result that
-differs least from its neighbours is used: small steps suffer from the rounding of
-positions (1e-14 m), and large steps change the contacts or have no equilibrium.  The
-compared tangent does not influence this choice.
+The finite differences are extrapolated from several steps of the load.  Small steps
+have large round-off errors, and large steps change the contacts.  The result that
+differs least from the results of adjacent steps is used.
 
-For the comparison under load, a joint that is locked about some axes and elastic about
-others becomes elastic about all axes, with a stiffness of 1e8 about the locked ones.
-The reason is that large rotations of such a joint are not defined uniquely (see
+For the comparison under load, the locked rotations of an elastic joint have a stiffness
+of 1e8, because large rotations of such a joint are not defined uniquely (see
 ``forcefit.validation.crosscheck.stiffness_check``).  The load moves the platform by
-0.03 rad or 0.03 reference lengths, or by a tenth or a hundredth of this if there is no
-equilibrium.  If the two programs find different equilibria, the program prints this and
-compares nothing.
+0.03 rad or 0.03 reference lengths, or less if there is no equilibrium.  If both
+programs find different equilibria, they are not compared.
 """
 
 import argparse
@@ -63,19 +57,19 @@ from forcefit.validation.multibody.tangent import simulated_tangent
 from tests.robots_for_tests import random_robot
 
 SIZES = (0.1, 0.3, 1.0)
-LEGS = {1: 3, 2: 6, 3: 7}  # joints of each leg, so that loops can move
-TIME_LIMIT = 20.0  # [s] of one simulation
-ERRORS = np.repeat([1e-3, 1e-4], 3)  # [rad, m] of the built-in robots
-_FAR, _MOVED = 0.1, 1e-3  # [rad or m] of drives; what counts as another pose
-_SIZE = np.repeat([1.0, 20.0], 3)  # [N m, N] of loads
-# steps of the load, relative to its size; contacts may change within 1e-3 of it
-_STEPS = 0.5 * 0.2 ** np.arange(8)
-_MOVES = 0.03  # [rad or reference lengths] of a loaded platform
-_STIFF = 1e8  # [N m/rad, N/m]
+LEGS = {1: 3, 2: 6, 3: 7}  # number of joints in each leg, by number of legs
+TIME_LIMIT = 20.0  # [s] time limit of a simulation
+ERRORS = np.repeat([1e-3, 1e-4], 3)  # [rad, m] largest errors of the built-in robots
+# [rad or m] largest motion of drives, and smallest motion to another pose
+_FAR, _MOVED = 0.1, 1e-3
+_SIZE = np.repeat([1.0, 20.0], 3)  # [N m, N] standard deviation of loads
+_STEPS = 0.5 * 0.2 ** np.arange(8)  # [-] steps of the load, relative to the load
+_MOVES = 0.03  # [rad or reference lengths] motion of the platform under load
+_STIFF = 1e8  # [N m/rad, N/m] stiffness of locked rotations
 
 
 def relative(C: NDArray, other: NDArray) -> float:
-    """Return the largest difference of finite entries over sqrt(C_ii C_jj)."""
+    """Return the largest difference of finite entries, relative to sqrt(C_ii C_jj)."""
     size = np.sqrt(np.abs(np.diag(C)))
     with np.errstate(divide="ignore", invalid="ignore"):
         off = np.abs(C - other) / np.outer(size, size)
@@ -83,7 +77,7 @@ def relative(C: NDArray, other: NDArray) -> float:
 
 
 def limit(steps: list[float], slopes: list[NDArray]) -> NDArray:
-    """Return (6,) central differences, extrapolated to a step of zero."""
+    """Return central differences, extrapolated to a step of zero, (6,)."""
     better = without_squares(steps, slopes)
     # rotations and translations of a column are scaled separately
     size = np.abs(better).max(axis=0) + 1e-300
@@ -91,7 +85,7 @@ def limit(steps: list[float], slopes: list[NDArray]) -> NDArray:
 
 
 def carried(posture: Posture, load: NDArray) -> tuple[ExactAssembly, float]:
-    """Return the equilibrium under a load, or under a tenth or hundredth of it."""
+    """Return the equilibrium under a load, which is reduced if none is found."""
     for share in (1.0, 0.1):
         try:
             return solve_exact(posture, share * load), share
@@ -101,7 +95,7 @@ def carried(posture: Posture, load: NDArray) -> tuple[ExactAssembly, float]:
 
 
 def slope_by(equilibrium: ExactAssembly, unit: NDArray) -> NDArray:
-    """Return the (6,) derivative by a load, from differences with decreasing steps."""
+    """Return the derivative by a load from differences with several steps, (6,)."""
     steps, slopes = list[float](), list[NDArray]()
     for step in _STEPS:
         try:
@@ -113,7 +107,7 @@ def slope_by(equilibrium: ExactAssembly, unit: NDArray) -> NDArray:
                 for sign in (1, -1)
             )  # fmt: skip
         except SolverFailed:
-            # under a large step of the load there may be no equilibrium
+            # there may be no equilibrium for a large step
             if step <= _STEPS[-3]:
                 raise
             steps.clear()
@@ -150,7 +144,7 @@ def by_differences(posture: Posture, load: NDArray) -> tuple[float, str]:
 
 
 def by_least_energy(posture: Posture) -> float:
-    """Compare the classical matrix with (22) without clearances and errors."""
+    """Compare the classical matrix with problem (22), without clearances and errors."""
     robot = posture.robot
     frames = tuple(replace(f, clearance=None) for f in robot.frames)
     tight = replace(robot, frames=frames).with_errors(np.zeros_like(robot.errors))
@@ -185,7 +179,7 @@ def by_simulation(posture: Posture) -> tuple[dict[str, float], str]:
 
 
 def loaded_by_simulation(posture: Posture, load: NDArray) -> tuple[float, str]:
-    """Compare the exact tangent under errors and a load with Exudyn's linear system."""
+    """Compare the exact tangent under a load with the linearised system of Exudyn."""
     robot = replace(posture.robot, frames=tuple(map(all_elastic, posture.robot.frames)))
     posture = replace(posture, robot=unplayed(robot))
     classical = without_clearance(posture)
@@ -225,7 +219,7 @@ def loaded_by_simulation(posture: Posture, load: NDArray) -> tuple[float, str]:
 def stands_elsewhere(
     posture: Posture, length: float, screw: NDArray, platform: NDArray
 ) -> bool:
-    """Return whether two platform poses differ by a tenth of the motion."""
+    """Return whether two platform poses differ by more than a tenth of the motion."""
     nominal = posture.platform
     turn = rotation_vector(platform[:3, :3] @ nominal[:3, :3].T)
     other = np.concatenate([turn, platform[:3, 3] - nominal[:3, 3]])
@@ -235,7 +229,7 @@ def stands_elsewhere(
 
 
 def all_elastic(frame: Frame) -> Frame:
-    """Return the frame; a joint elastic about some axes becomes stiff about others."""
+    """Return a frame with a large finite stiffness instead of locked directions."""
     if frame.springs is None:
         return frame
     K = np.diag(frame.springs).copy()
@@ -246,7 +240,7 @@ def all_elastic(frame: Frame) -> Frame:
 
 
 def moved_postures(robot: Robot, rng: np.random.Generator) -> list[Posture]:
-    """Return home and at most two other postures that the drives reach."""
+    """Return the home posture and up to two other postures."""
     home = home_posture(robot)
     driven = np.array([frame.actuated for frame in robot.frames])
     steps = rng.uniform(-_FAR, _FAR, (8, len(driven)))
@@ -260,7 +254,7 @@ def moved_postures(robot: Robot, rng: np.random.Generator) -> list[Posture]:
 
 
 def built_in() -> Iterator[tuple[str, list[Posture], NDArray]]:
-    """Yield postures and loads of built-in robots, errors up to 1 mrad and 0.1 mm."""
+    """Yield postures and loads of built-in robots with random errors."""
     for seed, name in enumerate(BUILT_IN):
         rng, robot = np.random.default_rng(seed), load_robot(name)
         errors = rng.uniform(-1, 1, (len(robot.frames), 6)) * ERRORS

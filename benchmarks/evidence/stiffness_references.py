@@ -1,15 +1,14 @@
-"""Compute K_E of the whole links of ``meshes/`` by NGSolve, from exact geometry.
+"""Compute K_E of the links of ``meshes/`` by NGSolve from their exact geometry.
 
-``python benchmarks/evidence/stiffness_references.py [link ...]`` (``pip install
-ngsolve``)
+``python benchmarks/evidence/stiffness_references.py [link ...]`` requires NGSolve
+(``pip install ngsolve``).
 
-The solids are built again from the dimensions in ``meshes/make.py``, meshed by Netgen
-with thin layers of elements along the singular edges of the interfaces, curved, and
-solved with polynomials of rising order; the program shares no code with forcefit's
-elements, meshes or estimates.  Each K is printed together with its distance from the
-more accurate references of ``stiffness_references.json``, which
-``stiffness_round_references.py`` and ``stiffness_part_references.py`` make; the speed
-benchmark runs these solids.
+The links are modelled as solids with the dimensions in ``meshes/make.py``.  Netgen
+creates curved meshes with thin layers of elements along the edges of the interfaces.
+The polynomial order is increased.  For each K, the program prints the difference from
+``stiffness_references.json``, which ``stiffness_round_references.py`` and
+``stiffness_part_references.py`` compute with higher accuracy.  The program does not use
+the finite elements of forcefit.
 """
 
 import argparse
@@ -24,7 +23,7 @@ from netgen.occ import Axis, Box, Cone, Cylinder, OCCGeometry, Pnt, X, Y, Z, gp_
 HERE = Path(__file__).parent
 E, NU = 60e9, 0.3
 LAM, MU = E * NU / ((1 + NU) * (1 - 2 * NU)), E / (2 * (1 + NU))
-L = 0.452  # [m] of the distal link
+L = 0.452  # [m] length of the distal link
 
 
 def bar(radius, z0, z1):
@@ -33,7 +32,7 @@ def bar(radius, z0, z1):
 
 
 def ends(solid, base, tip):
-    """Name the faces of a solid that are its base and tip interfaces."""
+    """Return a solid whose base and tip interfaces have names."""
     solid.faces.name = "side"
     for name, (axis, place) in {"base": base, "tip": tip}.items():
         face = solid.faces.Max(axis) if place > 0 else solid.faces.Min(axis)
@@ -42,7 +41,7 @@ def ends(solid, base, tip):
 
 
 def fork():
-    """Return a fork: an end plug and two lugs with bores; name the faces ``bore``."""
+    """Return a fork with two bores, whose faces are named ``bore``."""
     solid = bar(0.040, 0.042, 0.060) - bar(0.015, 0.03, 0.07)
     for y0, y1 in ((0.016, 0.030), (-0.030, -0.016)):
         lug = Box(Pnt(-0.025, y0, 0), Pnt(0.025, y1, 0.045))
@@ -77,7 +76,7 @@ def head_and_rod():
 
 
 def l_bracket():
-    """Return an L-bracket of two perpendicular bars."""
+    """Return an L-bracket."""
     leg = Box(Pnt(-0.02, -0.02, 0), Pnt(0.02, 0.02, 0.22))
     return leg + Box(Pnt(-0.02, -0.02, 0.18), Pnt(0.15, 0.02, 0.22))
 
@@ -101,12 +100,12 @@ LINKS = {
 }  # fmt: skip
 
 
-# middles [m] of the singular edges that belong to no interface; None: all edges
+# midpoints [m] of singular edges that do not belong to an interface, or None for all
 INNER_EDGES = {"l_bracket": [(0.02, 0.0, 0.18)], "distal_forks": None}
 
 
 def netgen_mesh(name, layers=2, finer=1.0):
-    """Return a link's mesh of straight elements, before curving, and its solid."""
+    """Return a mesh of a link before its elements are curved, and the solid."""
     make, _, size = LINKS[name]
     solid = make()
     for face in solid.faces:
@@ -125,7 +124,7 @@ def netgen_mesh(name, layers=2, finer=1.0):
 
 
 def stiffness(mesh, order, tip):
-    """Return K_E and the number of unknowns; element interiors are condensed."""
+    """Return K_E and the number of unknowns."""
     condense = order > 2
     space = ng.VectorH1(mesh, order=order, dirichlet="base|tip")
     u, v = space.TnT()
@@ -149,7 +148,7 @@ def stiffness(mesh, order, tip):
         if condense:
             field.vec.data += a.harmonic_extension * field.vec
         fields.append(field)
-    # from the energy of the fields, in which solution errors enter squared
+    # the error of the energy is quadratic in the error of the solution
     full = ng.BilinearForm(space, symmetric=True)
     full += form * ng.dx
     K = np.empty((6, 6))
@@ -161,13 +160,13 @@ def stiffness(mesh, order, tip):
 
 
 def scaled(difference, K):
-    """Return the entries divided by sqrt(K_ii K_jj)."""
+    """Return a matrix whose entries are divided by sqrt(K_ii K_jj)."""
     size = np.sqrt(np.diag(K))
     return difference / np.outer(size, size)
 
 
 def report(name, orders, finer):
-    """Print K for increasing orders, and its difference from the stored reference."""
+    """Print K for each order, and its difference from the stored reference."""
     stored = json.loads((HERE / "stiffness_references.json").read_text())[name]
     mesh, solid = netgen_mesh(name, finer=finer)
     print(f"{name}: {mesh.ne} elements, {solid.mass:.9g} m^3", flush=True)

@@ -1,18 +1,20 @@
 """Compute K_E of the round links of ``meshes/`` by Fourier modes.
 
-``python benchmarks/evidence/stiffness_round_references.py`` (``pip install ngsolve``)
+``python benchmarks/evidence/stiffness_round_references.py`` requires NGSolve (``pip
+install ngsolve``).
 
-A body of revolution moves in modes of the angle about its axis: stretching and torsion
-in mode 0, bending and shear in mode 1.  Each is a problem in the plane (r, z), solved
-by NGSolve with elements that shrink geometrically toward every singular corner and
-polynomials of rising order, which converges exponentially.  The displacements are
+The displacements of a body of revolution in the Fourier mode m are
 
-    u_r = U cos(m a), u_t = V sin(m a), u_z = W cos(m a),
+    u_r = U cos(m a), u_t = V sin(m a), u_z = W cos(m a).
 
-and in mode 1 the unknowns are U + V, U - V and W, of which the first and the last
-vanish on the axis.  K of the last order and its difference from the previous order are
-written to ``stiffness_references.json``.  The program shares no code with forcefit's
-elements or the solid ones of ``stiffness_references.py``.
+Mode 0 contains tension and torsion, and mode 1 contains bending and shear.  Each mode
+is a problem in the plane (r, z).  NGSolve solves it with elements whose size decreases
+towards singular corners, and with increasing polynomial order.  In mode 1, the unknowns
+are U + V, U - V and W, and U + V and W are zero on the axis.
+
+K of the highest order and its difference from the previous order are written to
+``stiffness_references.json``.  The program does not use the finite elements of
+forcefit.
 """
 
 import argparse
@@ -24,7 +26,7 @@ import numpy as np
 from stiffness_references import HERE, LAM, MU, scaled
 
 AXIS, FREE, BASE, TIP = "axis", "side", "base", "tip"
-# half sections: (r, z) [m] of each corner, and the kind of the line to the next corner
+# corners (r, z) [m] of half sections, and the kind of the edge to the next corner
 LINKS = {
     "distal_plain": (
         [(0, 0), (0.040, 0), (0.040, 0.452), (0, 0.452)], [BASE, FREE, TIP, AXIS]
@@ -44,7 +46,7 @@ LINKS = {
 
 
 def half_section(corners, lines, size, layers=8):
-    """Return a mesh of the half section, geometrically finer toward every corner."""
+    """Return a mesh of a half section with small elements at the corners."""
     geometry = plane.SplineGeometry()
     points = [geometry.AppendPoint(r, z, hpref=float(r > 0)) for r, z in corners]
     for k, name in enumerate(lines):
@@ -56,7 +58,7 @@ def half_section(corners, lines, size, layers=8):
 
 
 def energy(u, v, m, lame=(LAM, MU)):
-    """Return the work of one field's stresses on another's strains, times 1 / r."""
+    """Return the work of the stresses of one field on the strains of another."""
     r, (lam, mu) = ng.x, lame
     (U, V, W, dU, dV, dW), (S, T, X, dS, dT, dX) = u, v
     e, f = (
@@ -71,11 +73,11 @@ def energy(u, v, m, lame=(LAM, MU)):
 
 
 def mode_stiffness(mesh, order, m, motions, lame=(LAM, MU)):
-    """Return the stiffness between motions (U, V, W) of the tip in mode m."""
+    """Return the stiffness for motions (U, V, W) of the tip in mode m."""
     held = f"{BASE}|{TIP}"
     one = ng.H1(mesh, order=order, dirichlet=held)
     zero = ng.H1(mesh, order=order, dirichlet=f"{held}|{AXIS}")
-    # unknowns of mode 0: U, V, W; of mode 1: U + V, U - V, W; some vanish on the axis
+    # unknowns U, V, W of mode 0, and U + V, U - V, W of mode 1
     space = zero * zero * one if m == 0 else zero * one * zero
 
     def parts(p, q, w):
@@ -112,7 +114,7 @@ def mode_stiffness(mesh, order, m, motions, lame=(LAM, MU)):
 
 
 def stiffness(mesh, order, lame=(LAM, MU)):
-    """Return (6, 6) K_E at the centre of the tip; the base is held."""
+    """Return K_E at the centre of the tip with a fixed base, (6, 6)."""
     turned, stretched = (
         mode_stiffness(mesh, order, 0, [motion], lame)[0, 0]
         for motion in ((0, ng.x, 0), (0, 0, 1))

@@ -1,13 +1,13 @@
-"""Measure the longest time of K_E for random parts with finely triangulated surfaces.
+"""Measure the time of K_E for random parts with many surface triangles.
 
     python -m benchmarks.evidence.stiffness_seconds OUT.json [--count 50] [--seed 3]
         [--accuracy 0.005]
 
-The parts are those of ``stiffness_random_parts.py`` with another seed.  Each triangle
-of their surfaces is divided into four, until there are 10 000 to 40 000 triangles.  The
-parts are solved as ``forcefit stiffness fea`` does, without stored meshes.  Each result
-is written immediately, so that an interrupted run can continue.  The table lists
-triangles, unknowns, estimated error, and wall and processor time including the mesher.
+The parts are those of ``stiffness_random_parts.py`` with another seed.  The triangles
+of their surfaces are divided until there are 10 000 to 40 000 triangles.  The parts are
+solved as by ``forcefit stiffness fea``, without stored meshes.  The table contains the
+numbers of triangles and unknowns, the estimated error, and the wall and processor times
+including the mesher.  An interrupted run can be continued.
 """
 
 import argparse
@@ -26,12 +26,12 @@ from forcefit.stiffness.fem.material import Material
 from forcefit.stiffness.surface.interface import parse_interface
 from forcefit.stiffness.surface.surface import Surface, check_surface
 
-FEWEST = 10_000  # smallest number of triangles of a surface
+FEWEST = 10_000  # minimum number of triangles of a surface
 WHO = resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN
 
 
 def finer(surface: Surface) -> Surface:
-    """Return a surface with each triangle divided into four, repeatedly."""
+    """Return a surface whose triangles are repeatedly divided into four triangles."""
     points, triangles = surface.points, surface.triangles
     while len(triangles) < FEWEST:
         edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]], axis=2).reshape(-1, 2)
@@ -51,7 +51,7 @@ def spent() -> float:
 
 
 def run_part(seed: int, number: int, accuracy: float) -> dict[str, float | str]:
-    """Return triangles, unknowns, error and times [s] of one part."""
+    """Return the numbers of triangles and unknowns, the error and the times [s]."""
     part = draw_part(seed, number)
     surface = finer(surface_of(part))
     faces = [parse_interface(text) for text in (part.base, part.tip)]
@@ -69,7 +69,7 @@ def run_part(seed: int, number: int, accuracy: float) -> dict[str, float | str]:
 
 
 def main() -> None:
-    """Print a row for each part, and then the quantiles of the times."""
+    """Print a row of the table for each part, and quantiles of the times."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("out", type=Path)
     parser.add_argument("--count", type=int, default=50)

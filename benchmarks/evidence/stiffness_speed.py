@@ -1,21 +1,19 @@
-"""Compare the cost of K_E with NGSolve and CalculiX as a function of true error.
+"""Compare time and true error of K_E with NGSolve and CalculiX.
 
-``python benchmarks/evidence/stiffness_speed.py`` (``pip install ngsolve``; ``ccx`` on
-the path)
+``python benchmarks/evidence/stiffness_speed.py`` requires NGSolve (``pip install
+ngsolve``) and the command ``ccx`` of CalculiX.
 
-Each case runs in a separate process.  The operating system reports its processor time
-(including child processes and imports) and its largest memory.  Wall times are
-meaningful only on an idle machine.  True errors refer to ``stiffness_references.json``.
+Each case runs in a separate process.  The table contains the processor time, including
+child processes and imports, and the peak memory.  True errors refer to
+``stiffness_references.json``.  The cases are:
 
-- ours: from the STL surface to K with its error estimate, including the mesher, without
-  stored meshes; and separately assembly, factorisation and six load cases on the last
-  mesh.
-- NGSolve: from the exact geometry with curved elements; order and mesh are chosen by
-  hand, and there is no error estimate.
-- CalculiX: one load case of six on a given mesh of forcefit, by its own solver.  The
-  elements are quadratic (it has no cubic ones), with forcefit's layers, and are
-  bisected as forcefit's indicator requests until the true error is small enough.  The
-  time to find this mesh is not included.
+- forcefit: from the STL surface to K with its error estimate, including the mesher.
+  Assembly, factorisation and six load cases on the last mesh are also measured
+  separately.
+- NGSolve: from the exact geometry to K with curved elements.  The order and the mesh
+  are given, and there is no error estimate.
+- CalculiX: a load case on a given mesh of forcefit with quadratic elements.  The mesh
+  is refined until the true error is sufficiently small, and this time is not included.
 """
 
 import argparse
@@ -54,7 +52,7 @@ CASES = [
 
 
 def true_error(name, K):
-    """Return the largest entry of K - K_ref over sqrt(K_ii K_jj)."""
+    """Return the largest entry of K - K_ref, relative to sqrt(K_ii K_jj)."""
     stored = json.loads((HERE / "stiffness_references.json").read_text())
     K, exact = (
         np.asarray(getattr(K, "stiffness", K)),
@@ -77,7 +75,7 @@ def given(name):
 
 
 def ours(name, accuracy):
-    """Measure forcefit from the surface to K, and then the last mesh separately."""
+    """Measure forcefit from the surface to K, and separately on the last mesh."""
     from forcefit.stiffness.fem.condensation import condense
     from forcefit.stiffness.fem.fea import Budget, FemOptions, solve_link
     from forcefit.stiffness.fem.material import Material
@@ -112,7 +110,7 @@ def ngsolve(name, order, layers, finer):
 
 
 def quadratic(name, accuracy):
-    """Return a quadratic mesh with the required true error, its K and unknowns."""
+    """Return a quadratic mesh with a given true error, its K and its unknowns."""
     from forcefit.stiffness.fem.adaptive_step import refine_level, solve_level
     from forcefit.stiffness.fem.condensation import condense
     from forcefit.stiffness.fem.elements import isoparametric
@@ -139,7 +137,7 @@ def ccx(name, accuracy):
         points = mesh.nodes[mesh.cells[:, :4]]
         turned = np.linalg.det(points[:, 1:] - points[:, :1]) < 0
         cells = mesh.cells[:, [0, 1, 2, 3, 4, 7, 5, 6, 8, 9]]
-        # Corners 0 and 1 are swapped, and with them the edges at 2 and at 3.
+        # exchanging corners 0 and 1 also exchanges the edges at corners 2 and 3
         cells[turned] = cells[turned][:, [1, 0, 2, 3, 4, 6, 5, 8, 7, 9]]
         tip = np.unique(mesh.faces[mesh.patch == 1])
         base = np.unique(mesh.faces[mesh.patch == 0])
@@ -170,7 +168,7 @@ def ccx(name, accuracy):
 
 
 def run_case(words):
-    """Run one case in this process; print its result as JSON on the last line."""
+    """Run a case in this process, and print its result as JSON."""
     kind, name, *options = words
     K, unknowns, more = {"ours": ours, "ngsolve": ngsolve, "ccx": ccx}[kind](
         name, *options
@@ -183,7 +181,7 @@ def run_case(words):
 
 
 def main(cases):
-    """Run the cases one after the other and print a row for each."""
+    """Run all cases and print a row of the table for each."""
     print(
         "case                            unknowns  true error  estimate  CPU s"
         "  last mesh  wall s     GB"

@@ -3,12 +3,13 @@
 ``python benchmarks/evidence/stress_of_notches.py [--accuracy 0.02] [--parts 0:20]``
 
 Twenty random shafts with shoulders, grooves or bores are loaded in tension, torsion or
-bending.  They are solved as ``forcefit stiffness stress`` does, and stresses are read
-one radius away from the ends.  The references use quadratic axisymmetric elements
-(scikit-fem; the first harmonic in bending) with rigidly held ends.  Their meshes of r /
-20 and r / 40 in the notch agree to 0.25 %.  Printed are the true error, the estimated
-error, and whether it covers the true error; then the number of covered parts.  Each
-part takes 20 to 100 s.
+bending.  They are solved as by ``forcefit stiffness stress``, and stresses at a
+distance of one radius or more from the ends are evaluated.  The references were
+computed with quadratic axisymmetric elements of scikit-fem and rigid ends, and are
+accurate to 0.25 %.
+
+The program prints the true error and the estimated error of each part, and the number
+of parts whose estimated error is at least the true error.  Each part takes 20 to 100 s.
 """
 
 import argparse
@@ -23,24 +24,25 @@ from forcefit.stiffness.fem.stress import peak_stress
 from forcefit.stiffness.surface.interface import parse_interface
 from forcefit.stiffness.surface.surface import Surface, check_surface
 
-# facets around the axis; rings in a quarter of a fillet; [m] largest distance of rings
+# number of facets around the axis, number of rings of a fillet, and [m] largest
+# distance between rings
 AROUND, ROWS, APART = 48, 8, 0.005
 COMPONENTS = {"tension": 5, "torsion": 2, "bending": 1}
 
 
 class Part(NamedTuple):
-    """A shaft along z, with lengths in mm.
+    """Shaft along z, with lengths in mm.
 
     Attributes:
         kind: ``"shoulder"`` or ``"groove"``.
-        large: diameter at the base; for a groove, the diameter at both ends.
+        large: diameter at the base, or at both ends of a shaft with a groove.
         small: diameter beyond the shoulder, or at the bottom of the groove.
         radius: radius of the fillet or of the groove.
-        bore: diameter of the bore; 0 if there is none.
-        place: position along z of the shoulder, or of the middle of the groove.
+        bore: diameter of the bore, or 0.
+        place: position of the shoulder or of the middle of the groove along z.
         length: length from base to tip.
-        load: kind of the load at the tip, whose size is 1 N or 1 N m.
-        peak: [Pa] largest von Mises stress at least half the diameter from both ends.
+        load: kind of load at the tip, 1 N or 1 N m.
+        peak: [Pa] largest von Mises stress, except near both ends.
     """
 
     kind: str
@@ -80,7 +82,7 @@ PARTS = (
 
 
 def outline(part: Part) -> NDArray:
-    """Return (k, 2) [m] radius and z of the rings of a shaft's surface and bore."""
+    """Return the radius and z of rings on the surface of a shaft, (k, 2) [m]."""
     R, q, r, place, end = (
         v / 1e3 for v in (part.large / 2, part.small / 2, part.radius, part.place,
                           part.length)
@@ -103,7 +105,7 @@ def outline(part: Part) -> NDArray:
 
 
 def surface_of(part: Part) -> Surface:
-    """Return the surface of a shaft; successive rings are offset by half a facet."""
+    """Return the triangulated surface of a shaft."""
     profile = outline(part)
     if part.bore:  # an even number of rings, so that the last one matches the first
         profile = profile[:-1]
@@ -132,7 +134,7 @@ def surface_of(part: Part) -> Surface:
 
 
 def main() -> None:
-    """Print a line for each part, and the number of covered parts."""
+    """Print the errors of each part, and the number of covered parts."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--accuracy", type=float, default=0.02)
     parser.add_argument("--parts", default="0:20")

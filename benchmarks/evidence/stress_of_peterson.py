@@ -1,12 +1,10 @@
-"""Evaluate the estimated error of peak stresses against Peterson's charts.
+"""Compare peak stresses with published stress concentration factors (Peterson).
 
 ``python -m benchmarks.evidence.stress_of_peterson [--parts 0:10] [--accuracy 0.02]``
 
-Ten random parts are of kinds with published stress concentration factors: shoulder
-fillets in tension, bending and torsion; circumferential grooves in torsion; plates with
-a hole in tension.  The compared value is the largest principal stress, as in the
-charts; in torsion it equals the shear stress.  The fits of the charts are accurate to 1
-to 3 %.
+The ten random parts are shafts with shoulder fillets in tension, bending and torsion,
+shafts with grooves in torsion, and plates with a hole in tension.  The largest
+principal stress is compared.  The published formulas are accurate to 1 to 3 %.
 """
 
 import argparse
@@ -22,8 +20,9 @@ from forcefit.stiffness.surface.interface import parse_interface
 from forcefit.stiffness.surface.surface import Surface, check_surface
 
 SEED = 20261126
-# of 1, sqrt(h / r), h / r in C_1 to C_4; Kt is the sum of C_k (2 h / D)^(k - 1):
-# Pilkey & Pilkey (2008), Peterson's Stress Concentration Factors, charts 2.47 and 3.12
+# coefficients of 1, sqrt(h / r) and h / r in C_1 to C_4, where the stress concentration
+# factor is the sum of C_k (2 h / D)^(k - 1), from Pilkey & Pilkey (2008), Peterson's
+# Stress Concentration Factors, charts 2.47 and 3.12
 FITS = {
     "shoulder": [
         [0.905, 0.783, -0.075],
@@ -43,17 +42,15 @@ FITS = {
 def shoulder_factor(load: str, wide: float, radius: float) -> float:
     """Return the stress concentration factor of a shoulder fillet.
 
-    Source: the formulas of Tipton, Sorem & Rolovic (1996).
-
-    The older charts of shafts in tension are up to 10 % too low.
+    The formulas are those of Tipton, Sorem & Rolovic (1996).
 
     Args:
         load: tension or bending.
-        wide: [1] D / d.
-        radius: [1] r / d.
+        wide: [-] D / d.
+        radius: [-] r / d.
 
     Returns:
-        [1] over the nominal stress of the smaller diameter.
+        [-] factor that refers to the nominal stress at the smaller diameter.
     """
     square = wide**2
     if load == "tension":
@@ -72,7 +69,7 @@ KINDS = [("shoulder", "tension"), ("shoulder", "bending"), ("shoulder", "torsion
 
 
 def draw(number: int) -> tuple[Part, float]:
-    """Return a random part with lengths in mm, and the thickness of a plate."""
+    """Return a random part with lengths in mm, and its thickness if it is a plate."""
     rng = np.random.default_rng([SEED, number])
     kind, load = KINDS[number % len(KINDS)]
     if kind == "hole":
@@ -110,7 +107,7 @@ def expected(part: Part, thick: float) -> float:
 
 
 def plate(part: Part, thick: float) -> Surface:
-    """Return a plate in the plane of y and z with a hole in its middle."""
+    """Return a plate with a hole, normal to x."""
     half, end, r = part.large / 2e3, part.length / 1e3, part.small / 2e3
     corner = np.arctan2(half, end / 2)
     quarter = np.r_[np.linspace(0, corner, 7), np.linspace(corner, np.pi / 2, 11)[1:]]
@@ -135,7 +132,7 @@ def plate(part: Part, thick: float) -> Surface:
 
 
 def largest_principal(stresses: NDArray) -> float:
-    """Return the largest principal stress [Pa] of (p, 6) xx yy zz yz xz xy."""
+    """Return the largest principal stress [Pa] of p points, with xx yy zz yz xz xy."""
     x, y, z, yz, xz, xy = stresses.T
     rows = [[x, xy, xz], [xy, y, yz], [xz, yz, z]]
     tensors = np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
@@ -143,7 +140,7 @@ def largest_principal(stresses: NDArray) -> float:
 
 
 def main() -> None:
-    """Print a line for each part, and the number of covered parts."""
+    """Print the errors of each part, and the number of covered parts."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--accuracy", type=float, default=0.02)
     parser.add_argument("--parts", default="0:10")

@@ -1,7 +1,7 @@
-"""Draw the zones of callouts, for docs/drawing_tolerances.md.
+"""Draw the zones of callouts for docs/drawing_tolerances.md.
 
-Each panel shows a section of a zone, with uniform draws in it:
-``python benchmarks/evidence/tolerance_zones.py docs/pictures/tolerance_zones.png``.
+``python benchmarks/evidence/tolerance_zones.py docs/pictures/tolerance_zones.png``
+draws sections of the zones, with uniformly distributed random positions.
 """
 
 import sys
@@ -25,7 +25,7 @@ COUNT = 3000
 
 
 def drawn(zone: Zone) -> np.ndarray:
-    """Return (k, 6) uniform random screws in a zone."""
+    """Return uniformly distributed random screws in a zone, (k, 6)."""
 
     def numbers(attempt: int) -> np.ndarray:
         return np.random.default_rng([1, attempt]).random((COUNT, zone.words))

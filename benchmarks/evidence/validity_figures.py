@@ -1,4 +1,4 @@
-"""Plot the results of ``crosscheck_validity.py`` over the varied parameters."""
+"""Figures of the results of ``crosscheck_validity.py``."""
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -14,13 +14,13 @@ STYLES = {"position": "o-", "energy": "s--"}
 
 
 def validity_figure(rows: list[dict]) -> Figure:
-    """Plot errors relative to their limits (20 um or 1 %): medians and, thin, maxima.
+    """Plot medians and maxima of errors, relative to their limits (20 um or 1 %).
 
     Args:
-        rows: rows of the results of the benchmark.
+        rows: results of the benchmark.
 
     Returns:
-        A figure with a row of panels for each robot and a panel for each assumption.
+        A figure with a row of panels for each robot and a column for each assumption.
     """
     names = list(dict.fromkeys(r["robot"] for r in rows))
     figure = Figure(figsize=(15, 3.6 * len(names)), layout="constrained")
@@ -56,14 +56,14 @@ def validity_figure(rows: list[dict]) -> Figure:
 
 
 def pose_figure(maps: dict[str, dict]) -> Figure:
-    """Plot the errors over the workspace for the paper's geometric errors.
+    """Plot the errors over the workspace for the geometric errors of the paper.
 
     Args:
-        maps: for each robot ``x``, ``z`` [m], and (z, x, 2) [m], [-] for each
-            assumption.
+        maps: for each robot, coordinates ``x`` and ``z`` [m], and position errors [m]
+            and energy errors [-] for each assumption, (z, x, 2).
 
     Returns:
-        A figure with position and energy errors of two assumptions for each robot.
+        The figure.
     """
     from matplotlib.colors import LogNorm
 

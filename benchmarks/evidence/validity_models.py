@@ -1,4 +1,4 @@
-"""Define models with one assumption less or more, for ``docs/validity.md``."""
+"""Models with one assumption less or more, for ``docs/validity.md``."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -23,12 +23,12 @@ from forcefit.validation.crosscheck.spread_weight import (
 
 
 def with_bars(robot: Robot, slenderness: float, density: float | None = None) -> Robot:
-    """Return the robot with its beams replaced by round bars of one slenderness.
+    """Return a robot with round bars instead of beams.
 
     Args:
         robot: robot with beams.
-        slenderness: [-] length over radius.
-        density: [kg/m^3] density of the bars; by default that of the beams.
+        slenderness: [-] ratio of length to radius.
+        density: [kg/m^3] density of the bars, by default the density of the beams.
 
     Returns:
         The robot.
@@ -45,7 +45,7 @@ def with_bars(robot: Robot, slenderness: float, density: float | None = None) ->
 
 
 def bush_margin(posture: Posture, compliant: Compliant = "rigid") -> float:
-    """Return the factor on all clearances at which a robot on bushes just assembles.
+    """Return the margin of a robot whose pins have two bushes.
 
     Args:
         posture: configuration of the robot.
@@ -53,7 +53,8 @@ def bush_margin(posture: Posture, compliant: Compliant = "rigid") -> float:
             ``forcefit.assembly.linear.zone.zone_margin``.
 
     Returns:
-        The margin, or inf if no factor suffices.
+        The smallest factor of all clearances for which the robot can be assembled, or
+        inf.
 
     Raises:
         SolverFailed: the cone solver found no solution.
@@ -63,11 +64,11 @@ def bush_margin(posture: Posture, compliant: Compliant = "rigid") -> float:
 
 
 def half_weights(posture: Posture, gravity: ArrayLike) -> tuple[NDArray, NDArray]:
-    """Return the loads of half of each beam's weight at each end, without moments.
+    """Return loads that consist of half the weight of each beam at both ends.
 
     Args:
         posture: configuration of a robot with n frames.
-        gravity: (3,) [m/s^2] base axes.
+        gravity: (3,) [m/s^2] gravity vector in base axes.
 
     Returns:
         ``bodies`` and ``carried`` (n, 6) [N m, N] of
@@ -86,15 +87,15 @@ def half_weights(posture: Posture, gravity: ArrayLike) -> tuple[NDArray, NDArray
 def halves_cost(
     posture: Posture, gravity: ArrayLike, load: ArrayLike | None = None
 ) -> Cost:
-    """Return the error due to half of each weight at each end, without moments.
+    """Return the error that :func:`half_weights` causes.
 
     Args:
         posture: configuration of the robot.
-        gravity: (3,) [m/s^2] base axes.
-        load: (6,) [N m, N] on the platform at its origin, base axes.
+        gravity: (3,) [m/s^2] gravity vector in base axes.
+        load: (6,) [N m, N] load on the platform at its origin, base axes.
 
     Returns:
-        The error relative to a weight distributed over the links.
+        The error compared with distributed weights.
 
     Raises:
         CannotAssemble: the robot cannot be assembled.

@@ -1,8 +1,8 @@
-"""Recompute errors of ``crosscheck_validity.py`` by the multibody simulation.
+"""Compute errors of ``crosscheck_validity.py`` by multibody simulation.
 
-Run ``python benchmarks/evidence/validity_simulated.py``; it takes two minutes and
-prints the last table of ``docs/validity.md``.  Beams are geometrically exact, weight
-acts at nine nodes of each beam, and a pin in two bushes is modelled by two contacts.
+Run ``python benchmarks/evidence/validity_simulated.py``, which takes two minutes.  It
+prints the last table of ``docs/validity.md``.  The simulation has geometrically exact
+beams with weights at nine nodes, and two contacts for a pin in two bushes.
 """
 
 from collections.abc import Iterator
@@ -17,11 +17,11 @@ from forcefit.validation.assumptions.bushes import solve_bushes
 from forcefit.validation.crosscheck.spread_weight import energy_between_ends
 from forcefit.validation.multibody.simulation import SimulationModel, simulate_assembly
 
-ELEMENTS = 8  # number of elements of each beam under its weight
+ELEMENTS = 8  # number of elements of each beam
 
 
 def closures(at: Posture) -> tuple[float, ...]:
-    """Return the error [um] and [%] of the linear and of the exact model."""
+    """Return the errors [um] and [%] of the linear model and of the exact model."""
     assembly, exact = simulate_assembly(at), solve_exact(at)
     costs = []
     for model in (exact.linear, exact):
@@ -32,7 +32,7 @@ def closures(at: Posture) -> tuple[float, ...]:
 
 
 def weights(at: Posture) -> tuple[float, ...]:
-    """Return the error [um] and [%] of end loads, and [%] with the inner load."""
+    """Return the errors [um] and [%] of weights at the ends of beams."""
     assembly = simulate_assembly(
         at, model=SimulationModel(elements=ELEMENTS), gravity=GRAVITY
     )
@@ -47,7 +47,7 @@ def weights(at: Posture) -> tuple[float, ...]:
 
 
 def discs(at: Posture) -> tuple[float, ...]:
-    """Return the additional energy [%] of bushes, by cones and by contacts."""
+    """Return the additional energy [%] of two bushes in both models."""
     by_cones = solve_bushes(at).energy / solve_assembly(at).energy
     disc, bushes = (
         simulate_assembly(
@@ -59,7 +59,7 @@ def discs(at: Posture) -> tuple[float, ...]:
 
 
 def cases(name: str) -> Iterator[tuple[str, tuple[float, ...]]]:
-    """Yield each comparison with its numbers for about four cases."""
+    """Yield each comparison with its results."""
     for ratio in (None, 40.0):
         label = "as built" if ratio is None else "L / r = 40"
         for at in postures(name, ratio)[::5]:
@@ -72,7 +72,7 @@ def cases(name: str) -> Iterator[tuple[str, tuple[float, ...]]]:
 
 
 def main() -> None:
-    """Print a row for each comparison, with medians and largest values."""
+    """Print medians and largest values of each comparison."""
     for name in POSES:
         rows: dict[str, list[tuple[float, ...]]] = {}
         for what, numbers in cases(name):
