@@ -116,7 +116,7 @@ def batched(solve: Callable[..., object], postures: list[Posture]) -> float:
 
 def print_table(title: str, rows: dict[str, float]) -> None:
     """Print the times, and the ratio of the DPP time to each time."""
-    print(f"\n{title}\n{'':38}{'us/point':>10}{'DPP over it':>13}")
+    print(f"\n{title}\n{'':38}{'us/point':>10}{'DPP / time':>13}")
     dpp = rows["cvxpy DPP, scaled"]
     for name, value in rows.items():
         print(f"{name:38}{value:10.1f}{dpp / value:13.2f}")
@@ -208,7 +208,7 @@ def print_calls(robot: Robot, postures: list[Posture]) -> None:
             some[::12],
         )  # fmt: skip
     calls["place_robot"] = partial(place_robot, robot), poses[::4]
-    print("\nother calls, us")
+    print("\ntimes of other functions [us]")
     for name, (call, questions) in calls.items():
         call(questions[0])
         print(f"{name:38}{timed(call, questions):10.1f}")
@@ -226,7 +226,9 @@ def print_certified(robot: Robot, postures: list[Posture]) -> None:
         sets = np.repeat(kappa * robot.errors[None], len(postures), axis=0)
         answers = solve_assembly(at, errors=sets)
         share, slow = answers.certified.mean(), np.mean(answers.method == "reference")
-        print(f"errors times {kappa:<5g} {share:8.2%}, by the reference {slow:.2%}")
+        print(
+            f"errors times {kappa:<5g} {share:8.2%}, by the reference method {slow:.2%}"
+        )
     for size in (1e-3, 0.1, 1.0, 10.0):
         for kappa in (0.0, 0.2, 1.0):
             scaled = robot.with_errors(kappa * robot.errors)
@@ -236,7 +238,7 @@ def print_certified(robot: Robot, postures: list[Posture]) -> None:
             slow = np.mean(answers.method == "reference")
             print(
                 f"loads times {size:<6g} errors times {kappa:<5g} {share:8.2%}, by the "
-                f"reference {slow:.2%}"
+                f"reference method {slow:.2%}"
             )
 
 

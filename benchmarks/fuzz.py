@@ -145,7 +145,7 @@ def prepare(folder: Path, commands: list[str]) -> None:
                 print(f"{took:6.1f} s  {command[:90]}", flush=True)
             # commands with an invalid argument stop early, which saves time
             if status not in {0, 1} and ",x" not in command and "solid" not in command:
-                print(f"not sound, {status}: {command}\n   {err[-300:]}")
+                print(f"unexpected exit status {status}: {command}\n   {err[-300:]}")
     os.chdir(folder)
 
 
@@ -324,7 +324,11 @@ def main() -> int:
     parser.add_argument("count", nargs="?", type=int, default=3000)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--only", type=int, nargs="+")
-    parser.add_argument("--every-option", action="store_true", help="nothing is drawn")
+    parser.add_argument(
+        "--every-option",
+        action="store_true",
+        help="test each option with each extreme value",
+    )
     given = parser.parse_args()
 
     def too_late(*_):
@@ -367,9 +371,7 @@ def main() -> int:
                for r in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))  # fmt: skip
     for name, count in sorted(counts.items()):
         print(f"{name:24s} {count}")
-    print(
-        f"{'processor time':24s} {used:.0f} s, {time.monotonic() - began:.0f} s passed"
-    )
+    print(f"{'processor time':24s} {used:.0f} s, {time.monotonic() - began:.0f} s wall")
     for took, number, messages in sorted(slow, reverse=True)[:8]:
         print(f"  {took:5.1f} s  {number}: {messages}")
     print(f"{'faults':24s} {sum(map(len, wrong.values()))} of {len(wrong)} kinds")

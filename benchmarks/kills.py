@@ -206,7 +206,7 @@ def spoil(path: Path, case: Case, random: Random, counts: Counter) -> int:
         counts["journals cut"] += 1
         path.write_bytes(content[:at])
         return sum(points for _, end, points in sound if end <= at)
-    counts["journals with a bit turned"] += 1
+    counts["journals with a flipped bit"] += 1
     content[at] ^= 1 << random.randrange(8)
     if not sound and (at <= content.find(b"\n") or b"\n" not in content):
         path.unlink()  # a journal without its header must be removed
@@ -258,7 +258,7 @@ def trial(case: Case, random: Random, counts: Counter, small: bool) -> None:
     counts["wrong exit status"] += wrong(status, {0}, case, "nothing")
     counts["lost"] += solved_again(case, standing)
     files = {p.name: p.read_bytes() for p in Path().glob("out.*")}
-    counts["different at the end"] += files != case.files
+    counts["different final files"] += files != case.files
     counts["ended"] += 1
     for name in files:
         Path(name).unlink()
@@ -289,7 +289,7 @@ def check(case: Case, counts: Counter, status: int, before: set[Path]) -> int:
     for path in Path().glob("out.*"):
         if path.suffix in {".part", ".lock"}:
             left = status in {2, 130} and path not in before
-            counts["left beside a file"] += left
+            counts["temporary files left"] += left
         elif path.suffix != ".journal":
             different += path.read_bytes() != case.files[path.name]
     return different
@@ -309,7 +309,7 @@ def main() -> int:
     asked = parser.parse_args()
     random = Random(asked.seed)
     counts = Counter(dict.fromkeys(
-        ("lost", "half-written", "left beside a file", "different at the end",
+        ("lost", "half-written", "temporary files left", "different final files",
          "wrong exit status"), 0
     ))  # fmt: skip
     watch()
@@ -347,9 +347,9 @@ def main() -> int:
         os.chdir("/")
     for name, number in counts.items():
         print(f"{name:28s} {number}")
-    print(f"{'disturbed in all':28s} {disturbed}")
+    print(f"{'interruptions in total':28s} {disturbed}")
     print(
-        f"{warm:.0f} s to compile and warm up, {time.monotonic() - began - warm:.0f} s"
+        f"{warm:.0f} s to import and compile, {time.monotonic() - began - warm:.0f} s"
     )
     return int(any(list(counts.values())[:5]))
 

@@ -66,7 +66,7 @@ def main() -> None:
     blocks = -(-draws // BLOCK)
     posture = place_robot(load_robot("irsbot2"), pose={"tx": 0.1, "tz": -0.5})
     one = linear_response(posture)
-    print(f"{blocks * BLOCK} draws a line; goal {TARGET:.0e} in {GOAL:.0f} s")
+    print(f"{blocks * BLOCK} draws in each row; target {TARGET:.0e} in {GOAL:.0f} s")
     print(
         "errors  no energy  certified  reference  per core s  1e7, 2 cores [s]  "
         "2 threads, per s"

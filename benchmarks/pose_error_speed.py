@@ -237,7 +237,7 @@ def print_case(title: str, robot: Robot, postures: list[Posture], reading: str) 
         for i in few:
             bound_pose_error(solve_assembly(own[i]), reading, **tolerance)
         single = (time.process_time() - begin) / len(few) * 1e3
-        print(f"\n{title}, {name}\n{'':28}{'ms/point':>10}{'over ours':>11}")
+        print(f"\n{title}, {name}\n{'':28}{'ms/point':>10}{'ratio':>11}")
         ours = getattr(batch, f"{name}_error")[few]
         for solver, solve in (
             ("SCIP, scaled", by_scip), ("Gurobi, scaled", by_gurobi),
@@ -249,12 +249,13 @@ def print_case(title: str, robot: Robot, postures: list[Posture], reading: str) 
                 for a, (low, high) in zip(answers, ours, strict=False)
             ]
             if answers and max(apart) > 1e-7:
-                note += f"; brackets up to {max(apart):.1e} apart"
+                note += f"; bounds differ by up to {max(apart):.1e}"
             print(f"{solver:28}{taken:10.1f}{taken / batched:11.0f}  {note}")
-        print(f"{'ours, one at a time':28}{single:10.2f}{single / batched:11.1f}")
+        print(f"{'forcefit, single points':28}{single:10.2f}{single / batched:11.1f}")
         print(
-            f"{'ours, batched':28}{batched:10.3f}{1:11d}  {batch.supports.mean():.1f} "
-            f"supports a point, {batch.one_by_one.sum()} one by one"
+            f"{'forcefit, all points':28}{batched:10.3f}{1:11d}  "
+            f"{batch.supports.mean():.1f} support points, "
+            f"{batch.one_by_one.sum()} points one by one"
         )
 
 
@@ -278,7 +279,7 @@ def print_study(robot: Robot, poses: NDArray) -> None:
     print(
         f"\nthe study, {len(at.transforms)} points: {done - begin:.2f} s (placing "
         f"{placed - begin:.2f}, margins and energy {solved - placed:.2f}, pose errors "
-        f"{done - solved:.2f}); widest bracket {widest:.1e}, "
+        f"{done - solved:.2f}); largest difference of bounds {widest:.1e}, "
         f"{energies.certified.mean():.0%} of energies certified, {slow} in numpy"
     )
 
@@ -292,8 +293,10 @@ def main() -> None:
     print_case("clearances only", perfect, postures, "frozen")
     inside = zone_margin(postures, "free").margin <= 1.0
     zone = [p for p, assembles in zip(postures, inside, strict=True) if assembles]
-    print_case(f"first draw, free, {len(zone)} points of the zone", robot, zone, "free")
-    print_case("first draw, free, all points", robot, postures, "free")
+    print_case(
+        f"with errors, free, {len(zone)} points in the zone", robot, zone, "free"
+    )
+    print_case("with errors, free, all points", robot, postures, "free")
     x, z = np.meshgrid(np.arange(-0.65, 0.651, 0.025), np.arange(-0.75, 0.001, 0.025))
     poses = np.full((x.size, 6), np.nan)
     poses[:, 0], poses[:, 2] = x.ravel(), z.ravel()

@@ -46,7 +46,7 @@ def main(runs=7):
             times[name].append(processor_time(arguments))
     medians = {name: statistics.median(seconds) for name, seconds in times.items()}
     base, *_ = medians.values()
-    print(f"{'':28} processor s   ratio   wanted")
+    print(f"{'':28} processor s   ratio    limit")
     for (name, median), wanted in zip(
         medians.items(), [1.0, *WANTED.values()], strict=True
     ):

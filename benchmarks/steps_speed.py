@@ -30,7 +30,7 @@ def plan_of(robot: Robot) -> Plan:
 
 def main() -> None:
     """Print a row of the table for each robot."""
-    print("robot     frames  steps  all [s]  machine and step [us]")
+    print("robot     frames  steps  total [s]   per robot and step [us]")
     for name in ROBOTS:
         robot = load_robot(name)
         plan = plan_of(robot)

@@ -124,15 +124,15 @@ def main(draws=400):
         ratio = f", {before / seconds:.2f} times the row above" if before else ""
         print(
             f"{name:14} {seconds:6.2f} s  {asked.size / seconds:6.0f} points/s{ratio}; "
-            f"processor {here:.2f} s here, {theirs:.2f} of workers"
+            f"processor {here:.2f} s in this process, {theirs:.2f} s in workers"
         )
         before = seconds
     print(f"last: {tasks[-1]}")
     for work, (one, two) in machine.items():
         print(
-            f"the machine, {work.__name__}: two at once {2 * one / two:.2f} times one"
+            f"the machine, {work.__name__}: two workers {2 * one / two:.2f} times one"
         )
-    print("the files are", "the same, byte by byte" if same else "DIFFERENT")
+    print("the files are", "identical" if same else "DIFFERENT")
     print(f"load {os.getloadavg()[0]:.1f}")
     return same
 

@@ -160,7 +160,7 @@ def main() -> None:
         write_robots(folder)
         stored = {name: answer(words) for name, words in questions(folder).items()}
         (folder / "answers.json").write_text(json.dumps(stored))
-        print(f"{len(stored)} answers in {folder}")
+        print(f"{len(stored)} results in {folder}")
         return
     stored = json.loads((folder / "answers.json").read_text())
     worst = 0

@@ -80,7 +80,7 @@ def draw_case(seed: int, robots: tuple[str, ...]) -> Synthetic:
             )  # fmt: skip
         except (NotApplicable, SimulationFailed, BadInput):
             continue
-    raise RuntimeError(f"case {seed}: no robot can have what was drawn")
+    raise RuntimeError(f"case {seed}: no random robot can have the hidden effects")
 
 
 def _design(robot: Robot) -> CampaignDesign:
@@ -126,7 +126,7 @@ def run_case(seed: int, robots: tuple[str, ...]) -> dict[str, Any]:
                 continue
             break
         else:
-            raise RuntimeError(f"case {seed}: no targets that can be simulated")
+            raise RuntimeError(f"case {seed}: found no targets that can be simulated")
     six = sum(frame.actuated for frame in case.robot.frames) >= 6
     return {
         "seed": seed, "robot": case.robot.name,

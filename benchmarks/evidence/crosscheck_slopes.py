@@ -33,8 +33,8 @@ def postures(name: str) -> list[Posture]:
 
 def main() -> None:
     """Print a row of the table for each robot and each model of the links."""
-    print("robot      links   passed  slope            limit    left rotation    "
-          "left translation  energy, linear and exact   seconds")  # fmt: skip
+    print("robot      links   passed  slope            limit    residual rot.    "
+          "residual transl.  energy, linear and exact   seconds")  # fmt: skip
     names = sys.argv[1:] or ("irsbot2", "hexapod", "three_rrr")
     for name, links in itertools.product(names, ("beam", "spring")):
         started = time.perf_counter()

@@ -21,7 +21,7 @@ def main() -> None:
     """Print a row of the table for each set of errors and each model of the links."""
     link = MeshLink(SURFACE, "z=0", "z=0.452", 60e9, 0.3)
     names = [f"leg{leg}.link_{side}" for leg in (1, 2) for side in "ab"]
-    print("draw  links   passed  slope   limit    left rotation  left translation  "
+    print("draw  links   passed  slope   limit    residual rot.  residual transl.  "
           "energy against exact  seconds")  # fmt: skip
     for seed in range(3):
         robot = papers_robot(seed, signed=seed % 2 == 1)

@@ -87,7 +87,7 @@ def draw_case(seed: int, only: str | None = None) -> tuple[str, Synthetic]:
             continue
         if campaign.sigma[3] >= FINE:
             return kind, campaign
-    raise RuntimeError(f"case {seed}: no robot can have what was drawn")
+    raise RuntimeError(f"case {seed}: no random robot can have the hidden effects")
 
 
 def _measure(kind: str, rng: np.random.Generator) -> Synthetic:
@@ -252,15 +252,17 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--count", type=int, default=200)
     parser.add_argument("--first", type=int, default=0)
-    parser.add_argument("--kind", choices=MIX, help="make only this kind of campaign")
-    parser.add_argument("--step", type=int, default=1, help="take each STEP-th case")
+    parser.add_argument(
+        "--kind", choices=MIX, help="create only campaigns of this kind"
+    )
+    parser.add_argument("--step", type=int, default=1, help="use every STEP-th case")
     parser.add_argument(
         "--understated", type=float, default=1.0,
-        help="factor by which the stated sigma is too small",
+        help="factor by which the standard deviation in the campaign is too small",
     )  # fmt: skip
-    parser.add_argument("--make", action="store_true", help="make campaigns only")
+    parser.add_argument("--make", action="store_true", help="only create campaigns")
     parser.add_argument("--answer", action="store_true", help="only diagnose campaigns")
-    parser.add_argument("--score", action="store_true", help="only score results")
+    parser.add_argument("--score", action="store_true", help="only evaluate results")
     asked = parser.parse_args()
     for name in ("campaigns", "truths", "answers"):
         (asked.folder / name).mkdir(parents=True, exist_ok=True)
@@ -271,7 +273,7 @@ def main() -> None:
                 if not asked.answer:
                     make(asked.folder, seed, asked.kind, asked.understated)
             except SimulationFailed as error:
-                print(f"case {seed}: left out, {error}", flush=True)
+                print(f"case {seed}: omitted, {error}", flush=True)
             made = (asked.folder / "truths" / f"c{seed:04d}.json").exists()
             if made and not asked.make:
                 answer(asked.folder, seed)

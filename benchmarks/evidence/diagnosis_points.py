@@ -58,7 +58,7 @@ def machine(seed: int, hidden: str | None, common: float) -> Synthetic:
             return simulated(drawn.robot, wanted, design, seed, noise)
         except (NotApplicable, SimulationFailed, BadInput):
             continue
-    raise RuntimeError(f"case {seed}: no robot can have what was drawn")
+    raise RuntimeError(f"case {seed}: no random robot can have the hidden effects")
 
 
 def covered(found: Diagnosis, made: Synthetic) -> tuple[int, int]:
@@ -102,12 +102,12 @@ def main() -> None:
             f"{len(found.fit.unknowns.functions)} functions; "
             f"{found.before.normalised:.2f} sigma before, {found.after.normalised:.2f} "
             f"after, {found.noise.normalised:.2f} noise; "
-            f"in common {1e6 * turn:.0f} urad, {1e6 * shift:.1f} um",
+            f"common motion {1e6 * turn:.0f} urad, {1e6 * shift:.1f} um",
             flush=True,
         )
     print(
-        f"{asked.count} cases: {functions} with functions, {named} named as hidden, "
-        f"{inside[0]} of {inside[1]} intervals cover"
+        f"{asked.count} cases: {functions} with functions, {named} with the hidden "
+        f"effect, {inside[0]} of {inside[1]} intervals contain the true value"
     )
 
 

@@ -137,7 +137,7 @@ def summary(answers: list[dict[str, Any]]) -> str:
         how: np.mean([a["right"][how] for a in answers], axis=0) for how in rows
     }
     for k, count in enumerate(ROWS):
-        lines.append(f"{count} rows: right {shares['planned'][k]:.0%} planned, "
+        lines.append(f"{count} rows: correct {shares['planned'][k]:.0%} planned, "
                      f"{shares['random'][k]:.0%} random")  # fmt: skip
     return "\n".join(lines)
 

@@ -208,7 +208,7 @@ def bent(box: Bricks, force: NDArray, u: NDArray, tolerance: float) -> NDArray:
         u = u + change
         if np.abs(change).max() < tolerance * LENGTH:
             return u
-    raise RuntimeError(f"no equilibrium under {force} N")
+    raise RuntimeError(f"found no equilibrium under {force} N")
 
 
 def refined(box: Bricks, u: NDArray, finer: Bricks) -> NDArray:
@@ -258,10 +258,10 @@ def main() -> None:
     coarse, fine = (compliances(c, exact=True) for c in (COUNTS, (250, 24, 8)))
     right = fine + (fine - coarse) / 3
     factors = right / compliances(COUNTS, exact=False)
-    print("too stiff by", ", ".join(f"{100 * (f - 1):.2f} %" for f in factors),
-          "along the height, across, in twist")  # fmt: skip
-    print("published solids, per cent off, along the height, across")
-    print("    F  beta  as stiff a beam")
+    print("excess stiffness", ", ".join(f"{100 * (f - 1):.2f} %" for f in factors),
+          "along the height, along the width, in torsion")  # fmt: skip
+    print("difference of the published solids [%] along the height and the width")
+    print("    F  beta  beam of equal stiffness")
     link, root = stiffer_beam(factors)
     published = {
         (size, degrees): np.array([row[k] for row in rows[1]])
@@ -273,7 +273,7 @@ def main() -> None:
     for degrees in map(int, sys.argv[1:]):
         for size, rows in bent_rows(np.radians(degrees)).items():
             away = off(published[size, degrees], rows)
-            print(f"{size:7.3f}{degrees:4d}{away} off these bricks", flush=True)
+            print(f"{size:7.3f}{degrees:4d}{away} from these bricks", flush=True)
 
 
 if __name__ == "__main__":

@@ -188,7 +188,7 @@ def bent(solid: Box, force: NDArray, u: NDArray, start: NDArray) -> NDArray:
             if np.abs(change).max() < (1e-9 if share == 1.0 else 1e-3) * LENGTH:
                 break
         else:
-            raise RuntimeError(f"no equilibrium at {share:g} of {force} N")
+            raise RuntimeError(f"found no equilibrium at {share:g} times {force} N")
     return u
 
 
@@ -244,9 +244,9 @@ def main() -> None:
     """Print the table for given numbers and orders of the bricks."""
     numbers = tuple(int(n) for n in sys.argv[1:7]) or (40, 2, 1, 4, 4, 3)
     counts, orders = numbers[:3], numbers[3:]
-    print(f"{counts} bricks of orders {orders}; per cent off, along the height, across")
+    print(f"{counts} bricks of orders {orders}; differences [%], height and width")
     print(
-        "    F  beta      solid [mm]         8 pieces      their root held "
+        "    F  beta      solid [mm]       8 elements      with rigid root "
         "  published beam   solid"
     )
     root = root_link()

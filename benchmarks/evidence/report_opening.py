@@ -53,7 +53,7 @@ def opened(path: Path, first: str) -> list[float]:
 def main() -> None:
     """Print the size and the times of each given page."""
     head = "page, browser, MB, headline, first screen, all, processor [s]"
-    print(f"{head}; least and median of {TIMES}")
+    print(f"{head}; shortest and median time of {TIMES}")
     for path in map(Path, sys.argv[1:]):
         for state, first in (("running", EMPTY), ("just started", "")):
             runs = [opened(path, first) for _ in range(TIMES)]

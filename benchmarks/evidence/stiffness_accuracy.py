@@ -98,7 +98,9 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser()
     parser.add_argument("links", nargs="*", default=list(LINKS))
     parser.add_argument("--kind", choices=KINDS, default="rigid")
-    parser.add_argument("--most", type=float, default=430e3, help="unknowns")
+    parser.add_argument(
+        "--most", type=float, default=430e3, help="largest number of unknowns"
+    )
     asked = parser.parse_args()
     print(
         "link           interfaces        unknowns  true error   estimate"

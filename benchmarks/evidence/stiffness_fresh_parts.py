@@ -50,7 +50,7 @@ def judge(number: int, known: dict, folder: Path) -> tuple[float, float, float]:
     try:
         K, told, mesh = solved(folder / f"{number}.step", known)
     except (BadInput, MeshFailed) as error:
-        print(f"{head} no answer: {error}", flush=True)
+        print(f"{head} no result: {error}", flush=True)
         return np.inf, known["unsure"], 0.0
     true = float(np.abs(scaled(K - truth, truth)).max())
     print(
@@ -64,14 +64,16 @@ def judge(number: int, known: dict, folder: Path) -> tuple[float, float, float]:
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser()
-    parser.add_argument("folder", type=Path, help="of the STEP files")
-    parser.add_argument("--parts", default="0:40", help="numbers, first:last + 1")
+    parser.add_argument("folder", type=Path, help="folder of the STEP files")
+    parser.add_argument(
+        "--parts", default="0:40", help="numbers of the parts, FIRST:END"
+    )
     asked = parser.parse_args()
     references = json.loads(REFERENCES.read_text())
     numbers = [n for n in range(*(int(n) for n in asked.parts.split(":")))
                if str(n) in references]  # fmt: skip
     if not numbers:
-        raise SystemExit(f"{REFERENCES.name} has none of these parts")
+        raise SystemExit(f"{REFERENCES.name} contains none of the requested parts")
     rows = [judge(n, references[str(n)], asked.folder) for n in numbers]
     true, unsure, told = np.array(rows).T
     ratio = told / true

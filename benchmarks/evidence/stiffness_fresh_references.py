@@ -137,7 +137,9 @@ def part_texts(part):
 if __name__ == "__main__":
     parser = argparse.ArgumentParser()
     parser.add_argument("folder", type=Path)
-    parser.add_argument("--parts", default="0:40", help="numbers, first:last + 1")
+    parser.add_argument(
+        "--parts", default="0:40", help="numbers of the parts, FIRST:END"
+    )
     parser.add_argument("--dry", action="store_true", help="write STEP files only")
     asked = parser.parse_args()
     asked.folder.mkdir(parents=True, exist_ok=True)
@@ -155,5 +157,5 @@ if __name__ == "__main__":
             "stiffness": [[float(f"{v:.9g}") for v in row] for row in K],
         }  # fmt: skip
         REFERENCES.write_text(json.dumps(known, indent=0) + "\n")
-        print(f"{number} {kind} {part.note}: unsure {unsure:.1e}, "
+        print(f"{number} {kind} {part.note}: uncertainty {unsure:.1e}, "
               f"{time.process_time() - start:.0f} s", flush=True)  # fmt: skip

@@ -242,7 +242,7 @@ if __name__ == "__main__":
     parser.add_argument("links", nargs="*", default=list(LINKS))
     parser.add_argument("--orders", default="3,4,5")
     parser.add_argument("--layers", type=int, default=2)
-    parser.add_argument("--dry", action="store_true", help="print only")
+    parser.add_argument("--dry", action="store_true", help="only print the results")
     asked = parser.parse_args()
     path = HERE / "stiffness_references.json"
     for name in asked.links:

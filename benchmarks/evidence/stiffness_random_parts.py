@@ -315,17 +315,19 @@ def judge(
 if __name__ == "__main__":
     parser = argparse.ArgumentParser()
     parser.add_argument("--set", choices=list(SEEDS), default="test")
-    parser.add_argument("--parts", default="0:33", help="numbers, first:last + 1")
+    parser.add_argument(
+        "--parts", default="0:33", help="numbers of the parts, FIRST:END"
+    )
     parser.add_argument("--references", type=Path, default=REFERENCES)
     parser.add_argument("--answers", type=Path, default=Path("random_parts.json"))
     asked = parser.parse_args()
-    print("    part        nu unknowns meshes  true error           told  ratio  mesh")
+    print("    part        nu unknowns meshes  true error      estimated  ratio  mesh")
     numbers = range(*(int(n) for n in asked.parts.split(":")))
     ratios, true, own = np.transpose([
         judge(asked.set, n, asked.references, asked.answers) for n in numbers
     ])
     low, five, half, most, high = np.quantile(ratios, [0, 0.05, 0.5, 0.95, 1])
-    print(f"told / true: least {low:.2f}, 5 % {five:.2f}, median {half:.2f}, 95 % "
+    print(f"estimated / true: least {low:.2f}, 5 % {five:.2f}, median {half:.2f}, 95 % "
           f"{most:.2f}, largest {high:.2f}; covered {(ratios >= 1).sum()} of "
-          f"{len(ratios)}; mean true error {100 * true.mean():.3f} %, of the meshes' "
-          f"own K {100 * own.mean():.3f} %")  # fmt: skip
+          f"{len(ratios)}; mean true error {100 * true.mean():.3f} %, of the "
+          f"unextrapolated K {100 * own.mean():.3f} %")  # fmt: skip

@@ -136,7 +136,7 @@ def by_differences(posture: Posture, load: NDArray) -> tuple[float, str]:
     J = np.eye(6)
     J[:3, :3] = turn_jacobian(equilibrium.platform_screw[:3])
     if len(finite) < 6 and np.abs(J - np.eye(6)).max() > 1e-12:
-        return np.nan, "turned, and free in some directions"
+        return np.nan, "rotated, and free in some directions"
     D = J @ np.column_stack(columns)
     D = D @ J.T if len(finite) == 6 else D
     off = relative(C[np.ix_(finite, finite)], D[finite])
@@ -174,7 +174,7 @@ def by_simulation(posture: Posture) -> tuple[dict[str, float], str]:
         "steps": relative(C.compliance, answer.stepped),
         "linearised": relative(C.compliance, answer.linearised),
         "steps known to": answer.stepped_error,
-        "linearised known to": answer.linearised_error,
+        "error of the linearisation": answer.linearised_error,
     }, "compared"
 
 
@@ -210,7 +210,7 @@ def loaded_by_simulation(posture: Posture, load: NDArray) -> tuple[float, str]:
             here = equilibrium.platform_screw
             if stands_elsewhere(posture, classical.length, here, answer.platform):
                 which = "stable" if answer.stable else "unstable"
-                return np.nan, f"another equilibrium in Exudyn, {which} there"
+                return np.nan, f"another equilibrium in Exudyn, {which}"
             off = relative(C, answer.linearised)
             return off, f"compared under {share:g} of the load"
     return np.nan, reason
@@ -280,7 +280,7 @@ def random_ones(seed: int, robots: int) -> Iterator[tuple[str, list[Posture], ND
         if len(postures) == 3:
             kept, loops = kept + 1, loops + (legs > 1)
             yield str(seed + drawn - 1), postures, load
-    print(f"{robots} of {drawn} random robots can move, {loops} of them in loops")
+    print(f"{robots} of {drawn} random robots can move, {loops} of them with loops")
 
 
 def compare(robots: Iterable[tuple[str, list[Posture], NDArray]]) -> None:

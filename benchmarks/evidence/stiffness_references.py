@@ -176,7 +176,7 @@ def report(name, orders, finer):
         K, unknowns = stiffness(mesh, order, LINKS[name][1])
         gap = np.abs(scaled(K - np.array(stored["stiffness"]), K)).max()
         print(
-            f"  order {order}: {unknowns:8d} unknowns, {gap:.1e} off, "
+            f"  order {order}: {unknowns:8d} unknowns, difference {gap:.1e}, "
             f"K_RX {K[0, 0]:.9g}, {time.process_time() - start:.1f} s", flush=True,
         )  # fmt: skip
 
@@ -185,7 +185,7 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser()
     parser.add_argument("links", nargs="*", default=list(LINKS))
     parser.add_argument("--orders", default="3,4,5")
-    parser.add_argument("--finer", type=float, default=1.0, help="meshes, by this")
+    parser.add_argument("--finer", type=float, default=1.0, help="factor of refinement")
     asked = parser.parse_args()
     for name in asked.links:
         report(name, [int(p) for p in asked.orders.split(",")], asked.finer)

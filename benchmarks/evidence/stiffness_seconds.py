@@ -84,7 +84,7 @@ def main() -> None:
         one = answers[str(number)]
         seconds = f"{one['wall']:6.1f} s, processor {one['processor']:6.1f} s"
         print(f"{number:3} {one['kind']:8} {one['triangles']:6} triangles, "
-              f"{one['unknowns']:7} unknowns, told {one['told']:.2%}, {seconds}",
+              f"{one['unknowns']:7} unknowns, estimated {one['told']:.2%}, {seconds}",
               flush=True)  # fmt: skip
     for what in ("wall", "processor"):
         seconds = np.array([one[what] for one in answers.values()])

@@ -188,7 +188,7 @@ def main(cases):
     )
     for case in cases:
         if case.startswith("ccx") and shutil.which("ccx") is None:
-            print(f"{case}: no ccx on the path")
+            print(f"{case}: the command ccx was not found")
             continue
         command = [sys.executable, __file__, "--case", *case.split()]
         run = subprocess.run(command, capture_output=True, text=True, check=False)

@@ -155,7 +155,7 @@ def main() -> None:
         inside = abs(peak.von_mises - part.peak) <= peak.error
         covered += inside
         print(
-            f"{part.kind:9s}{part.load:8s} error {100 * error:6.2f} %, told "
+            f"{part.kind:9s}{part.load:8s} error {100 * error:6.2f} %, estimated "
             f"{100 * peak.error / peak.von_mises:5.1f} %{'' if inside else ' MISSED'}",
             flush=True,
         )

@@ -162,7 +162,7 @@ def main() -> None:
         error = found / expected(part, thick) - 1
         covered.append(abs(error) <= told)
         print(
-            f"{part.kind:9s}{part.load:8s} error {100 * error:6.2f} %, told "
+            f"{part.kind:9s}{part.load:8s} error {100 * error:6.2f} %, estimated "
             f"{100 * told:5.1f} %{'' if covered[-1] else ' MISSED'}",
             flush=True,
         )
