@@ -125,7 +125,10 @@ class FiniteRobot:
 
     @cached_property
     def signs(self) -> NDArray:
-        """1 on the first chain of a closure, -1 on the second, otherwise 0, (K, N)."""
+        """Sign of each unknown in each closure, (K, N).
+
+        It is 1 on the first chain of the closure, -1 on the second, and 0 elsewhere.
+        """
         return closure_signs(self.posture.robot)[:, self.frame]
 
     @cached_property
@@ -151,17 +154,21 @@ class FiniteRobot:
 
     @cached_property
     def precedence(self) -> NDArray:
-        """1 if the second unknown follows the first in the loop, else -1, (K, N, N).
+        """Order of two unknowns in each loop, (K, N, N).
 
-        The loop leads from the base along the first chain, and back along the second
-        chain.
+        It is 1 if the second unknown follows the first, and -1 if it precedes it.  The
+        loop leads from the base along the first chain and back along the second chain.
         """
         along = np.where(self.signs > 0, self._order, 1e6 - self._order)
         return np.sign(along[:, None, :] - along[:, :, None])
 
     @cached_property
     def comes_before(self) -> NDArray:
-        """1 if the first unknown moves the second, 1/2 in the same motion, (N, N)."""
+        """Order of two unknowns in the tree of frames, (N, N).
+
+        It is 1 if the first unknown moves the second, 1/2 if both belong to the same
+        motion, and 0 otherwise.
+        """
         above = self.posture.robot.on_path[self.frame][:, self.frame].T
         return above * (1.0 - np.sign(self._order[:, None] - self._order)) / 2
 

@@ -9,8 +9,8 @@ omega x J omega).  At the tip of a cantilever, this load causes the same deflect
     M_z = Q_0 L / 12 + Q_1 L / 8 - L (F_y - m_z) / 2 + ..
 
 and so on, where Q_0 = q(0) L, Q_1 = (q(L) - q(0)) L and phi = 12 E I / (k G A L^2). For
-phi = 0, it is the product of the consistent mass matrix and the accelerations of both
-ends.  The rest of the load acts at the base.
+phi = 0, this wrench is the product of the consistent mass matrix and the accelerations
+of both ends.  The rest of the load acts at the base.
 
 ======  =======================================================  ==============
 symbol  meaning                                                  unit

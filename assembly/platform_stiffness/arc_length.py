@@ -177,7 +177,7 @@ def follow_load(
     rest = np.zeros(6) if load is None else np.array(load, dtype=float)
     rest[component] = first
     start = solve_exact(tight, rest, gravity=gravity, method=method)
-    # raises FreeMotion if the load acts on a motion without stiffness
+    # this call raises FreeMotion if the load acts on a motion without stiffness
     solve_assembly(tight, np.eye(6)[component], method=method)
     span = abs(last - first)
     cut = start.cut.cut(tight)

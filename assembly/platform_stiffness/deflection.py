@@ -177,7 +177,7 @@ def deflection_curve(
     check_method(method)
     if state not in {"contact", "exact"}:
         raise ValueError(
-            f"deflection_curve: no state {state!r}; expected 'contact' or 'exact'"
+            f"deflection_curve: found state {state!r}, expected 'contact' or 'exact'"
         )
     if component not in range(6) or not len(loads):
         raise BadInput(

@@ -96,13 +96,14 @@ def platform_stiffness(
     side = cast(Side, current_value("side", side, _OLD_SIDES))
     if side not in get_args(Side):
         raise ValueError(
-            f"platform_stiffness: no side {side!r}; expected 'loading' or 'unloading'"
+            f"platform_stiffness: found side {side!r}, expected 'loading' or "
+            "'unloading'"
         )
     state = cast(State, current_value("state", state, _OLD_STATES))
     if state not in get_args(State):
         raise ValueError(
-            f"platform_stiffness: no state {state!r}; expected 'nominal', 'contact' "
-            "or 'exact'"
+            f"platform_stiffness: found state {state!r}, expected 'nominal', "
+            "'contact' or 'exact'"
         )
     if not isinstance(posture, Posture):
         posture = together(posture)

@@ -64,7 +64,7 @@ from forcefit.assembly.platform_stiffness.platform_stiffness import State
 
 @dataclass(frozen=True)
 class TangentState:
-    """Arguments of a tangent stiffness.
+    """Arguments for the computation of a tangent stiffness.
 
     See
     :func:`forcefit.assembly.platform_stiffness.platform_stiffness.platform_stiffness`.
@@ -122,14 +122,14 @@ def compliance_slope(
 def _classical(
     posture: Posture, ahead: Posture, back: Posture, step: float, asked: TangentState
 ) -> _Moved:
-    """Return a function for the classical stiffness at a changed parameter."""
+    """Return a function that computes the classical stiffness of a changed robot."""
     return lambda there, by: (without_clearance(there), there.platform)
 
 
 def _linear(
     posture: Posture, ahead: Posture, back: Posture, step: float, asked: TangentState
 ) -> _Moved:
-    """Return a function for the stiffness of problem (22) at a changed parameter."""
+    """Return a function that computes the stiffness (22) of a changed robot."""
     start = settle(solve_assembly(posture, asked.load, gravity=asked.gravity))
     pressed, touching = contacts(start)
     x, multipliers = unknowns(start), start.multipliers
@@ -172,7 +172,7 @@ def _like(joints: VirtualJoints, there: Posture) -> VirtualJoints:
 def _exact(
     posture: Posture, ahead: Posture, back: Posture, step: float, asked: TangentState
 ) -> _Moved:
-    """Return a function for the exact stiffness at a changed parameter."""
+    """Return a function that computes the exact stiffness of a changed robot."""
     start = solve_exact(posture, asked.load, gravity=asked.gravity)
     local = start.expansion
     at, model = local.placement, local.placement.model

@@ -126,7 +126,7 @@ def natural_modes(
     """
     if state not in {"nominal", "exact"}:
         raise ValueError(
-            f"natural_modes: no state {state!r}; expected 'nominal' or 'exact'"
+            f"natural_modes: found state {state!r}, expected 'nominal' or 'exact'"
         )
     if state == "nominal":
         # the nominal state ignores loads, including drive forces

@@ -242,7 +242,7 @@ def _closest(
     G: NDArray, h: NDArray, d: NDArray, H: NDArray, least: Minima, last: NDArray,
     group: NDArray,
 ) -> NDArray:  # fmt: skip
-    """Return the minimum-energy motions in clearances closest to the previous ones."""
+    """Return the minimum-energy motions closest to the previous ones, (k, nu)."""
     rows = np.vstack([G, H, d[:1]])  # the loads d are equal for all machines
     size = np.linalg.norm(rows, axis=1)
     rows = rows[size > 0] / size[size > 0, None]

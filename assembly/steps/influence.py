@@ -53,7 +53,7 @@ class Influence:
 
 
 def why_order_matters(plan: Plan) -> str:
-    """Return the steps because of which the final state depends on the order.
+    """Return the steps whose result depends on the order of a plan.
 
     Args:
         plan: any plan.

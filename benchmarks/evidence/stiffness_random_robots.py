@@ -95,7 +95,7 @@ def carried(posture: Posture, load: NDArray) -> tuple[ExactAssembly, float]:
 
 
 def slope_by(equilibrium: ExactAssembly, unit: NDArray) -> NDArray:
-    """Return the derivative by a load from differences with several steps, (6,)."""
+    """Return the derivative with respect to a load by differences, (6,)."""
     steps, slopes = list[float](), list[NDArray]()
     for step in _STEPS:
         try:

@@ -77,7 +77,7 @@ def test_old_exact_flag_of_a_deflection_curve_has_the_results_of_the_exact_state
         found = ff.deflection_curve(posture, 3, [0.0, 10.0], exact=True)
     expected = ff.deflection_curve(posture, 3, [0.0, 10.0], state="exact")
     np.testing.assert_array_equal(found.screws, expected.screws)
-    with pytest.raises(ValueError, match="no state 'nominal'"):
+    with pytest.raises(ValueError, match="found state 'nominal'"):
         ff.deflection_curve(posture, 3, [0.0, 10.0], state="nominal")
 
 

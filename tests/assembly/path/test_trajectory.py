@@ -21,7 +21,7 @@ def line(*values, times=None):
 
 @pytest.mark.parametrize("profile", PEAKS)
 def test_profile_peaks_equal_closed_form(profile):
-    """The peaks are in units of D / T and D / T^2."""
+    """The peaks are in units of D / T and D / T^2 for a distance D and a duration T."""
     t = np.linspace(0, 1, 30_001)
     s, speed, acceleration = PROFILES[profile](t)
     peak_speed, peak_acceleration = PEAKS[profile]

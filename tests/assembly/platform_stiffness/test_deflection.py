@@ -210,7 +210,7 @@ def test_arc_length_path_of_shallow_arch_equals_closed_form():
     curve = follow_load(shallow_arch(), FY, 0.0, -1.5 * limit)
     heights = 0.1 + curve.deflection
     np.testing.assert_allclose(-curve.loads, arch_force(heights), atol=1e-6 * limit)
-    assert heights.min() < -0.1  # past both limit points
+    assert heights.min() < -0.1  # beyond both limit points
     assert (np.diff(heights) < 0).all()
     first, second = curve.events
     assert -first.load == pytest.approx(limit, rel=1e-9)

@@ -126,8 +126,8 @@ def test_load_on_free_motion_raises_free_motion():
         ({"at": [0, 1]}, "at: found .* of length 2, expected 3 numbers"),
         ({"load": [1.0]}, "load: found .* of length 1, expected 6 numbers"),
         ({"load": [np.inf] * 6}, "load: found inf as number 1"),
-        ({"state": "loaded"}, "no state 'loaded'"),
-        ({"side": "left"}, "no side 'left'"),
+        ({"state": "loaded"}, "found state 'loaded'"),
+        ({"side": "left"}, "found side 'left'"),
     ],
 )
 def test_platform_stiffness_rejects_invalid_arguments(words, message):

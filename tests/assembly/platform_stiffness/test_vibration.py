@@ -192,7 +192,7 @@ joint = [
 """  # noqa: E501
 
 
-def test_frequencies_of_robot_with_screw_drives_equal_reference(write_file):
+def test_frequencies_of_robot_with_screw_drives_agree_with_reference(write_file):
     """The reference uses stiffness and mass matrices in the twists of all bodies.
 
     The rods are massless and can spin freely.

@@ -32,7 +32,7 @@ def pin(name, radius, error, **more):
 
 
 def bolted(robot, count=COUNT, seed=3):
-    """Return the locked motions of random machines."""
+    """Return the motions within clearances at which random machines are bolted."""
     errors = np.repeat(robot.errors[None], count, axis=0)
     rngs = bolt_generators(robot, seed, range(count))
     return bolted_errors(robot, errors, rngs) - errors

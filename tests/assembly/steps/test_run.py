@@ -282,7 +282,7 @@ def join_legs(count, but=()):
     )
 
 
-def test_displacement_of_gough_platform_equals_inverse_jacobian_times_lengths():
+def test_displacement_of_gough_platform_agrees_with_jacobian():
     last = assemble_in_steps(Plan(join_legs(6)), gough(LENGTHS))[-1]
     expected = inverse_jacobian() @ LENGTHS
     assert last.platform_screw[0] == pytest.approx(expected, rel=1e-9)

@@ -111,7 +111,7 @@ def test_command_error_reports_bounds_of_largest_error(tmp_path, run):
     assert found["assumption"] == BRACKET
 
 
-def test_load_on_robot_with_worst_position_is_rejected(tmp_path):
+def test_worst_position_under_load_is_rejected(tmp_path):
     """The worst position is defined only without a load."""
     key = '{ joints = { crank = 1.2 }, left = "worst" }'
     robot = bolt_joints(load_robot(str(four_bar(tmp_path, key))))
