@@ -238,9 +238,8 @@ def trial(case: Case, random: Random, counts: Counter, small: bool) -> None:
             os.kill(child, way)
             status = finish(child)
             counts[f"stopped by {way.name}"] += status != 0
-            right = {0, -way, 130} | (
-                {2} if small else set()
-            )  # status 2 if the disk is full
+            # the exit status is 2 if the disk is full
+            right = {0, -way, 130} | ({2} if small else set())
             counts["wrong exit status"] += wrong(status, right, case, way)
         counts["lost"] += solved_again(case, standing)
         counts["half-written"] += check(case, counts, status, before)

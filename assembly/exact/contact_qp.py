@@ -35,7 +35,7 @@ from forcefit.assembly.solvers.method import Method
 AT_BOUNDARY = 1e-5  # [-] largest distance of an active constraint from its boundary
 _STEPS = 15  # maximum number of Newton steps
 _STILL = 1e-6  # [-] convergence tolerance on the step, relative to the clearances
-# [-] threshold of a zero multiplier, relative to the largest multiplier
+# [-] tolerance for zero multipliers, relative to the largest multiplier
 _ZERO_MULTIPLIER = 1e-11
 _LONGEST = 0.3  # [-] longest step along a boundary, relative to its radius
 # [-] trial values added to the curvature, relative to the largest curvature

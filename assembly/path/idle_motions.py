@@ -16,7 +16,7 @@ from forcefit.assembly.kinematics.nominal import motion_screws, size_of
 from forcefit.assembly.path.inertial_loads import InertialLoads, inertial_loads
 from forcefit.assembly.path.motion import Motion, carries_matrix, idle_rates
 
-_MASSLESS = 1e-12  # [-] threshold of a zero inertia, relative to the largest inertia
+_MASSLESS = 1e-12  # [-] tolerance for zero inertias, relative to the largest inertia
 _ROUNDING = 1e-20  # [-] round-off of an inertia, relative to mass x (longest arm)^2
 
 
@@ -114,7 +114,7 @@ def _inverse(inertia: NDArray, least: NDArray) -> NDArray:
 
     Args:
         inertia: (k, d, d) inertia of the idle motions.
-        least: (k,) threshold of a zero eigenvalue, which is the round-off of the
+        least: (k,) tolerance for zero eigenvalues, which is the round-off of the
             inertia.
 
     Returns:

@@ -34,10 +34,10 @@ from forcefit.assembly.kinematics.posture import POSE, Posture, pose_components
 from forcefit.assembly.kinematics.se3 import bracket, stumpff, turn_jacobian
 from forcefit.assembly.model.robot import Robot
 
-# [-] threshold of a zero singular value, relative to the largest, as in
+# [-] tolerance for zero singular values, relative to the largest, as in
 # forcefit.assembly.kinematics.closure_rates
 _SINGULAR = 1e-6
-# [-] threshold of a zero singular value, relative to the nominal loop-closure error
+# [-] tolerance for zero singular values, relative to the nominal loop-closure error
 _NOISE = 30.0
 _PRESCRIBED = 1e-4  # [-] largest relative error of a prescribed velocity
 

@@ -18,7 +18,7 @@ from forcefit.results.units import FACTORS
 
 # [periods] shortest path for which vibration is small, at most 15 % (quintic profile)
 LEAST_PERIODS = 10.0
-_STARTS = 1e-6  # [-] threshold of a zero end acceleration, relative to the largest
+_STARTS = 1e-6  # [-] tolerance for zero end accelerations, relative to the largest
 LAWS = {"times": "spline through poses at given times"}
 # description, SI unit and displayed unit of the largest values
 LARGEST = {

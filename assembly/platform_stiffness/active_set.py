@@ -30,11 +30,11 @@ from forcefit.assembly.solvers.cones import cone_sizes
 AT_BOUND = 1e-6  # [-] tolerance of a contact, relative to the clearance
 # [-] largest gap, relative to the clearance, at which a contact force is possible
 _NEAR_BOUND = 1e-3
-_PRESSED = 1e-8  # [-] threshold of a zero force, relative to the largest force
-# [-] threshold of a zero force, relative to the energy without clearance
+_PRESSED = 1e-8  # [-] tolerance for zero forces, relative to the largest force
+# [-] tolerance for zero forces, relative to the energy without clearance
 _ROUNDING = 1e-12
-_RANK = 1e-10  # [-] threshold of a zero singular value, relative to the largest
-_FLAT = 1e-12  # [-] threshold of a zero curvature, relative to the largest
+_RANK = 1e-10  # [-] tolerance for zero singular values, relative to the largest
+_FLAT = 1e-12  # [-] tolerance for zero curvatures, relative to the largest
 _STEPS = 4  # maximum number of Newton steps
 _SETTLED = 1e-14  # [-] tolerance by which a motion may exceed its clearance
 _GUESSES = 3  # maximum number of trial sets of closed clearances

@@ -89,7 +89,7 @@ class _Path:
     """A load-deflection path, with the definition of its arc length.
 
     Attributes:
-        posture: posture of the robot without clearance, with beams cut into pieces.
+        posture: posture of the robot without clearance, with divided beams.
         component: component of the load that varies.
         rest: (6,) [N m, N] constant components of the load.
         gravity: (3,) [m/s^2] gravity vector, or None.

@@ -48,14 +48,14 @@ if TYPE_CHECKING:
     import xarray
 
 _HALVINGS = 14  # number of bisections, for an accuracy of 6e-5 of a load step
-# [-] threshold of a zero contact force, relative to the largest contact force
+# [-] tolerance for zero contact forces, relative to the largest contact force
 _CARRIES = 1e-6
 _CHANGES = 8  # maximum number of changes of contact within a load step
-# [-] threshold of a zero platform motion, relative to the largest of all modes
+# [-] tolerance for zero platform motions, relative to the largest of all modes
 _STAYS = 1e-6
 _STILL = 1e-12  # [characteristic lengths] round-off of platform motions
 _JUMP = 5.0  # [-] smallest ratio of a jump to the motion predicted by the tangents
-_NO_LOAD = 1e-9  # [-] threshold of a zero load, relative to the largest load
+_NO_LOAD = 1e-9  # [-] tolerance for zero loads, relative to the largest load
 
 
 @dataclass(frozen=True)

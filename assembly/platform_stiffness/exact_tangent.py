@@ -34,7 +34,7 @@ from forcefit.assembly.platform_stiffness.matrices import (
     unit_screws,
 )
 
-FLAT = 1e-12  # [-] threshold of a zero curvature, relative to the largest
+FLAT = 1e-12  # [-] tolerance for zero curvatures, relative to the largest
 
 
 def exact_tangent(

@@ -47,7 +47,7 @@ from forcefit.assembly.platform_stiffness.matrices import (
 from forcefit.assembly.solvers.method import Method
 
 Side = Literal["loading", "unloading"]
-_RANK = 1e-10  # [-] threshold of a zero singular value, relative to the largest
+_RANK = 1e-10  # [-] tolerance for zero singular values, relative to the largest
 _NOISE = 1e-12  # [-] relative round-off of a projection
 
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-_RANK = 1e-10  # [-] threshold of a zero singular value, relative to the largest
+_RANK = 1e-10  # [-] tolerance for zero singular values, relative to the largest
 
 
 @dataclass(frozen=True, eq=False)

@@ -44,9 +44,9 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-_RANK = 1e-10  # [-] threshold of a zero motion, relative to the largest
+_RANK = 1e-10  # [-] tolerance for zero motions, relative to the largest
 _ROUNDING = 1e-12  # [-] relative round-off of platform motions
-_UNTOUCHED = 1e-9  # [-] threshold of a zero component of a unit screw
+_UNTOUCHED = 1e-9  # [-] tolerance for zero components of a unit screw
 
 
 class Part(NamedTuple):

@@ -50,7 +50,7 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-_NULL = 1e-12  # [-] threshold of a zero eigenvalue, relative to the largest
+_NULL = 1e-12  # [-] tolerance for zero eigenvalues, relative to the largest
 _ROUNDING = 1e-14  # [-] round-off in the mass matrix, relative to its largest entry
 
 

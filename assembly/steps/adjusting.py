@@ -32,7 +32,7 @@ from forcefit.inputs.table import BadInput, quoted
 
 _MOST_STEPS, _HALVINGS = 30, 12  # maximum number of steps, and of halvings of a step
 _STEP = 1e-7  # [rad, reference lengths] step of the finite differences
-_FLAT = 1e-6  # [-] threshold of a zero derivative, relative to the largest
+_FLAT = 1e-6  # [-] tolerance for zero derivatives, relative to the largest
 _SETTLED = 1e-7  # [-] convergence tolerance on the relative change of the value
 
 

@@ -18,7 +18,7 @@ from forcefit.assembly.steps.run import StepResult, carry_out
 from forcefit.assembly.steps.state import State
 
 _STEP = 1e-7  # [rad, reference lengths] step of the finite differences
-_FLAT = 1e-6  # [-] threshold of a zero derivative, relative to the largest
+_FLAT = 1e-6  # [-] tolerance for zero derivatives, relative to the largest
 # maximum number of Gauss-Newton steps, and trial fractions of a step
 _MOST_STEPS, _SHARES = 20, 0.5 ** np.arange(8)
 _SETTLED = 1e-7  # [-] convergence tolerance on the relative change of the objective

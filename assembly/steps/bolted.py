@@ -32,7 +32,7 @@ from forcefit.inputs.table import BadInput, quoted
 from forcefit.results.display import numbers
 
 BOLT_STREAM = 4  # random number stream of the bolted positions, see draw_generator
-_ROUNDED = 1e-12  # [-] threshold of a zero motion, relative to the clearance
+_ROUNDED = 1e-12  # [-] tolerance for zero motions, relative to the clearance
 _BOLTED = "is bolted at"  # words by which a remark on a bolted joint is recognised
 _RULES = {
     "least": "",

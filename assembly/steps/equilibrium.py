@@ -34,7 +34,7 @@ from forcefit.assembly.solvers.many_programmes import (
 _OPEN = 1e-12  # [rad, reference lengths] tolerance of closed loops
 _ROUNDING = 1e-14  # [-] round-off of the equations, relative to the right-hand side
 _SOLVED = 1e-11  # [-] round-off of the springs, relative to the summands
-_DRIVEN = 1e-8  # [-] threshold of a zero load on a free motion, relative to the load
+_DRIVEN = 1e-8  # [-] tolerance for zero loads on free motions, relative to the load
 
 
 class Held(NamedTuple):
@@ -119,7 +119,7 @@ def equilibrium(
         held: constraints.
         movable: motions that are not bolted, and the loads on them.
         last: previous motions within clearances (k, nu) and free motions (k, nq).
-        tolerance: threshold of a zero singular value, relative to the largest.
+        tolerance: tolerance for zero singular values, relative to the largest.
 
     Returns:
         The equilibrium.

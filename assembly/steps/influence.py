@@ -28,8 +28,8 @@ from forcefit.assembly.steps.machine import Machine
 from forcefit.assembly.steps.plan import Adjust, Fix, Join, Plan, Step, rows_of
 from forcefit.assembly.steps.state import State
 
-_ZERO = 1e-9  # [-] threshold of a zero influence, relative to the largest possible one
-_FREE = 1e-11  # [-] threshold of a zero stiffness, relative to the largest
+_ZERO = 1e-9  # [-] tolerance for zero influences, relative to the largest possible one
+_FREE = 1e-11  # [-] tolerance for zero stiffnesses, relative to the largest
 
 
 @dataclass(frozen=True, eq=False)

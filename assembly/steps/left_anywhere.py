@@ -16,8 +16,8 @@ from forcefit.assembly.solvers.uniform_clearance import sample_uniform_position
 from forcefit.assembly.steps.machine import Machine
 from forcefit.assembly.steps.state import State
 
-_SAME = 1e-10  # [-] threshold of a zero singular value, relative to the largest
-_LOADED = 1e-9  # [-] threshold of a zero contact force, relative to the energy
+_SAME = 1e-10  # [-] tolerance for zero singular values, relative to the largest
+_LOADED = 1e-9  # [-] tolerance for zero contact forces, relative to the energy
 
 
 def positions_left_anywhere(
@@ -97,7 +97,7 @@ def _loaded(machine: Machine, state: State, of_cones: NDArray) -> NDArray:
     cones = (group[:, None] == np.unique(group)).astype(float)
     forces = np.sqrt((state.found.multipliers @ of_cones) ** 2 @ cones)
     slack = np.maximum(0.0, 1.0 - np.sqrt(state.found.clearances**2 @ cones))
-    # the product of force and slack is the duality gap, so one of both is nearly zero
+    # the duality gap is about force times slack, so force or slack is nearly zero
     scale = np.maximum(energy, 1e-18)[:, None]
     loaded = (forces > scale * slack) & (forces > _LOADED * scale)
     return loaded @ cones.T > 0

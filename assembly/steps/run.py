@@ -46,7 +46,7 @@ from forcefit.assembly.steps.state import (
     without,
 )
 
-_ROUNDED = 1e-13  # [-] threshold of a zero energy difference, relative to the energy
+_ROUNDED = 1e-13  # [-] tolerance for zero energy differences, relative to the energy
 _HALVINGS = 50  # number of bisections to compute the opening at a limited force
 
 

@@ -45,7 +45,7 @@ from forcefit.stiffness.screws import skew
 
 # [-] difference between both bounds, relative to the largest error along an axis
 _TOLERANCE = 5e-4
-_ROUNDING = 1e-10  # [-] threshold of a zero row, relative to the largest row
+_ROUNDING = 1e-10  # [-] tolerance for zero rows, relative to the largest row
 
 CONVEX = "the largest error of all positions with minimum energy"
 BRACKET = (

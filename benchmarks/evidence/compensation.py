@@ -3,7 +3,7 @@
     python benchmarks/evidence/compensation.py OUT.json --count 20 [--first 0]
         [--robots arm6]
 
-In case k, random numbers have the seed k.  The robot has six drives, or it is a Delta
+Case k uses random numbers with the seed k.  The robot has six drives, or it is a Delta
 robot.  It has one or two hidden effects, whose sizes are five times the noise.
 Measurements are simulated and diagnosed.  The identified robot is used to correct the
 commands at configurations that were not measured, and the robot is simulated with the

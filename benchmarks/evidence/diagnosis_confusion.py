@@ -3,7 +3,7 @@
     python benchmarks/evidence/diagnosis_confusion.py FOLDER --count 200  # make
     python benchmarks/evidence/diagnosis_confusion.py FOLDER --score      # count
 
-In case k, random numbers have the seed k.  They determine a robot (``random_robots``),
+Case k uses random numbers with the seed k.  They determine a robot (``random_robots``),
 a design of measurements, and hidden effects.  The hidden effects are one effect of the
 library at 2, 5 or 9 times the noise, two effects, no effect, an effect outside the
 library, or an effect that the design cannot distinguish from another effect.

@@ -3,7 +3,7 @@
     python -m benchmarks.evidence.diagnosis_points [--first 710000] [--count 10]
         [--hidden library|outside] [--common 1.0] [--device 5e-6]
 
-In case k, random numbers have the seed k.  They determine a robot (``random_robots``)
+Case k uses random numbers with the seed k.  They determine a robot (``random_robots``)
 and 128 measurements at 64 configurations.  The device noise is 5 um.  In addition, all
 points of a measurement have a common random motion of 20 um and 200 urad, multiplied by
 ``--common``.  There is no hidden effect, or a hidden effect at five times the common

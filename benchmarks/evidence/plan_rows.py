@@ -2,7 +2,7 @@
 
     python benchmarks/evidence/plan_rows.py OUT.json --count 50 [--first 0]
 
-In case k, random numbers have the seed k.  They determine a robot and an effect of the
+Case k uses random numbers with the seed k.  They determine a robot and an effect of the
 library, whose rms in random measurements is STRENGTH sigma.  Campaigns of increasing
 size are simulated with this effect and noise.  Their measurements are planned, or
 random within the same ranges.  Each campaign is diagnosed.  The required number of

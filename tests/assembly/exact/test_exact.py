@@ -128,7 +128,7 @@ def test_energy_of_elastic_bar_equals_closed_form(longer):
 def test_passive_joint_stops_at_its_motion_limit(longer, bound):
     """The bar deforms because the rotation of the pin is limited.
 
-    The second limit is not reached in the linear model, but with finite motions.
+    The linear model does not reach the second limit, but finite motions do.
     """
     free = solve_exact(two_bars(longer, stretch=True))
 

@@ -260,7 +260,7 @@ def forces_of_six_legs(robot):
 
 
 def test_drive_forces_of_gough_platform_equal_closed_form(tmp_path):
-    """The force of each drive is m (g + a) / (6 cos b) for an angle b of legs to z."""
+    """Each force is m (g + a) / (6 cos b) for an angle b between the legs and z."""
     robot, along = six_legs(tmp_path / "six_sps.toml", "spherical")
     pose = [0.0, 0.0, 0.5, 0.0, 0.0, 0.0]
     path = instants(POSE, [pose], [np.zeros(6)], [[0, 0, 5.0, 0, 0, 0]])
