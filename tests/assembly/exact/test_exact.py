@@ -192,7 +192,7 @@ def test_error_within_clearance_causes_no_energy():
 
 
 def test_pin_tilts_within_clearance_if_axes_are_not_parallel():
-    """The axes of the hinges are at an angle of 0.1 rad, which the pin must tilt."""
+    """The angle between the hinge axes is 0.1 rad, so the pin must tilt."""
     posture = two_bars(0.06, Clearance(tilt=0.2))
     errors = posture.robot.errors.copy()
     errors[4, 0] = 0.1  # twist of bar two, which no joint can compensate

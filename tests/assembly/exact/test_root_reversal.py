@@ -119,7 +119,7 @@ def test_solution_does_not_depend_on_choice_of_base(seed):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_exact_energy_depends_on_choice_of_base_by_second_order(seed):
+def test_exact_energy_with_exchanged_base_differs_by_second_order(seed):
     """Errors before and after a rotation differ by second-order terms."""
     legs, _ = random_legs(np.random.default_rng(seed))
     off = []

@@ -117,7 +117,8 @@ def test_clamped_column_buckles_at_euler_load():
 def test_thin_cantilever_buckles_at_lateral_buckling_load():
     """The buckling load is 4.013 sqrt(EI GJ) / L^2 (Michell, Prandtl 1899).
 
-    The deflection before buckling divides it by sqrt((1 - I_y/I_z) (1 - GJ/EI_z)).
+    With the deflection before buckling, it is divided by
+    sqrt((1 - I_y/I_z) (1 - GJ/EI_z)).
     """
     E, nu = 70e9, 0.3
     G = E / (2 * (1 + nu))

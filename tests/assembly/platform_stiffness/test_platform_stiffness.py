@@ -98,7 +98,7 @@ def test_displacement_under_a_unit_load_equals_the_compliance(name):
 
 
 def differences(solve, posture, load, step):
-    """Return central differences of the platform screw by the load, (6, 6)."""
+    """Return central differences of the platform screw for changes of the load."""
     columns = []
     for row in range(6):
         ahead, back = (

@@ -59,7 +59,7 @@ def planar_platform(places, errors, k=1e6):
 
 
 def two_bars(gap):
-    """Return two collinear bars between walls, which are too short by a gap."""
+    """Return two collinear bars between two walls, with a gap because of an error."""
     frames = (
         Frame("bar1", "base", translation=[0, 0, 0.5], link=spring(1e6, 5)),
         Frame("joint", "bar1", geometric_error=[0, 0, 0, 0, 0, -gap]),

@@ -227,7 +227,7 @@ def test_bolted_joint_is_unchanged_after_writing_and_reading(tmp_path):
     ("{ joints = {} }", "found no coordinate"),
     ("{ pose = { tx = 5.0 } }", "locked_at"),
 ])  # fmt: skip
-def test_invalid_locked_at_is_rejected(tmp_path, key, text):
+def test_invalid_key_locked_at_is_rejected(tmp_path, key, text):
     with pytest.raises(BadInput) as caught:
         load_robot(four_bar(tmp_path, key))
     assert text in str(caught.value)

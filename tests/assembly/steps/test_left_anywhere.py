@@ -149,7 +149,7 @@ def test_sweep_and_statistics_use_same_random_positions(tmp_path):
     assert energies == pytest.approx(own.solve(0, 3)["energy"], rel=1e-6, abs=1e-12)
 
 
-def test_rule_left_is_unchanged_after_writing_and_reading(tmp_path):
+def test_bolting_rule_is_unchanged_after_writing_and_reading(tmp_path):
     robot = load_robot(four_bar(tmp_path, '{ left = "uniform" }'))
     write_robot(robot, tmp_path / "again.toml")
     bolt = load_robot(tmp_path / "again.toml").frame("stand").locked_at
@@ -159,7 +159,7 @@ def test_rule_left_is_unchanged_after_writing_and_reading(tmp_path):
 
 
 @pytest.mark.parametrize("key", ['{ left = "normal" }', "{ left = 3 }"])
-def test_unknown_rule_left_is_rejected(tmp_path, key):
+def test_unknown_bolting_rule_is_rejected(tmp_path, key):
     with pytest.raises(BadInput) as caught:
         load_robot(four_bar(tmp_path, key))
     assert "locked_at.left: found" in str(caught.value)

@@ -490,7 +490,7 @@ def test_shim_in_bolted_joint_is_rejected():
 
 
 @pytest.mark.parametrize("name", ["four_bar", "five_bar", "3rrr", "irsbot2", "delta"])
-def test_energy_of_pinned_robot_equals_solve_assembly(name, rng):
+def test_energy_of_pinned_robot_agrees_with_solve_assembly(name, rng):
     """The energy after random orders of joining is compared."""
     robot = load_robot(name)
     errors = rng.normal(size=robot.errors.shape) * np.repeat([3e-3, 3e-4], 3)
