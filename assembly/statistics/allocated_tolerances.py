@@ -27,33 +27,32 @@ if TYPE_CHECKING:
 _SHOWN = {"rad": "mrad", "m": "mm"}  # display units of tolerances
 _SHARE_OF = {
     "reciprocal": "of the price",
-    "logarithm": "of the saving by looser tolerances",
+    "logarithm": "of the saving by larger tolerances",
 }
 
 
 @dataclass(frozen=True, eq=False)
 class Allocation:
-    """Tolerances and their cost, with bounds on the cost and on each limited quantity.
+    """Result of a tolerance allocation for G classes of errors.
 
     Attributes:
         plan: costs and limits.
         tolerances: (G,) [rad or m] tolerance of each class.
         price: cost of the tolerances.
-        uniformly_scaled: (G,) [rad or m] solution of the convex programme, scaled by
-            one common factor so that all limits are met.
+        uniformly_scaled: (G,) [rad or m] solution of the convex programme, multiplied
+            by one common factor so that all limits are satisfied.
         price_uniformly_scaled: cost of ``uniformly_scaled``, at least ``price``.
-        price_bound: lower bound on the cost of all tolerances for which every robot
-            meets the convex limits. NaN if the yield is below 1 or a limit is not
-            convex.
+        price_bound: lower bound on the minimum cost. NaN if the yield is below 1 or a
+            limit is not convex.
         cuts: number of cutting planes in the convex programme.
-        worst: for each limit, if the yield is 1: the limited quantity at the worst
-            corner found, and its proven upper bound over all postures (NaN without a
-            proof).
-        proven_scale: factor, at most 1, by which the tolerances must be scaled so that
-            the proven upper bounds meet the limits too. NaN without a proof.
+        worst: for each limit, the value at the worst corner found and the proven upper
+            bound over all postures (NaN without a proof). Empty if the yield is below
+            1.
+        proven_scale: factor <= 1 on all tolerances at which the proven upper bounds
+            satisfy the limits. NaN without a proof.
         verification: yields estimated from new random draws, with confidence intervals.
-        perfect_parts: for each limit on a pose error, the pose error [rad or m] due to
-            clearances alone, and its posture.
+        perfect_parts: for each limit on a pose error, the pose error [rad or m] of a
+            robot without geometric errors, and its posture.
     """
 
     plan: Plan
@@ -71,18 +70,18 @@ class Allocation:
     __repr__, _repr_html_ = short_repr, html_table
 
     def to_xarray(self) -> "xarray.Dataset":
-        """Return the data set of class tolerances that ``--output`` writes."""
+        """Return the tolerances as the data set that ``--output`` writes."""
         return tolerance_dataset(self)
 
     def to_pandas(self) -> "pandas.DataFrame":
-        """Return a table with one row per class and columns (variable, component)."""
+        """Return the tolerances as a table with one row per class of errors."""
         from forcefit.assembly.model.tables import frame_table
 
         return frame_table(self.to_xarray(), "class")
 
 
 def allocation_of(allocation: Allocation) -> dict[str, Any]:
-    """Convert an allocation to a dictionary of plain values."""
+    """Convert an allocation to a dictionary for JSON."""
     plan, shares = allocation.plan, price_shares(allocation)
     classes = [
         {
@@ -125,13 +124,11 @@ def allocation_of(allocation: Allocation) -> dict[str, Any]:
 
 
 def price_shares(allocation: Allocation) -> NDArray:
-    """Return the fraction of the cost saving that each class could contribute.
+    """Return the contribution of each class to the cost saved by larger tolerances.
 
-    At the optimum, the cost saved per relative increase of a tolerance equals the
-    limit's multiplier times the resulting change of the limited quantity.  For the
-    reciprocal cost law this saving is cost / tolerance; for the logarithmic law it is
-    the cost coefficient.  The saving is dimensionless, so angles and lengths can be
-    compared.
+    The saving is the derivative of the cost with respect to the logarithm of the
+    tolerance, with a minus sign. For the reciprocal cost law it is cost / tolerance.
+    For the logarithmic law it is the cost coefficient.
 
     Args:
         allocation: result of the allocation.
@@ -150,10 +147,10 @@ def price_shares(allocation: Allocation) -> NDArray:
 def _taken(
     allocation: Allocation, key: str, reached: float, at: str
 ) -> dict[str, float | str]:
-    """Return the pose error due to clearances, and the cost without any clearance."""
+    """Return the pose error due to clearances and the cost without clearances."""
     plan, limit = allocation.plan, allocation.plan.limits[key]
-    # the pose errors due to geometric errors and due to clearances nearly add up; the
-    # former are proportional to the tolerances
+    # The pose error is about the sum of a term due to clearances and a term that is
+    # proportional to the tolerances.
     looser = limit / (limit - reached) if reached < limit else np.inf
     without = allocation.price / looser
     if plan.cost == "logarithm":
@@ -165,7 +162,7 @@ def _taken(
 
 
 def _distribution(plan: Plan) -> dict[str, Any]:
-    """Return the distribution of the errors within their tolerances."""
+    """Return the name and the cut-off of the error distribution."""
     sources = plan.sources
     own = sources.independent if isinstance(sources, CalloutSources) else sources
     kind = "as in the robot file" if own is None else KINDS[int(own.kind[0])]
@@ -174,16 +171,16 @@ def _distribution(plan: Plan) -> dict[str, Any]:
 
 
 def _contact_length(plan: Plan) -> float | None:
-    """Return the contact length [m] of the contact model, or None for other models."""
+    """Return the contact length [m]; None unless the clearance model is "contact"."""
     if not plan.limits_pose or plan.clearance != "contact":
         return None
     return plan.contact_length or contact_length_of(plan.sources.robot)
 
 
 def _unit(allocation: Allocation, group: int) -> str:
-    """Return the unit of the tolerances of a class."""
+    """Return the unit of the tolerance of a class."""
     first = int(np.flatnonzero(allocation.plan.group == group)[0])
-    # a callout combines shifts and tilts in one zone, whose width is a length
+    # The tolerance of a callout is the width of its zone, which is a length.
     return "rad" if allocation.plan.sources.units[first] == "rad" else "m"
 
 
@@ -205,10 +202,10 @@ def allocation_text(results: dict[str, Any]) -> str:
         sides = "" if one.get("width") else "+-"
         size = in_unit(one["tolerance"], _SHOWN[one["unit"]])
         line = f"  {one['name']}: {sides}{size}"
-        note = "the loosest allowed" if one["at_loosest"] else f"{one['share']:.0%}"
+        note = "largest allowed" if one["at_loosest"] else f"{one['share']:.0%}"
         lines.append(f"{line} ({note})")
     if lines:
-        lines.append(f"in brackets: the share {_SHARE_OF[results['cost']]}")
+        lines.append(f"in brackets: share {_SHARE_OF[results['cost']]}")
     if results["clearance"]:
         means = clearance_means(results["clearance"], results["contact_length"])
         lines.append(f"pose errors: clearance {results['clearance']}: {means}")
@@ -218,14 +215,17 @@ def allocation_text(results: dict[str, Any]) -> str:
     for key, worst in results["worst"].items():
         proven = (
             f"at most {worst['proven']:.4g} proven" if np.isfinite(worst["proven"])
-            else "nothing proven"
+            else "no upper bound"
         )  # fmt: skip
         lines.append(
             f"worst {key}: {worst['found']:.4g} found, {proven}, "
             f"limit {results['limits'][key]:g}"
         )
     if np.isfinite(results["proven_scale"]):
-        lines.append(f"proven when scaled by {results['proven_scale']:.4f}")
+        lines.append(
+            "limits proven for all tolerances multiplied by "
+            f"{results['proven_scale']:.4f}"
+        )
     check = results["verification"]
     if check:
         one = check["yield"]
@@ -238,14 +238,14 @@ def allocation_text(results: dict[str, Any]) -> str:
 
 
 def _taken_text(key: str, one: dict[str, Any]) -> str:
-    """Format a sentence on the pose error caused by clearances alone."""
+    """Format the pose error due to clearances alone as a sentence."""
     reached, limit = (
         in_unit(one[k], _SHOWN[one["unit"]]) for k in ("reached", "limit")
     )
     return (
-        f"clearances alone use {reached} of the {limit} of {key} (at "
-        f"{one['at']}): without them tolerances could be about "
-        f"{one['looser_without']:.3g} times looser, at a price of about "
+        f"clearances alone cause {reached} of the limit of {limit} on {key} (at "
+        f"{one['at']}). Without clearances, tolerances could be larger by a factor of "
+        f"about {one['looser_without']:.3g}, at a cost of about "
         f"{one['price_without']:.3g}"
     )
 
@@ -262,20 +262,22 @@ def _looks_text(check: dict[str, Any]) -> str:
 
 
 def _price_text(results: dict[str, Any]) -> str:
-    """Format the cost of the tolerances as text, with its lower bound or reduction."""
+    """Format the cost of the tolerances and its lower bound as text."""
     price, alike, bound = (results[k] for k in ("price", "price_alike", "price_bound"))
     text = f"price {price:.5g}"
     if np.isfinite(bound):
         return f"{text}, no tolerances cost less than {bound:.5g}"
     if alike > price:
-        text += f", {alike:.5g} with those of the convex programme scaled alike"
+        text += (
+            f", {alike:.5g} for the uniformly scaled solution of the convex programme"
+        )
         if results["cost"] == "reciprocal":
             text += f": {1 - price / alike:.1%} less"
     return text
 
 
 def tolerance_dataset(allocation: Allocation) -> "xarray.Dataset":
-    """Convert an allocation to a data set over ``class``."""
+    """Convert an allocation to a data set with the dimension ``class``."""
     import xarray
 
     plan, results = allocation.plan, allocation_of(allocation)

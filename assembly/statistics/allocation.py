@@ -1,17 +1,17 @@
-"""Tolerance allocation: minimum-cost tolerances within limits.
+"""Tolerance allocation: minimum-cost tolerances that satisfy limits.
 
-Each class g of errors has a tolerance t_g, whose cost is ``c_g / t_g`` (or ``-c_g log
-t_g``).  The margin and the energy are convex in the tolerances. If these are the only
-limited quantities and the yield is 1,
-:mod:`forcefit.assembly.statistics.cutting_planes` finds the minimum cost and proves
-that no tolerances cost less.  Wrenches, stress, pose errors and a yield below 1 are not
-convex in the tolerances. For limits on them,
-:mod:`forcefit.assembly.statistics.least_cost` continues from there to a local minimum
-of the cost.
+Each class g of errors has a tolerance t_g with the cost ``c_g / t_g`` or ``-c_g log
+t_g``. The assembly margin and the elastic energy are convex in the tolerances. If no
+other quantity is limited and the required yield is 1,
+:mod:`forcefit.assembly.statistics.cutting_planes` finds the optimum and a lower bound
+on the cost. Wrenches, stress and pose errors are not convex in the tolerances, and
+neither is a yield below 1. For limits on them,
+:mod:`forcefit.assembly.statistics.least_cost` starts from that solution and finds a
+local minimum of the cost.
 
-Finally, all tolerances are scaled by one common factor, chosen so that independent
-random draws, or the worst corners of the tolerance box, just meet every limit. The
-result is verified with new random draws.
+Finally, all tolerances are multiplied by the largest common factor with which random
+draws, or the worst corners of the tolerance box, satisfy every limit. The result is
+verified with new random draws.
 """
 
 from collections.abc import Callable, Sequence
@@ -41,7 +41,7 @@ from forcefit.assembly.statistics.scaling import (
 from forcefit.assembly.statistics.verification import prove_worst, verify
 from forcefit.assembly.statistics.worst_case_widths import allot_worst_case
 
-# number of draws for the final factor, as a multiple of the number of training draws
+# ratio of the number of draws for the final factor to the number of training draws
 _SCALING_DRAWS = 4
 
 
@@ -52,21 +52,21 @@ def allocate(
     progress: Callable[[str, int, int], None] = lambda what, done, total: None,
     replay: Replay | None = None,
 ) -> Allocation:
-    """Find the minimum-cost tolerances that meet a plan's limits, and verify them.
+    """Find minimum-cost tolerances that satisfy the limits of a plan, and verify them.
 
     Args:
         postures: postures of one robot in its workspace.
         plan: costs and limits.
         fresh: number of independent draws for the verification; 0 to skip it.
         progress: callback that receives the name of a step, its progress and its total.
-        replay: stored results from which an interrupted computation resumes.
+        replay: stored results of an interrupted computation.
 
     Returns:
         The tolerances.
 
     Raises:
-        BadInput: an error can be taken up neither by a clearance nor by a spring, or a
-            limit is violated even without errors or with the tightest tolerances.
+        BadInput: no clearance or spring can compensate an error, or a limit is exceeded
+            even without errors or with the tightest tolerances.
     """
     replay = replay or Replay()
     if isinstance(plan.sources, CalloutSources) and plan.asked_yield == 1.0:
@@ -75,7 +75,8 @@ def allocate(
     perfect_parts = requirement.perfect_parts()
     convex_requirement = requirement
     if not requirement.convex:
-        # without a convex quantity, start from the tolerances for a limited energy
+        # If no limited quantity is convex, start from the solution for a limit on the
+        # energy.
         typical = _typical_energy(requirement)
         convex_requirement = Requirement(
             postures, replace(plan, limits={"energy": typical}), replay
@@ -110,7 +111,7 @@ def _scaled_tolerances(
     proportions: NDArray,
     progress: Callable[[str, int, int], None],
 ) -> tuple[NDArray, NDArray]:
-    """Return the minimum-cost and the uniformly scaled starting tolerances."""
+    """Return the minimum-cost tolerances and the uniformly scaled ones."""
     samples = draw_samples(requirement, TRAINING)
     if requirement.is_convex:
         uniformly_scaled = scale_uniformly(

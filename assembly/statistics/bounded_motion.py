@@ -1,8 +1,8 @@
-"""Clearance positions of draws in which a passive joint may reach its motion limit.
+"""Clearance positions if a passive joint may reach its motion limit.
 
-A prepared posture omits the motion limits of passive joints, because clearances rarely
-move a joint so far.  Draws in which a joint may reach a limit are solved one by one.
-Every relevant limit then adds a cone to problem (27), which describes the set of
+The linear response omits the motion limits of passive joints, because clearances rarely
+move a joint so far. If a joint may reach a limit in a draw, that draw is solved
+separately: the limit is added as a cone to problem (27), which describes the set of
 platform screws (:mod:`forcefit.assembly.linear.reference.pose_error`).
 """
 
@@ -19,20 +19,20 @@ from forcefit.assembly.linear.reference.reduction import FreeMotion
 from forcefit.assembly.solvers.conic import SolverFailed
 from forcefit.assembly.statistics.linear_response import LinearResponse
 
-# assumption of the pose error bounds: spring deformations stay at minimum energy
+# assumption of problem (27): springs keep their minimum-energy deformation
 ASSUMPTION = "frozen"
 
 
 def draws_at_bounds(prepared: LinearResponse, draws: Assembly) -> NDArray:
-    """Find the draws in which a passive joint may reach its motion limit.
+    """Return in which draws a passive joint may reach its motion limit.
 
     Args:
         prepared: the prepared posture.
-        draws: solutions of the posture for k draws.
+        draws: solutions for k draws at the posture.
 
     Returns:
-        (k,) bool, True if a motion limit is active in the solution, if the clearances
-        allow a joint to reach its limit, or if nothing but the limit stops a platform
+        (k,) bool, True if a motion limit is active in the solution, if a joint can
+        reach its limit within the clearances, or if only the limit bounds a platform
         motion.
     """
     solved = np.isfinite(draws.energy)
@@ -52,7 +52,7 @@ def draws_at_bounds(prepared: LinearResponse, draws: Assembly) -> NDArray:
 
 
 def _moves_platform(prepared: LinearResponse) -> NDArray:
-    """Return (nq,) bool, True if a free motion moves the platform with loops closed."""
+    """Return which free motions move the platform with all loops closed, (nq,) bool."""
     mismatch = prepared.posture.mismatch
     A_q = prepared.closures @ prepared.joints.free
     P_q = prepared.platform @ prepared.joints.free
@@ -64,7 +64,7 @@ def _moves_platform(prepared: LinearResponse) -> NDArray:
 def bounded_position(
     draws: Assembly, i: int, wrench: NDArray | None, rng: np.random.Generator
 ) -> tuple[NDArray, bool]:
-    """Compute the platform screw of one draw, at contact or from the uniform model.
+    """Compute the platform screw of one draw in the contact or the uniform model.
 
     Args:
         draws: draws of one posture.
@@ -74,8 +74,9 @@ def bounded_position(
         rng: random number generator for the uniform model.
 
     Returns:
-        (6,) [rad, m] screw, NaN if the draw has no solution or the solver fails; and
-        whether the random walk mixed. Unlimited motions are made as small as possible.
+        Platform screw, (6,) [rad, m], and whether the random walk mixed. The screw is
+        NaN if the draw has no solution or the solver fails. Free motions without a
+        limit are as small as possible.
     """
     from forcefit.assembly.solvers.uniform_clearance import sample_uniform_position
 

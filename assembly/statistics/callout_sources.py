@@ -1,8 +1,8 @@
 """Random geometric errors from drawing callouts, joint fits and an errors file.
 
-The shift and the tilt of a bore within its position zone are not independent, so all
-errors of one callout are drawn together. A draw depends only on its number and the
-seed, as in :mod:`forcefit.assembly.model.error_distributions`.
+The shift and the tilt of a bore within its position zone depend on each other, so all
+errors of one callout are drawn together. A draw depends only on its index and the seed,
+as in :mod:`forcefit.assembly.model.error_distributions`.
 """
 
 from collections.abc import Callable
@@ -30,21 +30,22 @@ from forcefit.assembly.statistics.ranking import group_of, kind_of
 from forcefit.inputs.table import BadInput
 
 _SAMPLE = 1 << 14  # number of draws from which the variance of a fit is estimated
-_WORDS = 4  # random numbers returned by one step of the Philox generator
+_WORDS = 4  # number of random numbers per step of the Philox generator
 
 
 @dataclass(frozen=True, eq=False)
 class CalloutSources:
-    """Sources of random errors (callouts, errors file, fits), with m numbers per draw.
+    """Random errors from callouts, an errors file and fits.
 
-    The m numbers are, in this order: the independent errors [rad or m]; the coordinates
-    of the callouts' zones relative to the radius of each ball [-]; and the radial
-    clearances of the fits minus their means [m].
+    Each draw consists of m random numbers, in this order: the independent errors [rad
+    or m], the coordinates in the callout zones relative to the radius of each ball [-],
+    and the deviations of the fits' radial clearances from their means [m].
 
     Attributes:
         robot: robot with the callouts.
         placed: callouts of the robot with their zones.
-        independent: errors that are added to the errors of the callouts, or None.
+        independent: independent errors, which are added to the errors of the callouts,
+            or None.
         fixed: (n, 6) [rad, m] errors that are added to every draw; zero if None.
         fits: fits of the robot's joints.
     """
@@ -57,19 +58,19 @@ class CalloutSources:
 
     @property
     def _independent_count(self) -> int:
-        """Number of independent errors per draw."""
+        """Number of independent errors."""
         return 0 if self.independent is None else len(self.independent)
 
     @cached_property
     def columns(self) -> list[NDArray]:
-        """Column indices of the numbers of each callout."""
+        """Column indices of the random numbers of each callout."""
         widths = [sum(placed.zone.dimensions) for placed in self.placed]
         ends = self._independent_count + np.cumsum(widths)
         return [np.arange(e - w, e) for e, w in zip(ends, widths, strict=True)]
 
     @cached_property
     def maps(self) -> NDArray:
-        """(n, 6, m) [rad, m] errors delta l of all frames per unit of each number."""
+        """Errors delta l per unit of each random number, (n, 6, m) [rad, m]."""
         n = len(self.robot.frames)
         maps = np.zeros((n, 6, len(self)))
         if self.independent is not None:
@@ -85,7 +86,7 @@ class CalloutSources:
 
     @cached_property
     def labels(self) -> tuple[str, ...]:
-        """Name of each number."""
+        """Name of each random number."""
         own = () if self.independent is None else self.independent.labels
         return (
             *own,
@@ -98,16 +99,15 @@ class CalloutSources:
         )
 
     def groups_by(self, by: str) -> list[str]:
-        """Return the group name of each number.
+        """Return the group name of each random number.
 
         Args:
             by: ``"source"``, ``"frame"`` or ``"kind"``.
 
         Returns:
-            (m,) names.  The numbers of a callout are in one group.  By kind, callouts
-            with the same name in every leg form one group. Numbers that depend on the
-            size of the same hole also form one group: its position at maximum material,
-            its datum shift and its fit.
+            Names, (m,). All numbers of a callout are in one group. With ``"kind"``,
+            callouts with the same name in all legs are in one group. All numbers that
+            depend on the size of the same hole are in one group.
         """
         labels = () if self.independent is None else self.independent.labels
         names, holes, counts = list[str](), list[str](), list[int]()
@@ -129,7 +129,7 @@ class CalloutSources:
         return own
 
     def draw(self, first: int, count: int, seed: int, stream: int = 0) -> NDArray:
-        """Draw the numbers (count, m); see ErrorSources.uniforms."""
+        """Return the random numbers of ``count`` draws, (count, m)."""
         words = [self._independent_count, *(p.zone.words for p in self.placed)]
         words += [2] * len(self.fits)
         ends = np.cumsum(words)
@@ -158,7 +158,7 @@ class CalloutSources:
         return np.hstack(parts)
 
     def _share_sizes(self, parts: list[NDArray]) -> None:
-        """Use one uniform random number for all occurrences of a hole's size."""
+        """Use one random number wherever the size of the same hole is needed."""
         sizes: dict[str, NDArray] = {}
         for part, placed in zip(parts[1:], self.placed, strict=False):
             if placed.hole:
@@ -167,7 +167,7 @@ class CalloutSources:
             part[:, 0] = sizes.get(fit.frame, part[:, 0])
 
     def with_clearances(self, values: NDArray) -> Robot:
-        """Return the robot with the fit clearances of one draw's numbers (m,)."""
+        """Return the robot with the fit clearances of one draw, (m,)."""
         more = values[len(self) - len(self.fits) :]
         pairs = zip(self.fits, more, strict=True)
         return self._with_radial([f.fit.mean_radial + float(v) for f, v in pairs])
@@ -177,7 +177,7 @@ class CalloutSources:
         return self._with_radial([one.fit.radial[1] for one in self.fits])
 
     def _with_radial(self, radial: list[float]) -> Robot:
-        """Return the robot whose joint fits have the given radial clearances [m]."""
+        """Return the robot with the given radial clearances [m] of its fits."""
         frames = list(self.robot.frames)
         for one, bound in zip(self.fits, radial, strict=True):
             gap = max(0.0, bound)
@@ -187,17 +187,17 @@ class CalloutSources:
         return replace(self.robot, frames=tuple(frames))
 
     def errors(self, values: NDArray) -> NDArray:
-        """Return the errors delta l (..., n, 6) [rad, m] for numbers (..., m)."""
+        """Return the errors delta l of draws, (..., n, 6) [rad, m]."""
         full = np.einsum("nim,...m->...ni", self.maps, values)
         return full if self.fixed is None else full + self.fixed
 
     def of_numbers(self, slopes: NDArray) -> NDArray:
-        """Convert derivatives by delta l (..., n, 6) into (..., m) by number."""
+        """Convert derivatives with respect to delta l, (..., n, 6), to (..., m)."""
         return np.einsum("...ni,nim->...m", slopes, self.maps)
 
     @cached_property
     def variance(self) -> NDArray:
-        """(m,) variances of the numbers."""
+        """Variances of the random numbers, (m,)."""
         own = [] if self.independent is None else [self.independent.variance]
         for p in self.placed:
             C = p.zone.variance_of_u(p.callout.distribution, p.callout.cp)
@@ -208,18 +208,18 @@ class CalloutSources:
 
     @property
     def units(self) -> list[str]:
-        """Unit of each number; the numbers of a callout combine shifts and tilts."""
+        """Unit of each random number; "rad, m" for callouts and fits."""
         own = [] if self.independent is None else self.independent.units
         return own + ["rad, m"] * (len(self) - len(own))
 
     @property
     def identity(self) -> list[NDArray]:
-        """Arrays that are equal if and only if two objects draw equal errors."""
+        """Arrays that are equal if and only if two objects produce the same draws."""
         own = [] if self.independent is None else self.independent.identity
         for p in self.placed:
             law = [DISTRIBUTIONS.index(p.callout.distribution), p.callout.cp]
             growth = [p.zone.bonus, *law, *([1.0] if p.zone.from_zero else [])]
-            if p.hole:  # index of the fit with the same hole
+            if p.hole:  # find the fit with the same hole
                 growth += [float(f.frame == p.hole_of) for f in self.fits]
             own += [*p.zone.bounds, *p.zone.cones, np.array(growth), p.errors]
         for f in self.fits:
@@ -232,19 +232,19 @@ Sources = ErrorSources | CalloutSources
 
 
 def _length(end: FittedEnd | None) -> list[float]:
-    """Return the length of a fitted end; empty for a radial clearance."""
+    """Return the length of a fitted end, or nothing for a radial clearance."""
     return [] if end is None else [end.length]
 
 
 def _nth(uniforms: Callable[[int], list[NDArray]], i: int) -> Callable[[int], NDArray]:
-    """Return a function that maps an attempt to callout i's random numbers."""
+    """Return a function that returns the random numbers of callout i for an attempt."""
     return lambda attempt: uniforms(attempt)[i]
 
 
 def _uniforms(
     first: int, count: int, seed: int, stream: int, words: int, attempt: int
 ) -> NDArray:
-    """Return (count, words) uniform random numbers, new ones for each attempt."""
+    """Return uniform random numbers, (count, words), which differ between attempts."""
     steps = -(-max(1, words) // _WORDS)
     philox = np.random.Philox(
         key=np.array([seed, stream], dtype=np.uint64),
@@ -264,13 +264,13 @@ def sources_of(
 
     Args:
         robot: any robot.
-        independent: independent errors, or a file of them (TOML, see
-            docs/statistics.md); or None.  Sources returned by this function are passed
-            through unchanged.
+        independent: independent errors, or the path of a TOML file that defines them
+            (see docs/statistics.md), or None. A result of this function is returned
+            unchanged.
         fixed: (n, 6) [rad, m] errors that are added to every draw.
 
     Returns:
-        The error sources; only the independent errors if the robot has no callouts.
+        The error sources. Without callouts, these are the independent errors.
 
     Raises:
         BadInput: the file violates a rule, or the robot has no callouts and no
@@ -286,7 +286,7 @@ def sources_of(
         return CalloutSources(robot, placed, independent, fixed, fits)
     if independent is None:
         raise BadInput(
-            f"{robot.name}: found no [[tolerance]] and no fit in the robot file and no "
-            "--errors, expected one of them"
+            f"{robot.name}: found neither --errors nor a [[tolerance]] table or a fit "
+            "in the robot file; expected one of them"
         )
     return independent

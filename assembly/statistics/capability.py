@@ -1,7 +1,7 @@
-"""Capability indices Cp and Cpk and out-of-limit parts per million, with intervals.
+"""Process capability indices Cp and Cpk, and parts per million outside the limits.
 
-The indices apply to normal data within two limits, or to draws of any distribution
-below one limit.
+Normal data may have one or two limits. Draws from other distributions have an upper
+limit.
 
 Sources:
     Rodriguez (1992), Recent developments in process capability analysis, J. Quality
@@ -24,13 +24,12 @@ _TAIL = 0.99865  # probability below mean + 3 sigma of a normal distribution
 
 @dataclass(frozen=True)
 class Capability:
-    """Capability indices of a sample, with confidence intervals.
+    """Capability indices of a sample from a normal distribution.
 
     Attributes:
-        cp: value, lower and upper bound; NaN unless there are two limits.
-        cpk: value, lower and upper bound.
-        share_outside: probability that a normal variable with the sample's mean and
-            standard deviation lies outside the limits.
+        cp: value and confidence bounds (lower, upper); NaN unless there are two limits.
+        cpk: value and confidence bounds (lower, upper).
+        share_outside: estimated probability of a value outside the limits.
     """
 
     cp: tuple[float, float, float]
@@ -50,10 +49,10 @@ def capability(
         level: confidence level of the intervals.
 
     Returns:
-        The indices, computed with the sample's standard deviation (divisor n - 1).
+        The indices for the sample standard deviation (divisor n - 1).
 
     Raises:
-        ValueError: fewer than two values, no limit, or values that do not vary.
+        ValueError: there are fewer than two values, no limit, or only equal values.
     """
     x = np.asarray(values, dtype=float)
     if len(x) < 2 or not lower < upper or not np.isfinite([lower, upper]).any():
@@ -75,12 +74,12 @@ def capability(
 
 
 def share_outside(cpk_upper: float, cpk_lower: float) -> float:
-    """Return the probability mass of a normal distribution outside its limits."""
+    """Return the probability of a normal variable outside its limits."""
     return float(norm.sf(3 * cpk_upper) + norm.sf(3 * cpk_lower))
 
 
 def cp_interval(cp: float, n: int, level: float = 0.95) -> tuple[float, float]:
-    """Return the confidence interval of Cp, which is exact for n normal values."""
+    """Return the exact confidence interval of Cp for n normal values."""
     tails = chi2.ppf([(1 - level) / 2, (1 + level) / 2], n - 1)
     low, high = cp * np.sqrt(tails / (n - 1))
     return float(low), float(high)
@@ -95,11 +94,11 @@ def cpk_interval(cpk: float, n: int, level: float = 0.95) -> tuple[float, float]
 def cpk_interval_one_sided(
     cpk: float, n: int, level: float = 0.95
 ) -> tuple[float, float]:
-    """Return the exact interval of Cpk for one limit (noncentral t distribution)."""
+    """Return the exact confidence interval of Cpk for one limit."""
     from scipy.optimize import brentq
 
-    # 3 sqrt(n) Cpk of a sample has a noncentral t distribution, whose noncentrality is
-    # 3 sqrt(n) times the true Cpk
+    # For a sample, 3 sqrt(n) Cpk has a noncentral t distribution with noncentrality 3
+    # sqrt(n) times the true Cpk.
     t, root = 3 * np.sqrt(n) * cpk, 3 * np.sqrt(n)
     low, high = cpk_interval(cpk, n, 1 - (1 - level) / 100)
 
@@ -117,15 +116,14 @@ def quantile_cpk(
 ) -> tuple[float, float, float]:
     """Compute Cpk of draws from any distribution with an upper limit.
 
-    Cpk is (limit - median) / (99.865 % quantile - median).  For a normal distribution
-    this equals the usual index.
+    Cpk is (limit - median) / (99.865 % quantile - median), which equals the usual index
+    for a normal distribution.
 
     Args:
         values: (k,) draws; inf for a draw without a solution.
         limit: upper limit.
-        level: confidence level of the interval.  The interval is distribution-free:
-            order statistics bound both quantiles, each with half of the error
-            probability.
+        level: confidence level of the interval, which is based on order statistics and
+            valid for any distribution.
 
     Returns:
         Value, lower and upper bound; 0 if the draws are too few to bound a quantile.

@@ -1,21 +1,20 @@
-"""Clearance models: positions within the clearances of an assembled robot.
+"""Models of the joint positions within the clearances of an assembled robot.
 
-In the minimum-energy solution, clearances that carry load are at their bounds. The
-other clearances can move without deforming any spring, and their possible positions
-form a convex set. The available models are
+In the minimum-energy solution, joints that transmit a force through their clearance are
+in contact. The other joints can move within their clearances without deforming a
+spring. Their possible positions form a convex set. The models are
 
 ======== =====================================================================
-worst    any position; the largest pose errors are computed, see
+worst    all positions; the largest pose errors are computed, see
          :mod:`forcefit.assembly.statistics.worst_clearance`
 uniform  uniformly distributed over the set (billiard walk)
-contact  displaced by a wrench of random direction on the platform until in contact
-least    the position in the minimum-energy solution, one of many possible ones
+contact  in contact under a platform wrench of random direction
+least    the position in the computed minimum-energy solution, which is not unique
 ======== =====================================================================
 
-The contact model requires a length that relates moments to forces: random moments
-divided by this length are as large as random forces.  The positions depend on the
-length, so every result reports it.  If the service loads are known, they determine how
-the clearances close, so no contact length is needed.
+The contact model requires a contact length: the ratio of random moments to random
+forces. The positions depend on it, so every result contains it. No contact length is
+needed if the service load is given.
 """
 
 from collections.abc import Sequence
@@ -33,12 +32,12 @@ from forcefit.assembly.statistics.bounded_motion import (
 )
 from forcefit.assembly.statistics.linear_response import LinearResponse
 
-# values of the option --clearance and their meaning
+# valid values of the option --clearance, and descriptions for output
 CLEARANCE_MODELS = {
-    "worst": "largest pose errors over all positions in the clearances, eq. (27)",
-    "uniform": "positions uniform over all possible ones in the clearances",
-    "contact": "clearances displaced to contact by a wrench of random direction",
-    "least": "positions of the least-energy solution, one of many possible ones",
+    "worst": "largest pose errors over all positions within the clearances, eq. (27)",
+    "uniform": "uniformly distributed positions within the clearances",
+    "contact": "positions in contact under a wrench of random direction",
+    "least": "positions in the minimum-energy solution, which is not unique",
 }
 CLEARANCE_STREAM = 1  # random number stream for clearances; stream 0 is for errors
 
@@ -50,19 +49,18 @@ def position_clearances(
     generators: Sequence[np.random.Generator],
     contact_length: float | None = None,
 ) -> tuple[NDArray, NDArray]:
-    """Place the clearances according to a clearance model; return the platform screws.
+    """Return platform screws for joint positions from a clearance model.
 
     Args:
         prepared: the prepared posture.
-        draws: solutions for k draws, from the posture's ``solve``.
+        draws: minimum-energy solutions for k draws.
         clearance: one of :data:`CLEARANCE_MODELS` except the worst model.
         generators: random number generator for each draw; not used for "least".
         contact_length: [m] length of the contact model, see :func:`contact_length_of`.
 
     Returns:
-        (k, 6) [rad, m] screws, NaN where a draw has no solution; and (k,) bool, False
-        where the random walk of the uniform model did not mix even at its maximum
-        length, see
+        Platform screws, (k, 6) [rad, m], NaN for a draw without a solution; and (k,)
+        bool, False if the random walk of the uniform model did not mix, see
         :func:`forcefit.assembly.solvers.uniform_clearance.sample_uniform_position`.
 
     Raises:
@@ -96,7 +94,7 @@ def _moved_clearances(
     prepared: LinearResponse, draws: Assembly, left: NDArray, wrenches: NDArray | None,
     generators: Sequence[np.random.Generator],
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
-    """Move clearances of the draws ``left``; return also whether random walks mixed."""
+    """Return the displacements of selected draws, and whether their walks mixed."""
     clearances, mixed = draws.clearances.copy(), np.ones(len(left), dtype=bool)
     loaded = loaded_clearances(prepared, draws)
     patterns, pattern_of_draw = np.unique(loaded, axis=0, return_inverse=True)
@@ -115,22 +113,22 @@ def _moved_clearances(
 
 
 def contact_length_of(robot: Robot) -> float:
-    """Return the default contact length [m]: the length of the robot's longest body."""
+    """Return the default contact length [m], the length of the longest body."""
     return size_of(robot)
 
 
 def clearance_means(clearance: str, contact_length: float | None = None) -> str:
-    """Describe a clearance model; for "contact", include the contact length."""
+    """Return a description of a clearance model, including the contact length."""
     words = CLEARANCE_MODELS[clearance]
     if clearance != "contact" or contact_length is None:
         return words
-    return f"{words} (moments / {contact_length:.4g} m, contact length, as forces)"
+    return f"{words} (contact length {contact_length:.4g} m)"
 
 
 def _random_wrenches(
     generators: Sequence[np.random.Generator], length: float
 ) -> NDArray:
-    """Draw platform wrenches (k, 6) with moments scaled by the contact length."""
+    """Return random platform wrenches, (k, 6), with moments scaled by the length."""
     scale = np.repeat([1.0, 1.0 / length], 3)
     wrenches = np.array([rng.normal(size=6) for rng in generators])
     return wrenches.reshape(-1, 6) * scale
@@ -140,12 +138,12 @@ def _at_random(
     prepared: LinearResponse, loaded: NDArray, clearances: NDArray,
     generators: Sequence[np.random.Generator],
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
-    """Sample clearances uniformly; return them and whether each random walk mixed."""
+    """Return uniformly distributed clearances, and whether each random walk mixed."""
     from forcefit.assembly.solvers.uniform_clearance import sample_uniform_position
 
     free = ~loaded
     rows = clearance_constraints(prepared, loaded)[:, free]
-    # null space of the closure equations, whose rows are orthonormal
+    # basis of the null space of the closure equations
     Z = np.ascontiguousarray(np.linalg.svd(rows)[2][len(rows) :].T)
     to_screw = np.ascontiguousarray(prepared.screws[:, : len(free)][:, free])
     starts, mixed = free_starts(prepared, free), np.ones(len(clearances), dtype=bool)
@@ -160,7 +158,7 @@ def _at_random(
 def _at_contact(
     prepared: LinearResponse, loaded: NDArray, clearances: NDArray, wrenches: NDArray
 ) -> NDArray:
-    """Move clearances along platform wrenches (k, 6) until they are in contact."""
+    """Return the clearances at contact under platform wrenches, (k, 6)."""
     from forcefit.assembly.statistics.contact_positions import move_to_contact
 
     rows, free = clearance_constraints(prepared, loaded), ~loaded
@@ -172,7 +170,7 @@ def _at_contact(
 
 
 def free_starts(prepared: LinearResponse, free: NDArray) -> NDArray:
-    """Return the first column of each free cone among the free columns (cones + 1,)."""
+    """Return the index of the first free clearance of each cone, (cones + 1,)."""
     sizes = np.diff(prepared.starts)[free[prepared.starts[:-1]]]
     return np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
 
@@ -184,7 +182,7 @@ def _at_contact_alone(
     clearances: NDArray,
     direction: NDArray,
 ) -> NDArray:
-    """Compute the farthest clearance position (nu,) with the Clarabel solver."""
+    """Return the farthest clearance position, (nu,), by conic optimisation."""
     group = np.unique(prepared.joints.group[free], return_inverse=True)[1]
     none, size = np.zeros((0, int(free.sum()))), np.linalg.norm(direction[free])
     solution = minimise_energy(
@@ -201,31 +199,30 @@ def _at_contact_alone(
 
 
 def loaded_clearances(prepared: LinearResponse, draws: Assembly) -> NDArray:
-    """Return (k, nu) bool: whether a clearance transmits force at its bound."""
+    """Return which clearances transmit a force at their bound, (k, nu) bool."""
     forces = draws.multipliers @ (_cone_columns(prepared))
     if prepared.loads is not None:
         forces += prepared.loads.joint @ prepared.joints.cones
     force_sizes = _sizes(forces, prepared.starts)
     slack = np.maximum(0.0, 1.0 - _sizes(draws.clearances, prepared.starts))
-    # the product of contact force and slack is about the duality gap, so one of the two
-    # is nearly zero
+    # By complementary slackness, either the contact force or the slack is nearly zero.
     scale = np.maximum(draws.energy, 1e-18)[:, None]
     loaded = (force_sizes > scale * slack) & (force_sizes > 1e-9 * scale)
     return np.repeat(loaded, np.diff(prepared.starts), axis=1)
 
 
 def clearance_constraints(prepared: LinearResponse, loaded: NDArray) -> NDArray:
-    """Return orthonormal rows (p, nu) of the equations that free clearances satisfy."""
+    """Return the equations for the free clearances as orthonormal rows, (p, nu)."""
     rows = np.vstack([prepared.G, prepared.H]) * ~loaded
     _, S, Vt = np.linalg.svd(rows, full_matrices=False)
     return np.ascontiguousarray(Vt[S > 1e-10 * S.max(initial=0.0)])
 
 
 def _cone_columns(prepared: LinearResponse) -> NDArray:
-    """Return the columns (m, nu) of the clearances in the closure equations."""
+    """Return the coefficients of the clearances in the closure equations, (m, nu)."""
     return prepared.closures @ prepared.joints.cones
 
 
 def _sizes(values: NDArray, starts: NDArray) -> NDArray:
-    """Return the norm (k, cones) of each cone's clearance components."""
+    """Return the norm of each cone's components, (k, cones)."""
     return np.sqrt(np.add.reduceat(values**2, starts[:-1], axis=1))

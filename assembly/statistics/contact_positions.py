@@ -1,30 +1,31 @@
-"""Clearance positions that lie farthest along given directions in clearance space."""
+"""Positions of joints in contact, for given directions in clearance space."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from forcefit.assembly.solvers.one_problem import farthest_points
 
-_PRECISION = 1e-9  # relative precision of the largest component in a direction
+_PRECISION = 1e-9  # relative precision of the maximum
 
 
 def move_to_contact(
     rows: NDArray, starts: NDArray, free: NDArray, positions: NDArray,
     directions: NDArray,
 ) -> NDArray:  # fmt: skip
-    """Find the point of the clearance set that lies farthest along each direction.
+    """Find the farthest point of the set of clearance positions in each direction.
 
     Args:
-        rows: (p, nu) orthonormal rows, zero for clearances that are not ``free``.
+        rows: (p, nu) orthonormal rows of the closure equations, zero for clearances
+            that are not ``free``.
         starts: (cones + 1,) index of the first clearance of each cone, and finally nu.
-        free: (nu,) bool, True for clearances that may move; the same for all components
-            of a cone.
+        free: (nu,) bool, True for clearances in which the joint may move; equal for all
+            components of a cone.
         positions: (k, nu) points of the set.
-        directions: (k, nu) directions in which the component is maximised.
+        directions: (k, nu) directions.
 
     Returns:
-        (k, nu) farthest points; NaN if the interior-point method fails, for example
-        because the interior of the set is empty.
+        Farthest points, (k, nu); NaN if the interior-point method fails, for example
+        because the set has no interior.
     """
     ends = positions.copy()
     along = np.where(free, directions, 0.0)

@@ -1,17 +1,17 @@
 """Minimum-cost tolerances for convex requirements, by cutting planes.
 
-Two requirements are convex in the tolerances t:
+Two types of requirements are convex in the tolerances t:
 
-- *yield 1*: margin or energy at every corner of the tolerance box.  For every choice s
-  of signs, ``m(t s)`` is convex in t; the margin is also proportional to t.
-- *yield below 1*: the mean over the worst fraction (1 - yield) of many fixed draws s.
-  This mean is the conditional value at risk; a limit on it is stricter than the yield
-  requirement itself.
+- *yield 1*: a limit on the margin or the energy at every corner of the tolerance box.
+  For every vector s of signs, the quantity ``m(t s)`` is convex in t.
+- *yield below 1*: a limit on the mean of the worst fraction (1 - yield) of many fixed
+  draws s. This mean is the conditional value at risk. The limit on it is stricter than
+  the required yield.
 
-Each iteration minimises the cost subject to the planes found so far, finds the largest
-violation of the requirement, and adds the plane that linearises the violated quantity.
-Every plane is valid for all tolerances that meet the requirement, so the minimum
-subject to the planes is a lower bound on the cost.
+Each iteration minimises the cost subject to linear inequalities (cutting planes). If
+the result violates the requirement, the linearisation of the violated quantity is added
+as a further inequality. All feasible tolerances satisfy these inequalities, so each
+minimum is a lower bound on the cost.
 
 Sources:
     Kelley (1960), The cutting-plane method for solving convex programs; Rockafellar,
@@ -34,15 +34,15 @@ _MOST_CUTS = 200
 def cut_planes(
     requirement: Requirement, progress: Callable[[str, int, int], None]
 ) -> tuple[NDArray, float, int]:
-    """Find the minimum-cost tolerances that meet the convex requirements.
+    """Find the minimum-cost tolerances that satisfy convex requirements.
 
     Args:
         requirement: requirement at all postures.
         progress: called with the name of a step, its progress and its total.
 
     Returns:
-        (G,) [rad or m] tolerances, a lower bound on their cost, and the number of
-        planes.
+        Tolerances, (G,) [rad or m], a lower bound on their cost, and the number of
+        cutting planes.
 
     Raises:
         BadInput: a limit is exceeded without errors or with the tightest tolerances.
@@ -66,7 +66,7 @@ def cut_planes(
 def cheapest_within(
     plan: Plan, planes: Sequence[NDArray], least: NDArray, most: NDArray
 ) -> NDArray:
-    """Find the minimum-cost tolerances with ``a.t <= 1`` for every plane a.
+    """Find the minimum-cost tolerances t with ``a.t <= 1`` for every plane a.
 
     Args:
         plan: plan with the cost coefficients.
@@ -78,12 +78,12 @@ def cheapest_within(
         (G,) [rad or m] tolerances.
 
     Raises:
-        BadInput: no tolerances satisfy the planes.
+        BadInput: no tolerances satisfy all inequalities.
     """
     import cvxpy as cp
 
     A = np.array(planes).reshape(-1, len(plan.names))
-    # scaled so that each tolerance alone reaches its most restrictive plane at 1
+    # Scale each tolerance by the largest value it can have if all others are zero.
     steepest = np.maximum(A, 0.0).max(axis=0, initial=0.0)
     scale = np.minimum(most, 1.0 / np.maximum(steepest, 1e-300))
     x = cp.Variable(len(plan.names))
@@ -99,14 +99,14 @@ def cheapest_within(
     problem.solve(solver="CLARABEL")
     if x.value is None:
         raise BadInput(
-            "tolerances: even the smallest allowed tolerances violate a limit; loosen "
+            "tolerances: even the smallest allowed tolerances exceed a limit; increase "
             "the limit or allow smaller tolerances"
         )
     return np.clip(x.value * scale, least, most)
 
 
 def _violated(requirement: Requirement, t: NDArray) -> Iterator[NDArray]:
-    """Yield planes ``a.t <= 1`` that exclude the tolerances t."""
+    """Yield cutting planes ``a.t <= 1`` that the tolerances t violate."""
     plan = requirement.plan
     spread = plan.spread(t)
     for key, prepared in requirement.convex.items():
@@ -136,11 +136,11 @@ def _violated(requirement: Requirement, t: NDArray) -> Iterator[NDArray]:
 
 
 def _plane(slopes: NDArray, value: float, t: NDArray, limit: float) -> NDArray:
-    """Return the plane ``a.t' <= 1`` of a limited quantity linearised at t."""
+    """Return the coefficients a of a limit that is linearised at t, ``a.t' <= 1``."""
     right = limit - value + float(slopes @ t)
     if right <= 0:
         raise BadInput(
             f"even a robot without geometric errors exceeds a limit of {limit:g}; "
-            "loosen the limit or tighten the clearances"
+            "increase the limit or reduce the clearances"
         )
     return slopes / right

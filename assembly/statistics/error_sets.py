@@ -1,4 +1,4 @@
-"""Zones of all errors and clearances at a posture, and the resulting pose errors."""
+"""Convex sets (zones) of all errors and clearances at a posture."""
 
 from dataclasses import dataclass
 
@@ -18,23 +18,24 @@ from forcefit.assembly.statistics.callout_sources import CalloutSources, Sources
 from forcefit.assembly.statistics.linear_response import LinearResponse
 from forcefit.inputs.table import BadInput
 
-_ROUNDING = 1e-9  # rows smaller than this fraction of the largest row are round-off
+_ROUNDING = 1e-9  # relative singular value below which a row is round-off
 
 
 @dataclass(frozen=True, eq=False)
 class ErrorSets:
-    """Zones of errors and clearances, stacked in one vector z with linear constraints.
+    """Zones of errors and clearances, whose coordinates form one vector z.
 
     Attributes:
         names: names of the zones.
         zones: the zones, each in unit coordinates.
-        columns: indices of each zone's coordinates in z.
-        screws: (6, total) [rad, m] map from z to the platform screw.
-        rigid_rows: (p, total) rows whose product with z must vanish if parts are rigid.
-        spring_rows: (r, total) rows whose product with z is taken up by springs.
+        columns: for each zone, the indices of its coordinates in z.
+        screws: (6, total) [rad, m] derivative of the platform screw with respect to z.
+        rigid_rows: (p, total) matrix whose product with z must be zero if the bodies
+            are rigid.
+        spring_rows: (r, total) matrix whose product with z is compensated by springs.
         clearances: number of coordinates of z that are clearances.
-        contact_rows: (q, total) rows whose product with z must vanish for parallel
-            contacts.
+        contact_rows: (q, total) matrix whose product with z must be zero because a
+            joint has several contacts.
     """
 
     names: tuple[str, ...]
@@ -47,14 +48,14 @@ class ErrorSets:
     contact_rows: NDArray
 
     def weights_on_zones(self, along: NDArray) -> NDArray:
-        """Return the weights of the coordinates z, reduced by parallel contacts.
+        """Return weights that account for several contacts of the same joint.
 
         Args:
             along: (total,) weights of the coordinates.
 
         Returns:
-            (total,) weights with the smallest sum of support functions, which equals
-            the largest product with ``along`` over all contact positions.
+            Equivalent weights, (total,). The sum of the zones' support functions for
+            them is the maximum of ``along.z`` over all contact positions.
         """
         rows = self.contact_rows
         own = rows.any(axis=0)
@@ -74,14 +75,14 @@ class ErrorSets:
 
 
 def error_sets(prepared: LinearResponse, sources: Sources) -> ErrorSets:
-    """Collect the zones of errors and clearances, and their effect on the platform.
+    """Collect the zones of all errors and clearances.
 
     Args:
         prepared: a posture without loads.
         sources: sources of the errors.
 
     Returns:
-        The zones, with their coordinates in one vector.
+        The zones.
 
     Raises:
         BadInput: an independent error is unbounded or not symmetric about zero.
@@ -110,14 +111,14 @@ def error_sets(prepared: LinearResponse, sources: Sources) -> ErrorSets:
 
 
 def parts_of(sets: ErrorSets, along: NDArray) -> list[float]:
-    """Return each zone's contribution to the largest product if loops may open.
+    """Return each zone's contribution to ``max along.z`` if loops need not close.
 
     Args:
         sets: zones of errors and clearances.
         along: (total,) weights of the coordinates.
 
     Returns:
-        One contribution per zone; they sum to the largest product of ``along`` with z.
+        One contribution per zone. Their sum is the maximum.
     """
     weights = sets.weights_on_zones(along)
     pairs = zip(sets.zones, sets.columns, strict=True)
@@ -125,15 +126,15 @@ def parts_of(sets: ErrorSets, along: NDArray) -> list[float]:
 
 
 def rigid_parts(sets: ErrorSets, along: NDArray) -> list[float]:
-    """Return each zone's contribution to the largest product if rigid loops must close.
+    """Return each zone's contribution to ``max along.z`` if rigid loops must close.
 
     Args:
         sets: zones of errors and clearances.
         along: (total,) weights of the coordinates.
 
     Returns:
-        One contribution per zone: the derivative of the largest product with respect to
-            the logarithm of the zone's size. They sum to the largest product (Euler).
+        One contribution per zone: the derivative of the maximum with respect to the
+        logarithm of the zone's size. By Euler's theorem, their sum is the maximum.
     """
     N, bounds, cones = bounds_where_closed(sets, sets.rigid_rows)
     _, _, sizes = product_by_bounds(along @ N, bounds, cones)
@@ -148,14 +149,15 @@ def rigid_parts(sets: ErrorSets, along: NDArray) -> list[float]:
 def bounds_where_closed(
     sets: ErrorSets, rows: NDArray
 ) -> tuple[NDArray, list[NDArray], list[NDArray]]:
-    """Return the null space of the rows, and the bounds of all zones within it.
+    """Return the bounds of all zones in the null space of a matrix.
 
     Args:
         sets: zones of errors and clearances.
-        rows: (k, total) rows whose product with z must be zero.
+        rows: (k, total) matrix whose product with z must be zero.
 
     Returns:
-        (total, m) orthonormal basis, and the rows of balls and of double cones (., m).
+        Orthonormal basis of the null space, (total, m), and one matrix (., m) for each
+        ball and for each double cone.
     """
     N = np.linalg.svd(rows)[2][len(rows) :].T
     own = list(zip(sets.zones, sets.columns, strict=True))
@@ -165,7 +167,7 @@ def bounds_where_closed(
 
 
 def _contact_rows(prepared: LinearResponse, columns: NDArray) -> NDArray:
-    """Return the closure rows that couple the parallel contacts of a joint."""
+    """Return the closure equations between the contacts of the same joint."""
     found = [np.zeros((0, columns.shape[1]))]
     for k in np.flatnonzero(contact_closures(prepared.posture.robot)).tolist():
         closure = prepared.closures[6 * k : 6 * k + 6]
@@ -175,7 +177,7 @@ def _contact_rows(prepared: LinearResponse, columns: NDArray) -> NDArray:
 
 
 def _real_rows(rows: NDArray, columns: NDArray) -> NDArray:
-    """Return an orthonormal row basis of rows @ columns; empty if only round-off."""
+    """Return an orthonormal basis of the row space of ``rows @ columns``."""
     product = rows @ columns
     scale = np.abs(rows).max(initial=0.0) * np.linalg.norm(columns)
     _, sizes, vt = np.linalg.svd(product, full_matrices=False)
@@ -183,14 +185,14 @@ def _real_rows(rows: NDArray, columns: NDArray) -> NDArray:
 
 
 def _maps(sources: Sources) -> NDArray:
-    """Return the frame errors (n, 6, m) per unit of each random number."""
+    """Return the frame errors per unit of each random number, (n, 6, m)."""
     if isinstance(sources, CalloutSources):
         return sources.maps
     return np.moveaxis(sources.errors(np.eye(len(sources))), 0, -1)
 
 
 def zones_of_errors(sources: Sources) -> list[tuple[str, Zone, NDArray]]:
-    """Return the name, the zone and the units [rad, m or 1] of every error."""
+    """Return the name, the zone and the scale [rad, m or 1] of every error."""
     placed: tuple[PlacedCallout, ...] = ()
     if isinstance(sources, CalloutSources):
         independent, placed = sources.independent, sources.placed
@@ -199,21 +201,21 @@ def zones_of_errors(sources: Sources) -> list[tuple[str, Zone, NDArray]]:
         independent, fixed = sources, sources.fixed
     if fixed is not None and fixed.any():
         raise BadInput(
-            "worst case: found loops that do not close at home, whose mismatch is a "
-            "constant error; expected loops that close"
+            "worst case: found loops that do not close in the home pose; expected "
+            "loops that close, because closure errors are constant"
         )
     found = [] if independent is None else _intervals(independent)
     return found + [(p.name, p.zone, np.ones(sum(p.zone.dimensions))) for p in placed]
 
 
 def _intervals(sources: ErrorSources) -> list[tuple[str, Zone, NDArray]]:
-    """Return interval zones of independent errors, in units of their half widths."""
+    """Return the intervals of independent errors, relative to their half widths."""
     pairs = zip(sources.labels, _half_widths(sources), strict=True)
     return [(name, Zone((np.eye(6)[:1],)), np.array([width])) for name, width in pairs]
 
 
 def _half_widths(sources: ErrorSources) -> NDArray:
-    """Return the half widths (m,) [rad or m] of independent errors."""
+    """Return the half widths of independent errors, (m,) [rad or m]."""
     uniform = sources.kind == KINDS.index("uniform")
     bounded = uniform | (sources.kind == KINDS.index("truncated"))
     centred = (sources.centre == 0) & sources.signed
@@ -221,13 +223,13 @@ def _half_widths(sources: ErrorSources) -> NDArray:
         name = sources.labels[int(np.argmin(bounded & centred))]
         raise BadInput(
             f"worst case: found {name}, which is unbounded or not symmetric about "
-            "zero; expected a uniform or truncated error of both signs"
+            "zero; expected a uniform or truncated distribution"
         )
     return np.asarray(sources.scale * np.where(uniform, 1.0, sources.limit))
 
 
 def _cone_name(prepared: LinearResponse, column: NDArray) -> str:
-    """Return the name of a clearance: its joint or frame, and its components."""
+    """Return the name of a clearance, such as "tilt clearance of hinge"."""
     row = int(np.flatnonzero(column)[0])
     kind = ("tilt", "tilt", "spin", "radial", "radial", "axial")[row % 6]
     name = clearance_name(prepared.posture.robot, row // 6, kind)

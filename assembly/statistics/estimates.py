@@ -1,9 +1,8 @@
-"""Estimators for a sample of draws, with confidence intervals.
+"""Point estimates with confidence intervals for random samples.
 
-Probabilities have Clopper-Pearson intervals, which are exact for any number of draws.
-Quantiles have distribution-free intervals from order statistics. Intervals of means
-rely on the central limit theorem, and intervals of the most probable value on the
-bootstrap.
+Intervals of probabilities are Clopper-Pearson intervals. Intervals of quantiles are
+based on order statistics, those of means on the central limit theorem, and those of the
+most probable value on the bootstrap.
 """
 
 from typing import Literal
@@ -21,7 +20,7 @@ def proportion(successes: int, count: int, level: float = 0.95) -> dict[str, flo
     Args:
         successes: number of successes in ``count`` independent trials.
         count: number of trials, > 0.
-        level: confidence level; the coverage is at least as high.
+        level: confidence level, a lower bound on the coverage.
 
     Returns:
         ``probability``, ``lower``, ``upper``.
@@ -42,11 +41,11 @@ def bracketed(
         holds: number of certain successes in ``count`` independent trials.
         fails: number of certain failures.
         count: number of trials, > 0.
-        level: confidence level, which holds for any outcome of the undecided trials.
+        level: confidence level, valid for all outcomes of the undecided trials.
 
     Returns:
-        ``probability`` of a certain success, bounds ``lower`` and ``upper``, and the
-        number of ``undecided`` trials.
+        ``probability`` of a certain success, ``lower`` and ``upper`` bound on the
+        probability of success, and number of ``undecided`` trials.
     """
     surely = proportion(holds, count, level)
     perhaps = proportion(count - fails, count, level)
@@ -58,20 +57,20 @@ def quantile(values: ArrayLike, share: float, level: float = 0.95) -> dict[str, 
 
     Args:
         values: (k,) a sample.
-        share: fraction of the distribution below the quantile, in (0, 1).
+        share: probability below the quantile, in (0, 1).
         level: confidence level.
 
     Returns:
-        ``value``, ``lower``, ``upper``; infinite if the sample is too small or contains
-        infinite values.
+        ``value``, ``lower``, ``upper``. A bound is infinite if the sample is too small
+        for it.
     """
     x = np.sort(np.asarray(values, dtype=float))
     count = len(x)
-    # do not interpolate between infinite values
+    # Interpolation between infinite values is not possible.
     way: Literal["linear", "higher"] = "linear" if np.isfinite(x).all() else "higher"
     low, high = stats.binom.ppf([(1 - level) / 2, (1 + level) / 2], count, share)
-    # P(fewer than ``low`` values lie below the quantile) < (1 - level)/2, and the same
-    # for the values above it
+    # The probability that the quantile lies below the lower bound is < (1 - level)/2,
+    # and the same applies to the upper bound.
     below, above = int(low) - 1, int(high)
     return {
         "value": float(np.quantile(x, share, method=way)),
@@ -104,13 +103,13 @@ def most_probable(
 ) -> dict[str, float]:
     """Estimate the mode of a sample's density, with a bootstrap interval.
 
-    The density is estimated on 1024 bins with a Gaussian kernel of Silverman's width.
+    The density is estimated on 1024 bins with a Gaussian kernel, whose width is
+    Silverman's.
 
     Args:
         values: (k,) a sample.
         level: confidence level.
-        positive: whether the samples are magnitudes; the kernel is then reflected at
-            zero.
+        positive: whether all values are >= 0; the density is then reflected at zero.
         seed: seed of the bootstrap.
 
     Returns:
@@ -124,7 +123,7 @@ def most_probable(
     scale = min(float(x.std()), spread) or float(x.std())
     if scale <= 1e-12 * np.abs(x).max():  # all values are equal up to round-off
         return dict.fromkeys(("value", "lower", "upper"), float(x[0]))
-    # the bins exclude a long tail, which cannot contain the mode
+    # Limit the bins to the vicinity of the quartiles.
     ends = np.quantile(x, [0.25, 0.75]) + np.array([-8.0, 8.0]) * scale
     low = 0.0 if positive else max(float(x.min()) - 4 * scale, float(ends[0]))
     high = min(float(x.max()) + 4 * scale, float(ends[1]))
@@ -140,8 +139,8 @@ def most_probable(
 
 
 def _modes(counts: NDArray, width: float) -> NDArray:
-    """Return the modes of smoothed histograms, one per row, refined by parabolas."""
-    # a cosine transform reflects the density at both ends
+    """Return the mode of each smoothed histogram, refined by a parabola."""
+    # The cosine transform implies reflection of the density at both ends.
     bins = counts.shape[1]
     decay = np.exp(-0.5 * (np.pi * np.arange(bins) / bins * width) ** 2)
     density = fft.idct(fft.dct(counts.astype(float), axis=1) * decay, axis=1)
@@ -149,7 +148,7 @@ def _modes(counts: NDArray, width: float) -> NDArray:
     inner = (i > 0) & (i < bins - 1)
     rows, middle = np.arange(len(i)), np.clip(i, 1, bins - 2)
     a, b, c = (density[rows, middle + k] for k in (-1, 0, 1))
-    # without curvature, the density is flat or has its maximum at an end
+    # The parabola has no maximum if the density is constant.
     with np.errstate(invalid="ignore", divide="ignore"):
         offset = (a - c) / (2 * (a - 2 * b + c))
     return np.where(inner, i + offset, i)

@@ -1,4 +1,4 @@
-"""Monte Carlo experiments: error distributions and quantities computed per draw."""
+"""Monte Carlo experiments: error distributions and the quantities to compute."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -31,7 +31,7 @@ from forcefit.inputs.renamed import renamed_fields, warn_renamed
 from forcefit.inputs.table import BadInput
 from forcefit.results.display import html_table, short_repr
 
-# required difference of upper and lower bound, relative to the limit on a pose error
+# required difference of both bounds, relative to the limit on a pose error
 _PRECISION = 1e-3
 
 
@@ -41,24 +41,22 @@ class Experiment:
     """Error distributions at a posture, and the quantities to compute for each draw.
 
     Attributes:
-        posture: posture of the robot; drawn errors replace those in the robot file.
+        posture: posture of the robot; random errors replace those in the robot file.
         sources: distributions of the errors.
         seed: seed of all draws.
         clearance: one of
             :data:`forcefit.assembly.statistics.clearance_positions.CLEARANCE_MODELS`.
         margins: whether the assembly margins, eq. (21), are computed.
         stress: whether the stress of the links is computed.
-        load: load on the platform at its origin in base axes, (6,) [N m, N] or by
-            component, ``{"fz": -50}``; None for no load.
+        load: load on the platform at its origin in base axes, (6,) [N m, N] or a
+            dictionary such as ``{"fz": -50}``; None for no load.
         gravity: (3,) [m/s^2] gravity in base axes; None for no gravity.
-        stiffness: state for which the platform stiffness is computed, one of
-            :data:`forcefit.assembly.sweeps.point_stiffness.STATES` except the nominal
-            one; empty to omit the stiffness.
-        precision: [rad, m] required difference between upper and lower bound on the
-            largest pose errors in the worst clearance model; inf if they are not
-            needed.
-        contact_length: [m] length of the contact model; random moments divided by it
-            are as large as random forces. None for the length of the longest body.
+        stiffness: state in which the platform stiffness is computed, ``"contact"`` or
+            ``"exact"``; empty to omit the stiffness.
+        precision: [rad, m] required difference between the bounds on the largest pose
+            errors in the worst clearance model; inf if they are not needed.
+        contact_length: [m] ratio of random moments to random forces in the contact
+            model; None for the length of the longest body.
     """
 
     posture: Posture
@@ -86,25 +84,25 @@ class Experiment:
 
     @property
     def clearance_model(self) -> str:
-        """Former name of ``clearance``, available for one more release."""
+        """Deprecated name of ``clearance``."""
         warn_renamed("Experiment.clearance_model", "Experiment.clearance")
         return self.clearance
 
     @cached_property
     def wrench(self) -> tuple[float, ...] | None:
-        """(6,) [N m, N] load on the platform; None if there is no load."""
+        """Load on the platform, (6,) [N m, N]; None if there is no load."""
         return None if self.load is None else tuple(one_load(self.load).tolist())
 
     @property
     def used_contact_length(self) -> float | None:
-        """[m] contact length of the contact model; None for other models."""
+        """Contact length [m]; None unless the clearance model is "contact"."""
         if self.clearance != "contact":
             return None
         return self.contact_length or contact_length_of(self.posture.robot)
 
     @cached_property
     def energies(self) -> LinearResponse:
-        """Posture prepared for problem (22), the minimum energy.
+        """Linear response of the posture for problem (22), the minimum energy.
 
         Raises:
             BadInput: the load acts along a motion without stiffness.
@@ -116,28 +114,28 @@ class Experiment:
 
     @cached_property
     def zones(self) -> dict[str, PostureMargins]:
-        """Posture prepared for the margins, problem (21), by name of the margin."""
+        """Prepared problems (21) by the name of the margin."""
         if not self.margins:
             return {}
         return {k: prepare_margins(self.posture, r) for k, r in MARGINS.items()}
 
     @cached_property
     def links(self) -> tuple[str, ...]:
-        """Frames of the links whose stress is computed."""
+        """Frame names of the links whose stress is computed."""
         if not self.stress:
             return ()
         return tuple(link.frame for link in stressed_links(self.posture.robot))
 
     @property
     def stress_errors(self) -> list[float]:
-        """[-] estimated relative error of each link's stress due to its mesh."""
+        """Estimated relative discretisation error of each link's stress [-]."""
         if not self.stress:
             return []
         return [x.relative_error for x in stressed_links(self.posture.robot)]
 
     @cached_property
     def record_type(self) -> np.dtype:
-        """Type of a record, which contains the quantities of one draw."""
+        """Data type of a record with the quantities of one draw."""
         shapes: dict[str, tuple[int, ...]] = {
             "energy": (), "duality_gap": (), "platform_screw": (6,), "rotation": (),
             "translation": (), "force": (), "moment": (), "stress": (len(self.links),),
@@ -155,8 +153,7 @@ class Experiment:
         """Reject limits on quantities that are not computed.
 
         Raises:
-            BadInput: a limited margin is not computed, or no link has a computed
-                stress.
+            BadInput: there is a limit on a margin or a stress that is not computed.
         """
         for name in limits:
             if name.startswith("margin") and not self.margins:
@@ -177,20 +174,21 @@ class Experiment:
 
         Args:
             values: (k, m) [rad or m] errors.
-            draws: (k,) numbers of the random streams for the clearance positions.
+            draws: (k,) indices of the draws, which select the random numbers of the
+                clearance positions.
 
         Returns:
-            (k,) records of :attr:`record_type`; NaN and status 1 without a solution. In
-            the worst clearance model, rotation and translation are upper bounds on the
-            largest errors, while the platform screw is that of the minimum-energy
-            solution (22).
+            Records of type :attr:`record_type`, (k,). A draw without a solution has NaN
+            and status 1. In the worst clearance model, rotation and translation are
+            upper bounds on the largest errors, and the platform screw is the
+            minimum-energy solution (22).
         """
         if not isinstance(self.sources, CalloutSources) or not self.sources.fits:
             parts = self._bolted(values, np.asarray(draws))
         else:
             parts = []
             for own, draw in zip(values, np.asarray(draws).tolist(), strict=True):
-                # the clearances of fits differ between draws
+                # Each draw has different clearances of fits.
                 robot = self.sources.with_clearances(own)
                 one = replace(self, posture=replace(self.posture, robot=robot))
                 parts += one._bolted(own[None], np.array([draw]))
@@ -204,7 +202,7 @@ class Experiment:
     def _bolted(
         self, values: NDArray, draws: NDArray
     ) -> list[tuple[NDArray, NDArray, NDArray]]:
-        """Return the records of all draws; NaN for draws that cannot be bolted."""
+        """Return records of all draws; NaN if a joint cannot be bolted."""
         try:
             return [self._without_stress(values, draws)]
         except CannotBolt:
@@ -223,7 +221,7 @@ class Experiment:
     def _without_stress(
         self, values: NDArray, draws: Sequence[int] | NDArray
     ) -> tuple[NDArray, NDArray, NDArray]:
-        """Return records without stress, wrenches, and distributed loads at tips."""
+        """Return records without stress, the wrenches, and the loads at the tips."""
         robot = self.posture.robot
         bolts = bolt_generators(robot, self.seed, draws)
         errors = bolted_errors(robot, self.sources.errors(values), bolts)
@@ -238,7 +236,7 @@ class Experiment:
             for i, name in enumerate(POSE_ERRORS):
                 rows[f"{name}_lower"], rows[name] = bounds[:, i].T
         else:
-            # "least" needs no random numbers, and generators are slow to create
+            # Create generators only if needed, because this is slow.
             numbers = np.asarray(draws).tolist() if self.clearance != "least" else []
             rngs = [draw_generator(self.seed, d, CLEARANCE_STREAM) for d in numbers]
             screws, mixed = position_clearances(
@@ -267,7 +265,7 @@ class Experiment:
 def precision_for(
     limits: Mapping[str, float], share: float = _PRECISION
 ) -> tuple[float, float]:
-    """Return the pose error precision that suffices to check the given limits.
+    """Return the precision of pose errors that suffices to check limits.
 
     Args:
         limits: limits by quantity.

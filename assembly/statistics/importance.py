@@ -1,13 +1,14 @@
-"""Variance-based importance of errors: Sobol indices.
+"""Importance of errors: variance-based sensitivity (Sobol) indices.
 
-The first-order index of a source is the fraction of a result's variance that the source
-explains by itself. The total index also includes its interactions with other sources.
-Saltelli's design computes both indices from (groups + 2) x draws evaluations.  If a
-result is linear in the errors, both indices equal ``a_i^2 var_i / sum_j a_j^2 var_j``.
+The first-order index of an error is the fraction of the variance of a result that this
+error alone explains. The total index includes interactions with other errors.
+Saltelli's design estimates both indices from (groups + 2) x draws evaluations. For a
+result ``sum_j a_j e_j`` of independent errors e_j, both indices of e_i equal ``a_i^2
+var_i / sum_j a_j^2 var_j``.
 
-A draw without a solution is counted and discarded, together with the draws that are
-compared with it, so the errors of the remaining draws are no longer independent. If too
-many draws are discarded, a reason is reported instead of indices.
+A draw without a solution is discarded, together with the draws that are compared with
+it. Because the errors of the remaining draws are not independent, no indices are
+reported if too many draws are discarded.
 
 Sources:
     Saltelli et al. (2010), Variance based sensitivity analysis of model output, table 2
@@ -24,24 +25,24 @@ from forcefit.assembly.model.error_distributions import ErrorSources
 from forcefit.assembly.statistics.callout_sources import CalloutSources, Sources
 from forcefit.assembly.statistics.ranking import group_of
 
-# random number streams, see forcefit.assembly.model.error_distributions
+# random number streams of A and B
 STREAMS = (2, 3)
-# largest accepted fraction of discarded draws: discarding makes the errors dependent
+# largest accepted fraction of discarded draws
 MOST_FAILED = 0.05
 _RESAMPLES = 200
 
 
 @dataclass(frozen=True, eq=False)
 class Importance:
-    """Sobol indices of s results and d groups of sources.
+    """Sobol indices of s results for d groups of errors.
 
     Attributes:
         groups: names of the groups.
-        first: (s, d, 3) first-order indices: value, lower bound, upper bound.
-        total: (s, d, 3) total indices: value, lower bound, upper bound.
+        first: (s, d, 3) first-order indices, each with value, lower and upper bound.
+        total: (s, d, 3) total indices, in the same format.
         variance: (s,) variances of the results.
-        failed: (s, d) fraction of base draws discarded because one of three compared
-            draws has no solution. Above :data:`MOST_FAILED` the indices are NaN.
+        failed: (s, d) fraction of discarded base draws. If it exceeds
+            :data:`MOST_FAILED`, the indices are NaN.
     """
 
     groups: tuple[str, ...]
@@ -53,11 +54,11 @@ class Importance:
 
 @dataclass(frozen=True, eq=False)
 class SaltelliDesign:
-    """Saltelli's design: A, B, and for each group A with the group's columns from B.
+    """Saltelli's design of two samples A and B, and a mixed sample for each group.
 
     Attributes:
-        A: (k, m) independent draws of the errors.
-        B: (k, m) second set of independent draws.
+        A: (k, m) first sample of the errors.
+        B: (k, m) second, independent sample of the errors.
         groups: name and column indices of each of d groups.
     """
 
@@ -69,7 +70,7 @@ class SaltelliDesign:
         return len(self.A) * (len(self.groups) + 2)
 
     def rows(self, first: int, count: int) -> NDArray:
-        """Return ``count`` rows (count, m) of the design, starting at ``first``."""
+        """Return rows ``first`` to ``first + count - 1`` of the design, (count, m)."""
         matrix, base = np.divmod(np.arange(first, first + count), len(self.A))
         rows = np.where((matrix == 1)[:, None], self.B[base], self.A[base])
         for g, (_, columns) in enumerate(self.groups):
@@ -88,9 +89,10 @@ def sobol_importance(
     """Estimate the Sobol indices of any function of independent variables.
 
     Args:
-        evaluate: function from variables (k, m) to results (k, s), NaN for a draw
+        evaluate: function that maps variables (k, m) to results (k, s); NaN for a draw
             without a solution.
-        sample: function from stream number and count to independent draws (count, m).
+        sample: function that returns ``count`` independent draws, (count, m), for the
+            arguments ``stream`` and ``count``.
         groups: name and column indices of each group of variables.
         count: number of base draws; (groups + 2) x count draws are evaluated.
         level: confidence level of the bootstrap intervals.
@@ -110,8 +112,8 @@ def sobol_indices(
 
     Args:
         design: design of k base draws and d groups.
-        results: (k (d + 2), s) results in the order of the design's rows; not finite
-            for a draw without a solution.
+        results: (k (d + 2), s) results for the rows of the design; not finite for a
+            draw without a solution.
         level: confidence level of the bootstrap intervals.
 
     Returns:
@@ -143,7 +145,7 @@ def sobol_indices(
 
 
 def _shares(f: NDArray, weights: NDArray, level: float) -> tuple[NDArray, NDArray]:
-    """Estimate the first-order and the total index (3,) from results (3, k)."""
+    """Estimate both indices, each (3,), from results for A, B and mixed draws."""
     alone, left = f[1] * (f[2] - f[0]), 0.5 * (f[2] - f[0]) ** 2
     mean = weights @ (f[0] + f[1]) / 2
     variance = weights @ (f[0] ** 2 + f[1] ** 2) / 2 - mean**2
@@ -166,7 +168,8 @@ def linear_importance(
         groups: name and column indices of each group.
 
     Returns:
-        (s, d) fractions of the variance; first-order and total index are equal.
+        Fractions of the variance, (s, d), which are both the first-order and the total
+        indices.
     """
     parts = slopes**2 * sources.variance
     shares = np.stack([parts[:, columns].sum(axis=1) for _, columns in groups], axis=1)
@@ -178,14 +181,14 @@ def source_groups(sources: Sources, by: str) -> list[tuple[str, NDArray]]:
 
     Args:
         sources: sources of a robot.
-        by: ``"source"``, ``"frame"`` or ``"kind"``. A kind comprises the same component
-            of the frames with the same name in all legs.
+        by: ``"source"``, ``"frame"`` or ``"kind"``. Errors of the same kind have the
+            same component and the same frame name in different legs.
 
     Returns:
         Name and column indices of each group.
 
     Raises:
-        ValueError: ``by`` is not one of these words.
+        ValueError: ``by`` has another value.
     """
     if by not in {"source", "frame", "kind"}:
         raise ValueError(f"by is {by!r}, expected 'source', 'frame' or 'kind'")

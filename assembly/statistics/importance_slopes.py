@@ -1,10 +1,9 @@
-"""Exact derivatives of the platform's screw with respect to groups of errors.
+"""Exact derivatives of the platform screw with respect to groups of errors.
 
-A ratio of two sampled standard deviations would contain sampling noise. As long as the
-active clearances do not change, the solution (22) is linear in the errors, and its
-derivatives are exact (:mod:`forcefit.assembly.statistics.sensitivity`). The gain of a
-group is the root mean square of these derivatives over several draws and over the
-group's errors, weighted by variance.
+The gain of a group of errors is the root mean square of the derivatives over several
+draws and over the errors of the group, weighted by variance. The derivatives are those
+of the minimum-energy solution (22), see
+:mod:`forcefit.assembly.statistics.sensitivity`.
 """
 
 import numpy as np
@@ -21,16 +20,16 @@ DRAWS = 32  # number of draws over which the derivatives are averaged
 
 
 def platform_gains(experiment: Experiment, design: SaltelliDesign) -> NDArray:
-    """Compute the gain of each group of errors: platform motion per unit of error.
+    """Compute the platform motion per unit of error (gain) of each group.
 
     Args:
         experiment: error distributions and posture.
-        design: design whose groups and first draws are used.
+        design: design with the groups and the draws.
 
     Returns:
-        (2, d) rotation [rad] and translation [m] per rad or m of error. NaN for a group
-        that mixes angles and lengths, if no draw has a solution, and for robots with
-        bolted joints, whose locked-in clearances depend on the errors.
+        Gains of rotation and translation, (2, d) [rad or m per rad or m]. The gain is
+        NaN for a group with angles and lengths, without a solution, and for robots with
+        bolted joints.
     """
     sources = experiment.sources
     values = design.A[:DRAWS]
@@ -57,10 +56,10 @@ def platform_slopes(prepared: LinearResponse, draws: Assembly) -> NDArray:
 
     Args:
         prepared: the prepared posture.
-        draws: solutions of k draws, with clearances relative to their bounds.
+        draws: solutions for k draws, with clearances relative to their bounds.
 
     Returns:
-        (6, k, n, 6) [rad or m per rad or m] derivatives.
+        Derivatives, (6, k, n, 6) [rad or m per rad or m].
     """
     count, frames = draws.errors.shape[:2]
     repeated = draws[np.tile(np.arange(count), 6)]
@@ -71,7 +70,7 @@ def platform_slopes(prepared: LinearResponse, draws: Assembly) -> NDArray:
 
 
 def error_units(sources: Sources, design: SaltelliDesign) -> list[str]:
-    """Return the unit of the errors of each group."""
+    """Return the unit of each group's errors."""
     units = sources.units
     of_groups = [{units[i] for i in columns} for _, columns in design.groups]
     return [of.pop() if len(of) == 1 else "rad, m" for of in of_groups]

@@ -1,14 +1,12 @@
-"""Importance of errors as a data set, as plain values and as a text table.
+"""Importance of errors as a data set, as a dictionary and as a text table.
 
-In addition to the shares of the variance, two values are reported for each group of
-errors. The *part* of a group is the standard deviation of the platform's screw due to
-the group, from the same sample. The *gain* is an exact derivative: micrometres of
-platform motion per micrometre of error, see
-:mod:`forcefit.assembly.statistics.importance_slopes`.  Both are norms, so the gain is 1
-if the platform moves by as much as the error.
+For each group of errors, the Sobol indices and two further values are reported. The
+*part* of a group is the standard deviation of the platform screw that is due to the
+group. The *gain* is the platform motion per unit of error, see
+:mod:`forcefit.assembly.statistics.importance_slopes`. Both values are norms.
 
-Shares are estimates.  Groups whose intervals overlap cannot be distinguished and have
-possible ranks in common, see :mod:`forcefit.assembly.statistics.ranking`.
+Because the indices are estimates, groups with overlapping confidence intervals have a
+range of possible ranks, see :mod:`forcefit.assembly.statistics.ranking`.
 """
 
 from collections.abc import Mapping
@@ -48,8 +46,8 @@ class ImportanceOptions:
     """Options for computing the importance of errors.
 
     Attributes:
-        draws: number of base draws; (groups + 2) x draws are solved.
-        by: how errors are grouped, see
+        draws: number of base draws; (groups + 2) x ``draws`` problems are solved.
+        by: grouping of errors, see
             :func:`forcefit.assembly.statistics.importance.source_groups`.
         level: confidence level of the intervals.
     """
@@ -62,11 +60,11 @@ class ImportanceOptions:
 def importance_design(
     experiment: Experiment, asked: ImportanceOptions
 ) -> SaltelliDesign:
-    """Return the Saltelli design for the importance of an experiment's errors.
+    """Return the Saltelli design for the errors of an experiment.
 
     Args:
         experiment: error distributions and quantities.
-        asked: number of base draws, and how errors are grouped.
+        asked: number of base draws, and grouping of errors.
 
     Returns:
         The Saltelli design.
@@ -79,10 +77,10 @@ def importance_design(
 def importance_rows(
     experiment: Experiment, design: SaltelliDesign, first: int, count: int
 ) -> NDArray:
-    """Return the records of a range of rows of a design.
+    """Return the records of consecutive rows of a design.
 
-    Random clearance positions would add variance that is not due to the errors, so the
-    positions in the minimum-energy solution (22) are used.
+    The clearance positions are not random, because random positions would add variance
+    that is not due to the errors.
 
     Args:
         experiment: distributions and quantities.
@@ -91,7 +89,7 @@ def importance_rows(
         count: number of rows.
 
     Returns:
-        (count,) records of the experiment's record type.
+        Records of the experiment's record type, (count,).
     """
     asked = replace(
         experiment, clearance=importance_clearance_model(experiment), stiffness=""
@@ -104,25 +102,24 @@ def importance_rows(
 
 
 def importance_clearance_model(experiment: Experiment) -> str:
-    """Return the clearance model used to compute the importance of errors."""
+    """Return the clearance model with which the importance of errors is computed."""
     return "worst" if experiment.clearance == "worst" else "least"
 
 
 def importance_dataset(
     experiment: Experiment, design: SaltelliDesign, rows: NDArray, level: float = 0.95
 ) -> "xarray.Dataset":
-    """Compute the importance of each error source for an experiment's results.
+    """Compute the importance of errors for the results of an experiment.
 
     Args:
         experiment: distributions and quantities.
         design: design of the draws.
-        rows: records of the experiment's record type for all rows of the design.
+        rows: records of all rows of the design.
         level: confidence level of the intervals.
 
     Returns:
-        Data set with ``first_index`` and ``total_index`` over ``quantity``, ``group``
-        and ``estimate`` (value, lower, upper), with ``failed_share``, and with ``part``
-        and ``gain`` over ``component`` (rotation, translation).  It can be merged with
+        Data set with the dimensions ``quantity``, ``group``, ``estimate`` (value,
+        lower, upper) and ``component`` (rotation, translation). It can be merged with
         the data set of the draws.
     """
     import xarray
@@ -162,9 +159,9 @@ def importance_dataset(
 
 
 def _parts(variances: NDArray) -> NDArray:
-    """Compute the part (2, d) of each group from the screw's variances (6, d)."""
+    """Compute the parts, (2, d), from the variances of the screw, (6, d)."""
     lost = np.isnan(variances).all(axis=0)
-    # a component that does not vary has no index and contributes nothing
+    # A component that does not vary has an index of NaN.
     variances = np.maximum(np.nan_to_num(variances), 0.0)
     part = np.sqrt(np.stack([variances[:3].sum(axis=0), variances[3:].sum(axis=0)]))
     part[:, lost] = np.nan
@@ -172,15 +169,15 @@ def _parts(variances: NDArray) -> NDArray:
 
 
 def importance_report(data: "xarray.Dataset") -> dict[str, Any]:
-    """Convert the data of :func:`importance_dataset` to plain values.
+    """Convert the data of :func:`importance_dataset` to a dictionary.
 
     Args:
         data: result of :func:`importance_dataset`, possibly merged with the draws.
 
     Returns:
-        Number of base draws; the indices of each quantity, with the ranks that the
-        intervals allow; part and gain of each group; the fraction of discarded draws;
-        and a reason if there are no indices.
+        Indices, possible ranks and fraction of discarded draws of each quantity, with a
+        reason if there are no indices. Part and gain of each group. Number of base
+        draws.
     """
     groups = [str(g) for g in data["group"].values]
     quantities: dict[str, Any] = {}
@@ -218,7 +215,7 @@ def importance_report(data: "xarray.Dataset") -> dict[str, Any]:
 
 
 def importance_text(report: Mapping[str, Any]) -> str:
-    """Format the importance as a text table, with the largest shares first."""
+    """Format the importance as a text table, sorted by index."""
     quantities = report["quantities"]
     lines = [
         f"importance of the errors, {report['base_draws']} base draws; clearance model "
@@ -259,7 +256,7 @@ def importance_text(report: Mapping[str, Any]) -> str:
 
 
 def _moves_text(one: Mapping[str, Any]) -> str:
-    """Format the part and the gain of a group of errors as table columns."""
+    """Format the part and the gain of a group as columns of a text table."""
     gain = {
         "m": (f"{one['translation_gain']:11.4g}", " " * 13),
         "rad": (" " * 11, f"{1e3 * one['translation_gain']:13.4g}"),
@@ -271,6 +268,6 @@ def _moves_text(one: Mapping[str, Any]) -> str:
 
 
 def _interval_text(share: NDArray) -> str:
-    """Format a share and its confidence interval as text."""
+    """Format an index and its confidence interval as text."""
     value, low, high = share
     return f"{value:.3f} ({low:.3f} to {high:.3f})"

@@ -1,4 +1,4 @@
-"""Joint fits, and the frame whose clearance each fit determines."""
+"""Fits of joints, and the frames whose clearance they determine."""
 
 from dataclasses import dataclass, replace
 
@@ -6,19 +6,19 @@ from forcefit.assembly.callouts.fits import Fit, FittedEnd, parse_fit
 from forcefit.assembly.model.robot import Clearance, Frame, Robot
 from forcefit.assembly.statistics.ranking import kind_of
 
-# frames of a universal, cylindrical or planar joint; the joint's name precedes the dot
+# last words in frame names of universal, cylindrical and planar joints
 _PARTS_OF_JOINTS = ("first", "second", "turn", "slide")
 
 
 @dataclass(frozen=True, eq=False)
 class JointFit:
-    """A fit of a hole and a shaft.
+    """A fit of a hole and a shaft in a joint.
 
     Attributes:
-        frame: name of the joint's frame, or of the two parts.
+        frame: name of the frame of the joint, or names of the two fitted features.
         fit: the fit.
-        bounds: indices of the frames whose clearance the fit bounds, and the fitted end
-            of each; None if the fit bounds the value ``radial``.
+        bounds: index of each frame whose clearance the fit determines, with the fitted
+            end; None if the fit determines the key ``radial``.
     """
 
     frame: str
@@ -32,7 +32,7 @@ class JointFit:
 
 
 def fits_of(robot: Robot) -> tuple[JointFit, ...]:
-    """Return the fits of a robot, with each pair of hole and shaft listed once."""
+    """Return the fits of a robot, one for each pair of hole and shaft."""
     found: dict[str, JointFit] = {}
     for frame, text in robot.fits.items():
         end = robot.fitted_ends.get(frame)
@@ -44,7 +44,7 @@ def fits_of(robot: Robot) -> tuple[JointFit, ...]:
 
 
 def kind_of_fit(robot: Robot, fit: JointFit) -> str:
-    """Return the name of a fit without a leading leg name."""
+    """Return the name of a fit without the name of the leg."""
     joint, _, rest = fit.frame.partition(".")
     frames = {frame.name for frame in robot.frames}
     of_joint = joint in frames or rest.split(".")[0] in _PARTS_OF_JOINTS
@@ -52,7 +52,7 @@ def kind_of_fit(robot: Robot, fit: JointFit) -> str:
 
 
 def with_clearance(frame: Frame, new: dict[str, float]) -> Frame:
-    """Return the frame with a new clearance (for a bolted joint, before bolting)."""
+    """Return the frame with a new clearance, for a bolted joint before bolting."""
     bolt = frame.locked_at
     if bolt is not None:
         clearance = replace(bolt.clearance, **new)

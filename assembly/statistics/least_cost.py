@@ -1,22 +1,20 @@
-"""Tolerances of locally minimum cost for limits on nonconvex quantities.
+"""Minimum-cost tolerances for limits on nonconvex quantities (local minimum).
 
 Wrenches, stress and pose errors are not convex in the errors, and a yield is not convex
-in the tolerances.  However, the derivatives of the limited quantities with respect to
-every error and every tolerance are known for the worst samples, so the limits can be
-linearised. A convex programme with the linearised limits computes a trial point within
-a trust region around the current tolerances.  The trial point is scaled uniformly until
-the samples just meet the limits again.  The trial point is accepted if its cost is
-smaller; otherwise the trust region is reduced.  The cost therefore never increases. The
-result is a local minimum, which need not be global.
+in the tolerances. Each iteration linearises the limits at the worst samples of errors.
+A convex programme then computes trial tolerances within a trust region around the
+current ones. The trial tolerances are multiplied by the largest common factor with
+which the samples satisfy the limits. They are accepted if their cost is smaller.
+Otherwise, the trust region is reduced.
 
-For a yield below 1, the linearised limit is the mean over the samples closest to the
-limit, which is the derivative of the quantile.  For a yield of 1, each of the worst
-samples has a separate linearised limit. The worst corners of the tolerance box are
-searched again at every step.
+For a yield below 1, the derivatives are averaged over the samples closest to the limit,
+which estimates the derivative of the quantile. For a yield of 1, each of the worst
+samples is linearised separately, and the worst corners of the tolerance box are
+searched in each iteration.
 
 Sources:
-    Hong (2009), Estimating quantile sensitivities; Fletcher, Leyffer (2002), for
-    programmes within a trust region.
+    Hong (2009), Estimating quantile sensitivities; Fletcher, Leyffer (2002), Nonlinear
+    programming without a penalty function (trust region).
 """
 
 from collections.abc import Callable
@@ -32,34 +30,33 @@ from forcefit.assembly.statistics.scaling import (
     with_worst_corners,
 )
 
-_COARSE = 1e-3  # precision of the scaling at intermediate steps, relative to the limits
-# smallest relative reduction of the cost per step for which the iteration continues
+_COARSE = 1e-3  # relative precision of the scaling in intermediate iterations
+# smallest relative reduction of the cost for which a trial point is accepted
 _GAIN = 1e-4
-# largest and smallest factor on the tolerances in one step (trust region)
+# initial and smallest radius of the trust region, as a factor on each tolerance
 _LARGEST_RADIUS, _SMALLEST_RADIUS = 2.0, 1.01
 _MOST_STEPS = 60
-_PLANES = 200  # number of worst samples that are linearised for a yield of 1
-_NEARLY_ACTIVE = 0.8  # samples above this fraction of the limit count as active
+_PLANES = 200  # largest number of samples that are linearised for a yield of 1
+_NEARLY_ACTIVE = 0.8  # fraction of the limit above which a sample is linearised
 
 
 def least_cost(
     requirement: Requirement, samples: Samples, t: NDArray,
     progress: Callable[[str, int, int], None],
 ) -> tuple[NDArray, Samples]:  # fmt: skip
-    """Reduce the cost of tolerances, starting from uniformly scaled ones.
+    """Minimise the cost of tolerances locally.
 
     Args:
         requirement: requirement at all postures.
-        samples: samples of the errors that must meet the limits.
-        t: (G,) [rad or m] tolerances at the start; only their proportions matter.
+        samples: samples of the errors that must satisfy the limits.
+        t: (G,) [rad or m] initial tolerances, up to a common factor.
         progress: called with the name of a step, its progress and its total.
 
     Returns:
-        (G,) [rad or m] tolerances, and the samples with the worst corners of all
-        iterations.
+        Tolerances, (G,) [rad or m], and the samples including all worst corners found.
 
     Raises:
-        BadInput: no scale factor makes the samples meet the limits.
+        BadInput: the samples exceed the limits for all scale factors.
     """
     plan, radius = requirement.plan, _LARGEST_RADIUS
     t = scale_uniformly(requirement, samples, t, _COARSE)
@@ -82,7 +79,7 @@ def least_cost(
         if _saving(plan, t, trial) > _GAIN:
             t = trial
             continue
-        # half of the rejected step, in logarithms
+        # Halve the rejected step on a logarithmic scale.
         radius = np.exp(np.abs(np.log(trial / t)).max() / 2)
         if radius < _SMALLEST_RADIUS:
             break
@@ -91,13 +88,13 @@ def least_cost(
 
 
 def _saving(plan: Plan, before: NDArray, after: NDArray) -> float:
-    """Return the reduction of the cost, relative to the cost of all tolerances."""
+    """Return the relative reduction of the cost."""
     size = plan.price(before) if plan.cost == "reciprocal" else plan.costs.sum()
     return (plan.price(before) - plan.price(after)) / size
 
 
 def _planes(requirement: Requirement, samples: Samples, t: NDArray) -> list[NDArray]:
-    """Return linearised limits a.t' <= 1, a (G,), at the samples nearest to limits."""
+    """Return the coefficients a of linearised limits ``a.t' <= 1``, each (G,)."""
     values = samples.values * requirement.plan.spread(t)
     utilisations = requirement.utilisations(values)[1]
     if requirement.plan.asked_yield == 1.0:
@@ -120,9 +117,9 @@ def _planes(requirement: Requirement, samples: Samples, t: NDArray) -> list[NDAr
         )
         slopes[rows] = [requirement.plan.gather(one) for one in slopes_of_case]
     utilisation = utilisations[cases, draws]
-    relative_slopes = slopes / t  # relative derivative of utilisation by each tolerance
+    relative_slopes = slopes / t  # derivative with respect to each tolerance
     if requirement.plan.asked_yield < 1.0:
-        # a draw with zero utilisation has no relative slopes
+        # The logarithm of a zero utilisation has no derivative.
         nonzero = utilisation > 0
         relative_slopes = (relative_slopes[nonzero] / utilisation[nonzero, None]).sum(
             axis=0, keepdims=True

@@ -1,7 +1,7 @@
-"""Linear response of springs, closures and platform to clearances and errors.
+"""Linear response of a posture to clearances and geometric errors.
 
-The response depends only on the posture, so all draws of errors share it;
-:func:`forcefit.assembly.linear.energy.solve_assembly` solves the draws.
+The response does not depend on the errors, so it is computed once for all draws. The
+draws are solved by :func:`forcefit.assembly.linear.energy.solve_assembly`.
 """
 
 from dataclasses import dataclass
@@ -36,34 +36,35 @@ from forcefit.assembly.solvers.cones import cone_starts
 
 @dataclass(frozen=True, eq=False)
 class LinearResponse:
-    """Response of a posture to clearances and errors, from :func:`linear_response`.
+    """Linear response of a posture, computed by :func:`linear_response`.
 
-    There are n frames, nu clearances, r springs after elimination, and m closure rows,
-    six for each loop. The columns of ``screws`` and ``motions`` are [clearances |
-    errors].
+    There are n frames, nu clearances, r springs after elimination, nq free motions and
+    m closure equations, six for each loop. The columns of ``screws`` and ``motions``
+    belong to the nu clearances, followed by the 6n errors.
 
     Attributes:
-        posture: the robot's configuration; the errors of its robot file are not used.
+        posture: posture of the robot, whose errors are not used.
         joints: virtual joints of the posture.
-        starts: (cones + 1,) index of the first clearance of each cone, and nu.
+        starts: (cones + 1,) index of the first clearance of each cone, and finally nu.
         G: (r, nu) derivative of the scaled strains with respect to the clearances.
-        H: (p, nu) equations for the clearances that do not involve springs.
-        closures: (m, 6n) scaled closure rows.
+        H: (p, nu) matrix of the closure equations without springs.
+        closures: (m, 6n) matrix of the scaled closure equations.
         misfit: (r, 6n) derivative of the scaled strains with respect to the errors.
-        closing: (m, r) map from springs to closure multipliers.
-        redundant: (m, m - ..) orthonormal columns: combinations of closure rows to
-            which neither free motions nor springs contribute.
-        infeasible: (m - .., 6n) infeasible component of the errors, redundant.T @
-            closures.
+        closing: (m, r) derivative of the closure multipliers with respect to the scaled
+            strains.
+        redundant: (m, p) orthonormal combinations of closure equations to which neither
+            free motions nor springs contribute.
+        infeasible: (p, 6n) matrix redundant.T @ closures.
         screws: (6, nu + 6n) derivative of the platform screw.
-        platform: (6, 6n) map from the screws of all frames to the platform's screw.
+        platform: (6, 6n) derivative of the platform screw with respect to the screws of
+            all frames.
         motions: (nq, nu + 6n) derivative of the free motions.
-        ranges: (nq,) [rad or m] limits of the free motions, which are not applied here.
-        wrench: (n, 6, m) [N m, N] wrenches for unit closure multipliers.
-        load: (6,) [N m, N] load on the platform at its origin, base axes; None if none.
-        gravity: (3,) [m/s^2] gravity in base axes; None if none.
-        loads: generalised forces of load and weight on all small screws; None if none.
-        load_motions: (nq,) [rad, m] free motions under the loads at zero clearance.
+        ranges: (nq,) [rad or m] limits of the free motions, which the response omits.
+        wrench: (n, 6, m) [N m, N] link wrenches for unit closure multipliers.
+        load: (6,) [N m, N] load on the platform at its origin in base axes, or None.
+        gravity: (3,) [m/s^2] gravity in base axes, or None.
+        loads: generalised forces of load and weight on all frames, or None.
+        load_motions: (nq,) [rad, m] free motions under the loads without clearances.
     """
 
     posture: Posture
@@ -93,8 +94,7 @@ class LinearResponse:
             errors: (k, n, 6) [rad, m] geometric errors delta l.
 
         Returns:
-            The assemblies under the loads, with clearances in the columns of
-            :attr:`joints`.
+            The assemblies under the loads.
 
         Raises:
             ValueError: the shape does not match the robot, or a value is not finite.
@@ -104,12 +104,12 @@ class LinearResponse:
             self.posture, self.load, gravity=self.gravity, errors=errors
         )
         if found.joints.cones.shape[1] < self.starts[-1]:
-            return found.in_columns(self.joints)  # these columns include motion limits
+            return found.in_columns(self.joints)  # self.joints includes motion limits
         return found
 
 
 def checked_errors(errors: ArrayLike, n: int) -> NDArray:
-    """Convert the errors of k draws to an array, and check shape and values.
+    """Convert the errors of k draws to an array of the required shape.
 
     Args:
         errors: (k, n, 6) [rad, m] geometric errors delta l.
@@ -132,7 +132,7 @@ def checked_errors(errors: ArrayLike, n: int) -> NDArray:
 def linear_response(
     posture: Posture, load: ArrayLike | None = None, gravity: ArrayLike | None = None
 ) -> LinearResponse:
-    """Compute the response of a posture, with free motions and springs eliminated.
+    """Compute the linear response of a posture to clearances and errors.
 
     Args:
         posture: the robot's configuration.
@@ -140,8 +140,8 @@ def linear_response(
         gravity: (3,) [m/s^2] gravity in base axes.
 
     Returns:
-        The linear response.  Motion limits of passive joints are omitted unless a load
-        moves a joint to its limit.
+        The linear response. It includes motion limits of passive joints only if nothing
+        else resists a load.
 
     Raises:
         FreeMotion: a load acts along a motion without stiffness.
@@ -160,10 +160,10 @@ def linear_response(
         reduced = reduce_problem(lin, joints, loads)
     A, free = lin.rows, joints.free
     closing = reduced.basis @ reduced.elastic_inverse.T @ reduced.spread
-    # orthonormal rows to which neither free motions nor springs contribute
+    # equations to which neither free motions nor springs contribute
     held = np.linalg.qr(closing)[0] if closing.shape[1] else closing
     redundant = reduced.basis @ complement(reduced.basis.T @ held, RANK)
-    # smallest free motions that close the remaining closure error
+    # The pseudoinverse returns the smallest free motions that close the loops.
     inverse = np.linalg.pinv(A @ free, rcond=RANK)
     springs = joints.elastic @ reduced.spread
     misfit = -closing.T @ A
@@ -197,8 +197,8 @@ def linear_response(
 
 
 def _bent(reduced: Reduction, closing: NDArray) -> NDArray:
-    """Compute the elastic deformations (6n,) [rad, m] under load at zero clearance."""
-    # wrenches that balance the free motions, with the minimum spring energy
+    """Compute the deformations under load without clearances, (6n,) [rad, m]."""
+    # The multipliers balance the load on the free motions at minimum energy.
     bent = reduced.spread.T @ reduced.load_springs
     springs = spring_deformations(
         reduced.linearisation, reduced.joints, reduced.frame_loads,

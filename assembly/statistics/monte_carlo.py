@@ -1,9 +1,9 @@
-"""Monte Carlo simulation at one posture: problems (21), (22) and (27) for each draw.
+"""Monte Carlo simulation of random errors at one posture.
 
-Draws are solved in blocks, in any order and by any number of threads; each draw depends
-only on its number and the seed.  If an output file is given, finished blocks are
-written to a journal next to it, from which an interrupted run resumes.  The rows of the
-design for the importance of errors are solved as additional blocks.
+Problems (21), (22) and (27) are solved for each draw. A draw depends only on its index
+and the seed, so the result does not depend on the number of threads. If an output file
+is given, finished blocks of draws are stored in a journal next to it, from which an
+interrupted run resumes.
 """
 
 from collections.abc import Callable, Iterator
@@ -40,8 +40,8 @@ from forcefit.stiffness.screws import SCREW, WRENCH
 if TYPE_CHECKING:
     import xarray
 
-BLOCK = 1024  # number of draws that are solved and written to the journal together
-_QUEUED = 4  # number of queued blocks per thread
+BLOCK = 1024  # number of draws in a block of the journal
+_QUEUED = 4  # largest number of queued blocks per thread
 
 
 def run_draws(
@@ -53,25 +53,25 @@ def run_draws(
     importance: ImportanceOptions | int | None = None,
     held: ExitStack | None = None,
 ) -> "xarray.Dataset":
-    """Solve draws 0 to count - 1 of an experiment; return them as a data set.
+    """Solve draws 0 to count - 1 of an experiment.
 
     Args:
         experiment: error distributions and quantities.
         count: number of draws.
         path: NetCDF file to write; a journal next to it exists during the computation.
         workers: number of threads.
-        progress: called with the number of finished draws and the number of all draws.
-        importance: options for the importance of errors, or just its number of base
-            draws; None to omit it.
-        held: exit stack that keeps the journal until the stack is closed, as in
+        progress: function called with the number of finished draws and the number of
+            all draws.
+        importance: options for the importance of errors, or its number of base draws;
+            None to omit the importance.
+        held: exit stack whose closing removes the journal, as in
             :func:`forcefit.assembly.sweeps.sweep.run_sweep`.
 
     Returns:
-        Data set over ``draw``, with the importance of errors if requested.  The file
-        contains the same data.
+        Data set with the dimension ``draw``, which is also written to ``path``.
 
     Raises:
-        BadInput: the journal belongs to another run or is locked by another run, or a
+        BadInput: the journal belongs to other draws or is used by another process, or a
             file cannot be written.
         ModuleNotFoundError: xarray is missing.
     """
@@ -89,10 +89,10 @@ def _run_draws(
     progress: Callable[[int, int], None], importance: ImportanceOptions | None,
     held: ExitStack,
 ) -> "xarray.Dataset":  # fmt: skip
-    """Return the data set of draws; the journal lives until ``held`` is closed."""
+    """Return the data set of draws; ``held`` removes the journal when closed."""
     design = None if importance is None else importance_design(experiment, importance)
     more = 0 if design is None else len(design)
-    # blocks of draws, then of the design: first row and number of rows
+    # First row and number of rows of each block of draws, then of each design block.
     spans = [(i, min(BLOCK, count - i)) for i in range(0, count, BLOCK)]
     drawn = len(spans)
     spans += [(i, min(BLOCK, more - i)) for i in range(0, more, BLOCK)]
@@ -106,7 +106,7 @@ def _run_draws(
     kept: dict[int, NDArray] = {}
     journal = None
     if path is not None:
-        # the confidence level does not change the draws
+        # The confidence level is omitted because it does not change the draws.
         rows_of_design = importance and (importance.draws, importance.by)
         identity = provenance(experiment) | {
             "draws": count, "block": BLOCK, "importance": str(rows_of_design),
@@ -118,7 +118,7 @@ def _run_draws(
     done = sum(map(len, kept.values()))
     progress(done, count + more)
     missing = [b for b in range(len(spans)) if b not in kept]
-    with threadpool_limits(1):  # linear algebra libraries start no threads
+    with threadpool_limits(1):  # one thread per block in linear algebra libraries
         for block, rows in _solved(solve, missing, workers):
             if journal is not None:
                 journal.add(block, rows, {})
@@ -140,10 +140,10 @@ def _run_draws(
 def _solved(
     solve: Callable[[int], NDArray], blocks: list[int], workers: int
 ) -> Iterator[tuple[int, NDArray]]:
-    """Yield solved blocks, with few blocks queued at a time to save memory."""
+    """Yield the indices and results of blocks as soon as they are solved."""
     if not blocks:
         return
-    # the first block fills caches that the threads share
+    # Solve the first block alone to fill caches that all threads use.
     yield blocks[0], solve(blocks[0])
     waiting = iter(blocks[1:])
     with ThreadPoolExecutor(workers) as pool:
@@ -165,7 +165,7 @@ def _solved(
 
 
 def provenance(experiment: Experiment) -> dict[str, str | int | float]:
-    """Return values that are equal if and only if two runs have equal draws."""
+    """Return values that identify the draws of an experiment."""
     posture, sources = experiment.posture, experiment.sources
     contact = experiment.used_contact_length
     numbers = [*sources.identity, posture.transforms]
@@ -196,8 +196,7 @@ def draws_dataset(experiment: Experiment, rows: NDArray) -> "xarray.Dataset":
         rows: (k,) records of the experiment's record type.
 
     Returns:
-        Data set over ``draw``, in which pose error descriptions name the clearance
-        model.
+        Data set with the dimension ``draw``.
     """
     import xarray
 

@@ -1,10 +1,10 @@
-"""Margins, energy and pose errors of perfect parts: effect of clearances and loads.
+"""Results for perfect parts: effect of clearances and loads without errors.
 
-If a robot without geometric errors exceeds a limit, no tolerance can meet that limit.
-In the worst clearance model, the largest pose error splits into contributions of the
-joint clearances. Without geometric errors, it is a homogeneous function of the
-clearances, so by Euler's theorem it equals the sum of each clearance times its
-derivative, which is the multiplier of the clearance's bound.
+If a robot without geometric errors exceeds a limit, no tolerances can satisfy this
+limit. In the worst clearance model, the largest pose error of such a robot is a
+homogeneous function of the clearances. By Euler's theorem, it is the sum of the
+products of each clearance and the derivative with respect to it. These products are
+reported as contributions of the clearances.
 """
 
 import json
@@ -25,13 +25,13 @@ from forcefit.assembly.statistics.worst_clearance import (
     worst_error_slopes,
 )
 
-# number of random clearance positions from which the median is computed
+# number of random clearance positions for the median
 _DRAWS = 200
-_PRECISION = (1e-9, 1e-9)  # [rad, m] required precision of the largest pose errors
-_SHARE = 1e-3  # contributions below this fraction of the pose error are not listed
-_OWN = 0.02  # required precision of contributions, relative to the pose error
+_PRECISION = (1e-9, 1e-9)  # [rad, m] precision of the largest pose errors
+_SHARE = 1e-3  # smallest listed contribution, relative to the sum
+_OWN = 0.02  # smallest contribution of motion limits, relative to the pose error
 OWN_MOTION = "own motion of passive joints"
-_EXCEEDED = 1e-9  # relative excess from which a limit counts as exceeded
+_EXCEEDED = 1e-9  # relative tolerance for the comparison with a limit
 
 
 def perfect_parts(experiment: Experiment) -> dict[str, Any]:
@@ -41,11 +41,10 @@ def perfect_parts(experiment: Experiment) -> dict[str, Any]:
         experiment: posture, loads and clearance model.
 
     Returns:
-        By quantity: ``reached``, the value without errors (for random clearance models,
-            the median of 200 positions). For pose errors of the unloaded worst model
-            also ``clearances``: the contribution [rad or m] of each kind of clearance,
-            largest first. The dictionary is empty if the robot has no solution even
-            without errors.
+        For each quantity, ``reached`` is the value without errors; for random clearance
+        models, it is the median of 200 positions. For pose errors in the worst model
+        without loads, ``clearances`` contains the contribution [rad or m] of each
+        clearance. The dictionary is empty if there is no solution.
     """
     random = experiment.clearance in {"uniform", "contact"}
     count = _DRAWS if random else 1
@@ -56,7 +55,7 @@ def perfect_parts(experiment: Experiment) -> dict[str, Any]:
         values = rows[lower if lower in (rows.dtype.names or ()) else key]
         values = values.max(axis=1, initial=0.0) if values.ndim == 2 else values
         value = float(np.median(values))
-        if not np.isnan(value):  # NaN: the platform can move freely
+        if not np.isnan(value):  # NaN if the platform can move freely
             reached[key] = {"reached": value, "unit": UNITS[key]}
     prepared = experiment.energies
     if experiment.clearance == "worst" and prepared.loads is None:
@@ -64,7 +63,7 @@ def perfect_parts(experiment: Experiment) -> dict[str, Any]:
             whole = reached.get(key, {}).get("reached", np.nan)
             if np.isfinite(whole):
                 own = whole - sum(parts.values())
-                # motion limits of passive joints are not among the prepared clearances
+                # The remaining contribution is due to motion limits of passive joints.
                 if np.isfinite(prepared.ranges).any() and own > _OWN * whole:
                     parts[OWN_MOTION] = own
                 largest_first = sorted(parts.items(), key=lambda item: -item[1])
@@ -73,7 +72,7 @@ def perfect_parts(experiment: Experiment) -> dict[str, Any]:
 
 
 def _clearance_parts(prepared: LinearResponse) -> dict[str, dict[str, float]]:
-    """Return the contribution of each clearance kind to the largest pose errors."""
+    """Return the contributions of clearances to the largest pose errors."""
     draws = prepared.solve(np.zeros((1, len(prepared.posture.robot.frames), 6)))
     if not (np.isfinite(draws.energy).all() and np.isfinite(draws.clearances).all()):
         return {}
@@ -94,7 +93,7 @@ def _clearance_parts(prepared: LinearResponse) -> dict[str, dict[str, float]]:
 
 
 def _clearance_kinds(prepared: LinearResponse) -> list[str]:
-    """Return each clearance's name without the leg's name, such as ``hinge.tilt``."""
+    """Return names of clearances without the leg name, such as ``hinge.tilt``."""
     robot, kinds = prepared.posture.robot, []
     for first, end in zip(prepared.starts[:-1], prepared.starts[1:], strict=True):
         columns: NDArray = prepared.joints.cones[:, first:end]
@@ -107,21 +106,21 @@ def _clearance_kinds(prepared: LinearResponse) -> list[str]:
 
 
 def stored_perfect_parts(experiment: Experiment) -> str:
-    """Format the results at zero errors as JSON text, for a data set attribute."""
+    """Return the results without errors as JSON text."""
     return json.dumps(perfect_parts(experiment))
 
 
 def limits_broken(
     parts: Mapping[str, Any], limits: Mapping[str, float]
 ) -> dict[str, Any]:
-    """Return the limits that a robot of perfect parts (zero errors) exceeds.
+    """Return the limits that a robot without geometric errors exceeds.
 
     Args:
         parts: result of :func:`perfect_parts`.
         limits: limits by quantity.
 
     Returns:
-        By quantity: the value for perfect parts, its unit and the limit.
+        For each exceeded limit: value without errors, unit and limit.
     """
     return {
         key: {**parts[key], "limit": limit}
@@ -131,7 +130,7 @@ def limits_broken(
 
 
 def perfect_text(summary: Mapping[str, Any]) -> list[str]:
-    """Format the results without errors and the exceeded limits as lines of text."""
+    """Format the results without errors as lines of text."""
     parts, lines = summary.get("perfect_parts", {}), []
     alone = {k: parts[k] for k in POSE_ERRORS if parts.get(k, {}).get("reached")}
     why = "clearances and loads alone" if summary.get("load") else "clearances alone"
@@ -141,22 +140,21 @@ def perfect_text(summary: Mapping[str, Any]) -> list[str]:
     advice = "" if summary.get("load") else ", or specify the service load (--load)"
     for key, one in summary.get("perfect_parts_break", {}).items():
         lines.append(
-            f"warning: perfect parts reach a {key} {_size_text(one)}, limit "
-            f"{one['limit']:.4g} {one['unit']}: no tolerance of the errors "
-            f"meets it; tighten the clearances{advice}"
+            f"warning: without geometric errors, a {key} {_size_text(one)} exceeds the "
+            f"limit of {one['limit']:.4g} {one['unit']}; tighten the clearances{advice}"
         )
     return lines
 
 
 def _size_text(one: Mapping[str, Any]) -> str:
-    """Format a result without errors as text, with its unit."""
+    """Format a value and its unit as text."""
     if np.isinf(one["reached"]):
         return "without bound"
     return f"of {one['reached']:.4g} {one['unit']}"
 
 
 def _of_text(one: Mapping[str, Any]) -> str:
-    """Format the two clearances that contribute most as text in brackets."""
+    """Format the two largest contributions of clearances as text."""
     parts = list(one.get("clearances", {}).items())[:2]
     if not parts:
         return ""

@@ -1,4 +1,4 @@
-"""Figures of draws, importance and tolerances, made from their data sets."""
+"""Figures of random draws, importance of errors and tolerances."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
@@ -32,21 +32,23 @@ NAMES = {name: one.words for name, one in _SHOWN.items()}
 def figure_of_draws(
     data: "xarray.Dataset", kind: str | None, quantities: Sequence[str] = ()
 ) -> "Figure | None":
-    """Plot a data set of draws or tolerances.
+    """Plot a data set of random draws or tolerances.
 
     Args:
-        data: data set saved by ``statistics`` or ``tolerances``, or another data set.
-        kind: ``"histogram"``, ``"tornado"`` or ``"allocation"``; None to choose the
-            kind that suits the data.
-        quantities: quantities of a histogram, by the names in
+        data: data set written by the commands ``statistics`` or ``tolerances``, or
+            another data set.
+        kind: ``"histogram"``, ``"tornado"`` or ``"allocation"``; None to select it by
+            the variables in the data set.
+        quantities: quantities of a histogram, such as ``["energy"]``; for the names see
             :mod:`forcefit.assembly.sweeps.panels`.
 
     Returns:
-        The figure; None for another kind of data set.
+        The figure, or None for another data set.
 
     Raises:
-        ValueError: the data set lacks the variables that this kind of figure needs.
-        BadInput: a quantity is unknown, or quantities are given for another kind.
+        ValueError: the data set does not contain the variables for this kind of figure.
+        BadInput: a quantity is unknown, or quantities are given for another kind of
+            figure.
     """
     if kind is None:
         own = {"tolerance": "allocation", "sources_and_posture_sha256": "histogram"}
@@ -57,7 +59,9 @@ def figure_of_draws(
     if kind == "histogram":
         return histogram_figure(data, quantities)
     if quantities:
-        raise BadInput(f"--quantities: found with {kind}, expected with a histogram")
+        raise BadInput(
+            f"--quantities: found together with {kind}; expected a histogram"
+        )
     return tornado_figure(data) if kind == "tornado" else allocation_figure(data)
 
 
@@ -68,21 +72,20 @@ def histogram_figure(
 
     Args:
         data: result of :func:`forcefit.assembly.statistics.monte_carlo.run_draws`.
-        quantities: quantities to show, by the names in
-            :mod:`forcefit.assembly.sweeps.panels`; by default the limited quantities.
+        quantities: names of quantities, see :mod:`forcefit.assembly.sweeps.panels`; by
+            default the limited quantities.
 
     Returns:
-        A figure with one panel per quantity that varies; bands are 95 % confidence
-        intervals.
+        A figure with one panel per quantity. Bands are 95 % confidence intervals.
 
     Raises:
-        ValueError: the data set has no draws.
+        ValueError: the data set contains no draws.
         BadInput: a quantity is unknown.
     """
     from matplotlib.figure import Figure
 
     if "draw" not in data.dims or "energy" not in data:
-        raise ValueError("histograms need a data set of draws")
+        raise ValueError("a histogram requires a data set of random draws")
     solved = data.isel(draw=np.flatnonzero(data["status"].values == 0))
     shown = [panel[:3] for panel in named_panels(data, quantities)] or [
         (name, FACTORS.get(unit, 1.0), f"{NAMES[name]} [{unit}]")
@@ -112,7 +115,7 @@ def histogram_figure(
 
 
 def _histogram(panel: Any, text: str, values: Any) -> None:
-    """Draw one histogram; several components are represented by the largest one."""
+    """Draw the histogram of a quantity or of its largest component."""
     x = values.max(axis=1) if values.ndim == 2 else values
     x = x[np.isfinite(x)]
     panel.set(xlabel=text, ylabel="draws")
@@ -132,28 +135,30 @@ def _histogram(panel: Any, text: str, values: Any) -> None:
             panel.axvspan(
                 estimate["lower"], estimate["upper"], color=colour, alpha=0.25
             )
-    # matplotlib's search for the best position takes seconds if there are many bars
+    # The default position "best" takes seconds to compute for many bars.
     panel.legend(fontsize=8, loc="upper right")
 
 
 def tornado_figure(data: "xarray.Dataset", most: int = 15) -> "Figure":
-    """Plot the importance of errors as a tornado chart, largest index on top.
+    """Plot the importance of errors as a tornado chart.
 
     Args:
         data: data set with ``first_index`` and ``total_index``.
         most: largest number of bars per panel.
 
     Returns:
-        A figure with one panel per quantity: total indices are light, first-order
-            indices dark.
+        A figure with one panel per quantity. Total indices are light, first-order
+        indices are dark.
 
     Raises:
-        ValueError: the data set has no importance.
+        ValueError: the data set contains no importance.
     """
     from matplotlib.figure import Figure
 
     if "total_index" not in data:
-        raise ValueError("a tornado needs a data set with importance")
+        raise ValueError(
+            "a tornado chart requires a data set with the importance of errors"
+        )
     some = data.isel(quantity=np.isfinite(data["total_index"].values).any(axis=(1, 2)))
     names = [str(n) for n in some["quantity"].values]
     rows = max(1, -(-len(names) // 2))
@@ -185,25 +190,23 @@ def tornado_figure(data: "xarray.Dataset", most: int = 15) -> "Figure":
 
 
 def allocation_figure(data: "xarray.Dataset") -> "Figure":
-    """Plot the tolerances and their upper bounds as a bar chart.
+    """Plot tolerances and their upper bounds as a bar chart.
 
     Args:
         data: data of
             :func:`forcefit.assembly.statistics.allocated_tolerances.tolerance_dataset`.
 
     Returns:
-        A figure with separate panels for angles and lengths.  Wide bars are
-        minimum-cost tolerances. Narrow bars, drawn where different, are the uniformly
-        scaled tolerances of the convex programme.  The title reports cost and
-        verification.
+        A figure with a panel for angles and one for lengths. Wide bars are minimum-cost
+        tolerances. Narrow bars are uniformly scaled tolerances, if they differ.
 
     Raises:
-        ValueError: the data set has no tolerances.
+        ValueError: the data set contains no tolerances.
     """
     from matplotlib.figure import Figure
 
     if "tolerance" not in data:
-        raise ValueError("bars of tolerances need a data set of tolerances")
+        raise ValueError("a chart of tolerances requires a data set of tolerances")
     figure = Figure(
         figsize=(11, 2.2 + 0.35 * data.sizes["class"]), layout="constrained"
     )
@@ -223,9 +226,9 @@ def allocation_figure(data: "xarray.Dataset") -> "Figure":
                 uniformly_scaled,
                 0.15,
                 color="darkorange",
-                label="scaled alike",
+                label="uniformly scaled",
             )
-        panel.plot(most, np.arange(len(rows)), "k|", ms=14, label="loosest allowed")
+        panel.plot(most, np.arange(len(rows)), "k|", ms=14, label="largest allowed")
         classes = [plot_label(str(name)) for name in data["class"].values[rows]]
         panel.set_yticks(np.arange(len(rows)), classes, fontsize=8)
         panel.set(xlabel=f"tolerance, plus or minus [{shown}]", xscale="log")

@@ -1,8 +1,8 @@
-"""Assembly margin, problem (21), at one posture for many draws, with derivatives.
+"""Assembly margins, problem (21), of many draws at one posture.
 
-The margin is ``max q.K e`` over multipliers q with ``sum_k |B_k^T q| <= 1``.  It is
-convex and positively homogeneous in the errors e. Its derivative with respect to e is
-``K^T q`` at the optimal q.
+The margin is the maximum of ``q.K e`` over multipliers q with ``sum_k |B_k^T q| <= 1``.
+It is convex and positively homogeneous in the errors e. Its derivative is ``K^T q`` at
+the optimal q.
 """
 
 from dataclasses import dataclass
@@ -19,21 +19,20 @@ from forcefit.assembly.linear.zone import Compliant, Zone, zone_margin
 from forcefit.assembly.solvers.cones import cone_starts
 from forcefit.assembly.statistics.linear_response import checked_errors
 
-# [rad, reference lengths] an infeasible error component above this is not round-off, so
-# no motion or clearance can close the loops
+# [rad, reference lengths] infeasible error component above which the loops cannot close
 _CLEARLY_INFEASIBLE = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
 class PostureMargins:
-    """A posture prepared for the margins of given errors, by :func:`prepare_margins`.
+    """Problem (21) of a posture for any errors, from :func:`prepare_margins`.
 
     Attributes:
-        posture: the robot's configuration; the errors of its robot file are not used.
+        posture: posture of the robot, whose errors are not used.
         starts: (cones + 1,) index of the first clearance of each cone, and finally nu.
-        B: (p, nu) orthonormal rows of the equations for the clearances u, B u = K e.
-        K: (p, 6n) map from the errors e to the right-hand sides of these equations.
-        infeasible: (.., 6n) map from the errors to their infeasible component.
+        B: (p, nu) orthonormal rows of the equations B u = K e for the clearances u.
+        K: (p, 6n) matrix of the right-hand sides for the errors e.
+        infeasible: (.., 6n) matrix whose product with feasible errors is zero.
         compliant: whether compliant joints are ``"rigid"`` or ``"free"``, see
             :mod:`forcefit.assembly.linear.zone`.
     """
@@ -52,11 +51,12 @@ class PostureMargins:
             errors: (k, n, 6) [rad, m] geometric errors delta l.
 
         Returns:
-            Margins with their certificates. If even enlarged clearances cannot close
-            the errors, the forces are those of the part that clearances can close.
+            Margins with their certificates. If no clearances can compensate the errors,
+            the margin is inf, and the forces are those for the feasible component of
+            the errors.
 
         Raises:
-            ValueError: the shape does not match the robot, or a value is not finite.
+            ValueError: the errors have the wrong shape, or a value is not finite.
         """
         errors = checked_errors(errors, len(self.posture.robot.frames))
         left = errors.reshape(len(errors), -1) @ self.infeasible.T
@@ -71,13 +71,13 @@ class PostureMargins:
         return found
 
     def slopes(self, zone: Zone) -> NDArray:
-        """Return the derivatives of the margins with respect to each error.
+        """Return the derivatives of the margins with respect to the errors.
 
         Args:
             zone: result of :meth:`solve` for k draws.
 
         Returns:
-            (k, n, 6) [1/rad, 1/m] derivatives; NaN for draws that required the
+            Derivatives, (k, n, 6) [1/rad, 1/m]; NaN for draws that were solved by the
             reference method.
         """
         slopes = zone.forces @ self.B.T @ self.K
@@ -85,7 +85,7 @@ class PostureMargins:
 
 
 def prepare_margins(posture: Posture, compliant: Compliant = "free") -> PostureMargins:
-    """Prepare a posture for margins, with free motions eliminated.
+    """Prepare problem (21) for a posture by eliminating free motions.
 
     Args:
         posture: the robot's configuration.
@@ -96,14 +96,14 @@ def prepare_margins(posture: Posture, compliant: Compliant = "free") -> PostureM
         The prepared posture.
 
     Raises:
-        ValueError: ``compliant`` is not one of these words.
+        ValueError: ``compliant`` has another value.
     """
     if compliant not in {"rigid", "free"}:
         raise ValueError(f"compliant is {compliant!r}, expected 'rigid' or 'free'")
     robot = posture.robot
     lin, joints = linearise(posture), virtual_joints(robot, False, compliant == "free")
     reduced = reduce_problem(lin, joints)
-    # orthonormal rows make the result independent of the units of the closures
+    # Orthonormal rows do not depend on the units of the closure equations.
     U, S, B = svd(reduced.H, full_matrices=False)
     rigid = reduced.rigid
     held = np.linalg.qr(rigid)[0] if rigid.shape[1] else rigid

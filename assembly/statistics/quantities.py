@@ -1,11 +1,11 @@
-"""Quantities computed for each draw, their units, and limits on them."""
+"""Quantities that are computed for each draw, with units and limits."""
 
 import numpy as np
 
 from forcefit.inputs.table import BadInput, nearest
 from forcefit.results.quantities import QUANTITIES
 
-# unit of each quantity of a draw, in the order of reports
+# unit of each quantity, in the order of reports
 UNITS = {
     name: QUANTITIES[name].unit
     for name in (
@@ -19,17 +19,16 @@ _UNLIMITED = {"platform_screw", "duality_gap", "rotation_lower", "translation_lo
 
 
 def limit_names() -> tuple[str, ...]:
-    """Return the names of the quantities that can be limited."""
+    """Return the names of quantities for which a limit is valid."""
     return tuple(k for k in UNITS if k not in _UNLIMITED)
 
 
 def parse_limit(text: str) -> tuple[str, float]:
-    """Parse a limit such as ``"energy=5"`` into quantity and number.
+    """Return the quantity and the value of a limit such as ``"energy=5"``.
 
     Args:
-        text: name of the quantity, "=", and a number > 0; names are energy [J], margin,
-            margin_free, rotation [rad], translation [m], force [N], moment [N m],
-            stress [Pa].
+        text: name, "=" and a number > 0. The names are energy [J], margin, margin_free,
+            rotation [rad], translation [m], force [N], moment [N m] and stress [Pa].
 
     Returns:
         The name and the limit.

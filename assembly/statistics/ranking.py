@@ -1,4 +1,4 @@
-"""Possible ranks of variance shares, and merged names for equal errors in all legs."""
+"""Ranks of the contributions of errors to a variance, and their names."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
@@ -8,23 +8,23 @@ from numpy.typing import NDArray
 
 from forcefit.stiffness.screws import SCREW
 
-_IN_SENTENCE = 3  # largest number of contributors in a sentence
+_IN_SENTENCE = 3  # largest number of errors in a sentence
 
 NOT_DISTINGUISHED = (
-    "rank: the ranks that the intervals allow; errors with a rank in common are not "
-    "distinguished by these draws"
+    "rank: range of possible ranks; the order of errors with overlapping ranges is "
+    "unknown"
 )
 
 
 def possible_ranks(shares: Mapping[str, NDArray]) -> dict[str, tuple[int, int]]:
-    """Return the best and the worst possible rank of each contributor.
+    """Return the best and the worst possible rank of each share.
 
     Args:
-        shares: value, lower and upper bound on each share, by name.
+        shares: estimate and confidence bounds (lower, upper) of each share, by name.
 
     Returns:
-        Best and worst rank by name.  A share ranks before another one only if its lower
-        bound exceeds the other's upper bound.  Unknown shares have no ranks.
+        Best and worst rank by name. Two shares have a definite order only if their
+        confidence intervals do not overlap. Shares of NaN are omitted.
     """
     known = {name: v for name, v in shares.items() if np.isfinite(v).all()}
     lower, upper = np.array([v[1:] for v in known.values()]).reshape(-1, 2).T
@@ -38,7 +38,7 @@ def possible_ranks(shares: Mapping[str, NDArray]) -> dict[str, tuple[int, int]]:
 
 
 def rank_text(rank: Sequence[int] | None) -> str:
-    """Format possible ranks as text, such as 1 or 2-4; empty if there are none."""
+    """Format a range of ranks as text, such as ``2-4``."""
     if rank is None:
         return ""
     first, last = rank
@@ -46,14 +46,14 @@ def rank_text(rank: Sequence[int] | None) -> str:
 
 
 def ranked(summary: Mapping[str, Any], key: str) -> list[tuple[str, list[float]]]:
-    """Return the total variance share of each error for a quantity, largest first.
+    """Return the total Sobol indices of a quantity in descending order.
 
     Args:
         summary: result of :func:`forcefit.assembly.statistics.summary.summarise`.
         key: name of the quantity.
 
     Returns:
-        Names with (value, lower, upper); empty if there are no shares.
+        Names of errors with (value, lower, upper); empty if there are no indices.
     """
     one = summary.get("importance", {}).get("quantities", {}).get(key, {})
     if "reason" in one or "total_index" not in one:
@@ -66,16 +66,16 @@ def ranked(summary: Mapping[str, Any], key: str) -> list[tuple[str, list[float]]
 def shares_sentence(
     shares: Sequence[tuple[str, Sequence[float]]], quantity: str
 ) -> str:
-    """Format the largest shares of a quantity's variance as a sentence.
+    """Format the largest contributions to a variance as a sentence.
 
     Args:
-        shares: names with value, lower and upper bound, the largest first.
+        shares: names with (value, lower, upper), in descending order.
         quantity: name of the quantity.
 
     Returns:
         A sentence such as ``"position of bore 2 on link_a: 31 % of the variance of the
-        translation (27 to 36 %); .."``.  Estimates and intervals from few draws may
-        leave the range from 0 to 100 %; the sentence states the part within it.
+        translation (27 to 36 %); .."``. Values are clipped to the range from 0 to 100
+        %.
     """
     parts = []
     for name, share in shares[:_IN_SENTENCE]:
@@ -86,20 +86,20 @@ def shares_sentence(
 
 
 def leaders(ranks: Mapping[str, Sequence[int]]) -> list[str]:
-    """Return the names of all contributors that could rank first."""
+    """Return the names of all errors that could have rank 1."""
     return [name for name, (first, _) in ranks.items() if first == 1]
 
 
 def named_together(names: Iterable[str], among: Iterable[str]) -> list[str]:
-    """Merge the names of contributors that occur in every leg.
+    """Merge names that are equal in all legs.
 
     Args:
-        names: names of the contributors, such as ``leg1.hinge.RX``.
-        among: all names.
+        names: names of errors, such as ``leg1.hinge.RX``.
+        among: names of all errors of the robot.
 
     Returns:
-        ``hinge.RX of all legs`` if this component of every leg is among the names;
-        other names, and the order of the names, stay unchanged.
+        The names in the same order. Names that occur for every leg are replaced by one
+        name, such as ``hinge.RX of all legs``.
     """
     names = list(names)
     of_kind: dict[str, list[str]] = {}
@@ -114,14 +114,14 @@ def named_together(names: Iterable[str], among: Iterable[str]) -> list[str]:
 
 
 def group_of(label: str, by: str) -> str:
-    """Return the group name of an error ``hinge.RX`` by source, frame or kind."""
+    """Return the group of an error ``leg1.hinge.RX`` by source, frame or kind."""
     return {
         "source": label, "frame": label.rpartition(".")[0], "kind": kind_of(label)
     }[by]  # fmt: skip
 
 
 def kind_of(name: str) -> str:
-    """Return the name of a frame or an error without the leg's name: ``hinge.RX``."""
+    """Return the name of a frame or an error without the leg name."""
     frame, dot, component = name.rpartition(".")
     if component not in SCREW:
         frame, dot, component = name, "", ""

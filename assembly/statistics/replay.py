@@ -1,8 +1,8 @@
-"""Journal of a long deterministic computation, which stores results in order.
+"""Journal that stores the results of a deterministic computation in order.
 
-When an interrupted computation is started again, results in the journal are read
-instead of computed. Each result is stored with a digest of its arguments, and is
-recomputed if the digest differs, for example because the program has changed.
+When an interrupted computation is restarted, it reads stored results instead of
+computing them. Each result is stored with a digest of its arguments. If the digest
+differs, the result is computed again.
 """
 
 import io
@@ -25,11 +25,11 @@ _DIGEST = 32
 
 @dataclass(eq=False)
 class Replay:
-    """Stored results of a computation, returned in order.
+    """Results of a computation, read from a journal if available.
 
     Attributes:
         journal: journal with records of type :data:`RECORD`; None to store nothing.
-        asked: number of results requested so far.
+        asked: number of requested results.
     """
 
     journal: Journal | None = None
@@ -38,14 +38,14 @@ class Replay:
     def recall(
         self, compute: Callable[[], tuple[ArrayLike, ...]], *given: ArrayLike
     ) -> tuple[NDArray, ...]:
-        """Return the next result, from the journal if possible, otherwise computed.
+        """Return the next result, which is computed unless the journal contains it.
 
         Args:
             compute: function that computes the result.
-            given: numbers and texts on which the result depends.
+            given: arguments on which the result depends.
 
         Returns:
-            The results of ``compute``, as arrays.
+            The return values of ``compute``, as arrays.
         """
         if self.journal is None:
             return tuple(np.asarray(a) for a in compute())
@@ -70,14 +70,15 @@ class Replay:
 def journalled(
     path: Path | None, whose: dict[str, Any]
 ) -> Generator[Replay, None, None]:
-    """Store results in a journal next to an output file until the file is written.
+    """Store results in a journal next to an output file.
 
     Args:
         path: path of the output file; None to store nothing.
-        whose: values that must be equal for two computations to share results.
+        whose: values that identify the computation.
 
     Yields:
-        The stored results. The journal is removed when the block ends without an error.
+        The results. The journal is removed after the ``with`` block unless an exception
+            is raised.
 
     Raises:
         BadInput: the journal belongs to another computation, or cannot be written.

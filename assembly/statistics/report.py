@@ -1,4 +1,4 @@
-"""HTML report on random draws: yields, perfect parts and main contributors."""
+"""HTML report on random errors: yields, distributions and main errors."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
@@ -25,12 +25,13 @@ if TYPE_CHECKING:
     import xarray
 
 _BINS = 60
-_GOOD = 0.95  # yield above which a result is marked as good
-_LISTED = 20  # largest number of errors in a table of shares
+_GOOD = 0.95  # yield that is marked as good
+_LISTED = 20  # largest number of rows in the table of errors
 _ASSUMED = (
-    "Small screws: the closures are linear in the errors of each draw.",
-    "Yields count all draws; energies, forces, pose errors only those that assemble.",
-    "Intervals are of the sampling alone: they do not cover a wrong distribution.",
+    "The closure equations are linearised (small screws).",
+    "Yields refer to all draws; other results refer to the draws that assemble.",
+    "Confidence intervals include the sampling error, but not errors of the "
+    "assumed distributions.",
 )
 
 
@@ -41,14 +42,14 @@ def draws_page(
     """Format the results of an experiment as an HTML page.
 
     Args:
-        summary: result of :func:`forcefit.assembly.statistics.summary.summarise`, with
-            the robot's name as ``robot``.
+        summary: result of :func:`forcefit.assembly.statistics.summary.summarise`, and
+            the robot's name with the key ``robot``.
         data: the draws.
-        provenance: the command and its input files.
-        robot: HTML from :func:`forcefit.assembly.statistics.scenes.drawn_robot`.
+        provenance: command line and input files.
+        robot: 3D scene from :func:`forcefit.assembly.statistics.scenes.drawn_robot`.
 
     Returns:
-        Self-contained HTML.
+        HTML that includes all data and scripts.
     """
     goes = summary["assembles"]["forced"]
     verdict = f"Of {summary['draws']} draws {_share_text(goes)} assemble"
@@ -73,7 +74,7 @@ def draws_page(
 def draws_sections(
     summary: Mapping[str, Any], data: "xarray.Dataset", robot: str = ""
 ) -> list[str]:
-    """Return the sections of :func:`draws_page`, which other pages share."""
+    """Return the sections of :func:`draws_page`."""
     return [
         section("Probabilities", _yields(summary)),
         _perfect_parts(summary),
@@ -86,30 +87,30 @@ def draws_sections(
 
 
 def _share(summary: Mapping[str, Any]) -> Mapping[str, float]:
-    """Return the yield: all limits met or, without limits, the robot assembles."""
+    """Return the yield; without limits, it is the probability of assembly."""
     limits: Mapping[str, float] | None = summary.get("within_limits")
     forced: Mapping[str, float] = summary["assembles"]["forced"]
     return limits or forced
 
 
 def _good(share: Mapping[str, float]) -> bool | None:
-    """Return whether the yield is at least 95 %; None if its interval contains it."""
+    """Return whether the yield is at least 95 %; None if this is uncertain."""
     if share["lower"] >= _GOOD:
         return True
     return None if share["upper"] >= _GOOD else False
 
 
 def _share_text(interval: Mapping[str, float]) -> str:
-    """Format a probability in per cent as text, with its confidence interval."""
+    """Format a probability and its confidence interval in per cent."""
     low, high = 100 * interval["lower"], 100 * interval["upper"]
     return f"{100 * interval['probability']:.2f} % ({low:.2f} to {high:.2f})"
 
 
 def _draws_tiles(summary: Mapping[str, Any]) -> list[Tile]:
-    """Return tiles for the yield, the pose error and the main errors."""
+    """Return tiles on the yield, the pose error and the main errors."""
     share = _share(summary)
     low, high = (100 * share[end] for end in ("lower", "upper"))
-    words = "all limits kept" if "within_limits" in summary else WORDS["forced"]
+    words = "all limits satisfied" if "within_limits" in summary else WORDS["forced"]
     tiles = [Tile("Yield", [f"{100 * share['probability']:.4g} %"],
                   [f"{words}; {low:.4g} to {high:.4g} %."])]  # fmt: skip
     sizes = {k: summary["quantities"].get(k, {}) for k in ("rotation", "translation")}
@@ -119,32 +120,32 @@ def _draws_tiles(summary: Mapping[str, Any]) -> list[Tile]:
     ]  # fmt: skip
     if high95:
         answer = [part for one in high95 for part in (" and ", one)][1:]
-        note = f"of the platform's error; clearance {summary['clearance']}."
+        note = f"of the platform error; clearance model {summary['clearance']}."
         tiles.append(Tile("95 % quantile", answer, [note]))
     return tiles + tightening_tiles(summary)
 
 
 def _yields(summary: Mapping[str, Any]) -> str:
-    """Format all probabilities as an HTML table."""
+    """Format the probabilities as an HTML table."""
     named = {WORDS[key]: one for key, one in summary["assembles"].items()}
     for key, one in summary["exceeds"].items():
         limit = f"{one['limit']:g} {one['unit']}".removesuffix(" 1")
         named[f"{NAMES[key]} above {limit}"] = one
     if "within_limits" in summary:
-        named["all limits kept"] = summary["within_limits"]
+        named["all limits satisfied"] = summary["within_limits"]
     rows: list[list[Cell]] = [
         [name, *(one[k] for k in ("probability", "lower", "upper")),
          float(one.get("undecided", 0))]
         for name, one in named.items()
     ]  # fmt: skip
     level = f"{summary['confidence']:.0%}"
-    words = ("probability", f"at least ({level})", "at most", "draws undecided")
+    words = ("probability", f"lower bound ({level})", "upper bound", "undecided draws")
     head: list[str | Column] = ["event", *(Column(one, digits=5) for one in words)]
     return table(head, rows, "yields")
 
 
 def _perfect_parts(summary: Mapping[str, Any]) -> str:
-    """Format the results without errors, by kind of clearance, as HTML."""
+    """Format the section on results without geometric errors."""
     parts = {k: v for k, v in summary["perfect_parts"].items() if v["reached"]}
     if not parts:
         return ""
@@ -159,11 +160,11 @@ def _perfect_parts(summary: Mapping[str, Any]) -> str:
         for key, one in parts.items()
         for name, size in one.get("clearances", {}).items()
     ]
-    pieces = [table(["all errors zero", "reached", "limit"], reached, "perfect parts")]
+    pieces = [table(["quantity", "without errors", "limit"], reached, "perfect parts")]
     if of_joints:
-        head: list[str | Column] = ["clearance", "its part", Column("share")]
+        head: list[str | Column] = ["clearance", "contribution", Column("share")]
         pieces.append(table(head, of_joints, "clearances"))
-    return section("Results with perfect parts", *pieces)
+    return section("Results without geometric errors", *pieces)
 
 
 def _quantities(summary: Mapping[str, Any]) -> str:
@@ -182,7 +183,7 @@ def _quantities(summary: Mapping[str, Any]) -> str:
 
 
 def _histograms(summary: Mapping[str, Any], data: "xarray.Dataset") -> str:
-    """Plot histograms of the varying quantities, with median and 95 % quantile."""
+    """Plot histograms of all quantities that vary."""
     charts, still = [], []
     solved = data["status"].values == 0
     for key, one in summary["quantities"].items():
@@ -193,12 +194,12 @@ def _histograms(summary: Mapping[str, Any], data: "xarray.Dataset") -> str:
             still.append(NAMES[key])
             continue
         charts.append(_histogram(NAMES[key], one, values))
-    note = f"Without variation: {', '.join(still)}." if still else ""
+    note = f"Constant quantities: {', '.join(still)}." if still else ""
     return grid(*charts) + paragraph(note)
 
 
 def _histogram(name: str, one: Mapping[str, Any], values: NDArray) -> str:
-    """Plot a histogram with bins of equal width as HTML."""
+    """Plot a histogram with median and 95 % quantile as HTML."""
     counts, edges = np.histogram(values, _BINS)
     traces: list[dict[str, Any]] = [{
         "type": "bar", "x": (edges[1:] + edges[:-1]) / 2, "y": counts,
@@ -215,7 +216,7 @@ def _histogram(name: str, one: Mapping[str, Any], values: NDArray) -> str:
 
 
 def _capability(summary: Mapping[str, Any]) -> str:
-    """Format Cpk and parts per million as an HTML table."""
+    """Format the section on process capability."""
     rows: list[list[Cell]] = [
         [NAMES[key], Value(one["limit"], one["unit"]),
          *(one[index][k] for index in ("cp", "cpk", "ppm")
@@ -223,13 +224,14 @@ def _capability(summary: Mapping[str, Any]) -> str:
         for key, one in summary.get("capability", {}).items()
     ]  # fmt: skip
     words = [word for name in ("Cp", "Cpk", "ppm above")
-             for word in (name, f"{name}, at least", f"{name}, at most")]  # fmt: skip
+             for word in (name, f"{name}, lower bound",
+                          f"{name}, upper bound")]  # fmt: skip
     head: list[str | Column] = ["quantity", "limit", *map(Column, words)]
     return section("Capability", table(head, rows, "capability")) if rows else ""
 
 
 def _importance(summary: Mapping[str, Any]) -> str:
-    """Format the section on the errors that contribute to the variance as HTML."""
+    """Format the section on the importance of errors."""
     pieces = []
     for key, one in summary.get("importance", {}).get("quantities", {}).items():
         shares = ranked(summary, key)[:_LISTED]
@@ -244,7 +246,7 @@ def _importance(summary: Mapping[str, Any]) -> str:
         model = summary["importance"]["clearance"]
         title = NAMES[key] + (f" (clearance {model})" if key in POSE_ERRORS else "")
         axis = Axis(f"share of the variance: {NAMES[key]}")
-        words = ("share, with others", "at least", "at most", "share alone")
+        words = ("total index", "lower bound", "upper bound", "first-order index")
         head: list[str | Column] = ["error", *map(Column, words), "rank"]
         pieces += [
             paragraph(f"{shares_sentence(shares, key)}."),

@@ -1,4 +1,4 @@
-"""Requirements on tolerances: limits at every posture and a required yield."""
+"""Requirements on tolerances: limits at several postures and a yield."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -22,31 +22,31 @@ from forcefit.results.display import html_table, short_repr
 
 CONVEX = ("margin", "margin_free", "energy")
 COSTS = ("reciprocal", "logarithm")
-# required difference of upper and lower bound, relative to the limit on a pose error
+# required difference of both bounds, relative to the limit on a pose error
 _PRECISION = 1e-4
-_BATCH = 512  # number of draws that are solved and stored together
-# random number streams; additional verifications use higher numbers
+_BATCH = 512  # number of draws per stored result
+# random number streams; repeated verifications use the streams after FRESH
 TRAINING, SCALING, FRESH = 10, 11, 12
 
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """Costs and limits of tolerances.
+    """Costs of tolerances, and limits on the results.
 
     Attributes:
-        sources: m errors, scaled to tolerances of 1 [rad or m]; callout zones are
-            scaled to a width of 1 m.
-        group: (m,) class of each error.
+        sources: m errors for tolerances of 1 rad or 1 m and for callout zones with a
+            width of 1 m.
+        group: (m,) index of each error's class.
         names: names of the G classes.
-        costs: (G,) cost coefficient of each class, > 0.
+        costs: (G,) cost coefficients, > 0.
         least: (G,) [rad or m] smallest tolerances.
         most: (G,) [rad or m] largest tolerances.
         cost: cost law, ``"reciprocal"`` or ``"logarithm"``.
         limits: limits by quantity: margin, margin_free, energy [J], force [N], moment
             [N m], stress [Pa], rotation [rad], translation [m].
-        asked_yield: 1 if all robots must meet the limits; otherwise the fraction of
-            robots that must meet every limit at every posture.
-        draws: number of training draws at every posture.
+        asked_yield: required fraction of robots that satisfy every limit at every
+            posture; 1 for all robots.
+        draws: number of training draws per posture.
         seed: seed of all draws.
         clearance: clearance model for limits on pose errors, one of
             :data:`forcefit.assembly.statistics.clearance_positions.CLEARANCE_MODELS`.
@@ -70,38 +70,38 @@ class Plan:
 
     @property
     def limits_pose(self) -> bool:
-        """Whether a pose error is limited; without one, no clearance model is used."""
+        """Whether there is a limit on a pose error."""
         return bool(set(POSE_ERRORS) & set(self.limits))
 
     __repr__, _repr_html_ = short_repr, html_table
 
     def spread(self, tolerances: NDArray) -> NDArray:
-        """Return the tolerance (m,) of every source."""
+        """Return the tolerance of each error, (m,)."""
         return tolerances[self.group]
 
     def gather(self, slopes: NDArray) -> NDArray:
-        """Sum slopes over the sources of each class; return (G,)."""
+        """Return the sums of the derivatives over each class, (G,)."""
         return np.bincount(self.group, weights=slopes, minlength=len(self.names))
 
     def price(self, tolerances: NDArray) -> float:
-        """Return the cost of tolerances."""
+        """Return the total cost of tolerances."""
         if self.cost == "reciprocal":
             return float((self.costs / tolerances).sum())
         return float(-(self.costs * np.log(tolerances)).sum())
 
     def draws_of(self, stream: int, count: int) -> NDArray:
-        """Draw errors (count, m), relative to the tolerances."""
+        """Return random errors relative to the tolerances, (count, m)."""
         return self.sources.draw(0, count, self.seed, stream)
 
 
 @dataclass(frozen=True, eq=False)
 class Requirement:
-    """A plan at several postures of one robot, prepared for the limited quantities.
+    """Limits of a plan at several postures of one robot.
 
     Attributes:
         postures: postures of the workspace.
         plan: costs and limits.
-        replay: stored results of an earlier, interrupted computation.
+        replay: stored results of an interrupted computation.
     """
 
     postures: Sequence[Posture]
@@ -112,7 +112,7 @@ class Requirement:
 
     @cached_property
     def experiments(self) -> list[Experiment]:
-        """Experiments for all quantities except the margins, one at each posture."""
+        """Experiment at each posture, for all quantities except margins."""
         plan = self.plan
         rotation, translation = (
             _PRECISION * plan.limits.get(key, np.inf) for key in POSE_ERRORS
@@ -132,7 +132,7 @@ class Requirement:
 
     @cached_property
     def prepared(self) -> dict[str, list]:
-        """Prepared postures by the name of the limited quantity."""
+        """Prepared postures for each limited quantity."""
         return {
             key: [prepare_margins(p, MARGINS[key]) for p in self.postures]
             if key in MARGINS else [e.energies for e in self.experiments]
@@ -141,10 +141,10 @@ class Requirement:
 
     @cached_property
     def convex(self) -> dict[str, list]:
-        """Prepared postures by limited quantity, for quantities convex in the errors.
+        """Prepared postures for each limited quantity that is convex in the errors.
 
-        If a joint is bolted, no quantity is convex, because the locked-in clearance is
-        not linear in the errors.
+        If a joint is bolted, no quantity is convex, because the clearance that the bolt
+        fixes is not linear in the errors.
         """
         if any(frame.locked_at for frame in self.postures[0].robot.frames):
             return {}
@@ -152,24 +152,24 @@ class Requirement:
 
     @property
     def is_convex(self) -> bool:
-        """Whether all limited quantities are convex; True only for a yield of 1."""
+        """Whether the yield is 1 and all limited quantities are convex."""
         return self.plan.asked_yield == 1.0 and len(self.convex) == len(self.prepared)
 
     @property
     def cases(self) -> list[tuple[str, int]]:
-        """Limit and posture of each row of :meth:`utilisations`."""
+        """Quantity and posture index of each row of :meth:`utilisations`."""
         return [(key, i) for key in self.plan.limits for i in range(len(self.postures))]
 
     def utilisations(self, values: NDArray) -> tuple[NDArray, NDArray]:
-        """Return the utilisation of the limits: each quantity divided by its limit.
+        """Return the quotient of each quantity and its limit.
 
         Args:
             values: (k, m) [rad or m] errors.
 
         Returns:
-            (limits x postures, k) lower and upper bounds, with rows as in
-            :attr:`cases`. The two differ only for pose errors of the worst clearance
-            model. The utilisation of a draw without a solution is inf.
+            Lower and upper bounds on the quotients, (limits x postures, k); for the
+            rows see :attr:`cases`. The bounds differ only for pose errors in the worst
+            clearance model. The quotients are inf without a solution.
         """
         chunks = [
             self._batch_utilisations(values, i) for i in range(0, len(values), _BATCH)
@@ -180,7 +180,7 @@ class Requirement:
     def _batch_utilisations(
         self, values: NDArray, first: int
     ) -> tuple[NDArray, NDArray]:
-        """Return the utilisations of one batch of errors at all postures."""
+        """Return the quotients for one batch of draws."""
         some = values[first : first + _BATCH]
         rows = np.arange(first, first + len(some))
         keys = list(self.plan.limits)
@@ -189,7 +189,7 @@ class Requirement:
             self.replay.recall(partial(self._quantities, i, some, rows), some, rows, i)
             for i in range(len(self.postures))
         ]
-        # (bounds, limits, postures, k): the postures of a limit are adjacent
+        # The array has the shape (bounds, limits, postures, k).
         utilisations = np.stack([np.array(b) / limits for b in bounds], axis=2)
         utilisations = np.where(np.isnan(utilisations), np.inf, utilisations)
         lower, upper = utilisations.reshape(2, -1, len(some))
@@ -198,7 +198,7 @@ class Requirement:
     def _quantities(
         self, i: int, values: NDArray, rows: NDArray
     ) -> tuple[NDArray, NDArray]:
-        """Return lower and upper bounds (limits, k) of the quantities at posture i."""
+        """Return lower and upper bounds on the quantities, each (limits, k)."""
         keys = list(self.plan.limits)
         rows_of_draws = None
         if any(not key.startswith("margin") for key in keys):
@@ -224,12 +224,12 @@ class Requirement:
         return bounds[0], bounds[1]
 
     def utilisation_slopes(self, case: int, values: NDArray) -> NDArray:
-        """Return derivatives (k, m) of a row of :meth:`utilisations` by each error."""
+        """Return the derivatives of a row of :meth:`utilisations`, (k, m)."""
         key, i = self.cases[case]
         return self.respond(key, i, values)[1] / self.plan.limits[key]
 
     def respond(self, key: str, i: int, values: NDArray) -> tuple[NDArray, NDArray]:
-        """Return a limited quantity at posture i, and its derivatives by each error."""
+        """Return a quantity at posture i, (k,), and its derivatives, (k, m)."""
         size, slopes = self.replay.recall(
             lambda: respond(
                 self.prepared[key][i],
@@ -246,9 +246,9 @@ class Requirement:
         return size, slopes
 
     def worst_corner(self, key: str, i: int, t: NDArray, corners: NDArray) -> Corner:
-        """Search for the worst corner of the tolerance box (G,) at posture i."""
+        """Search for the worst corner of the tolerance box at posture i."""
         spread, sources = self.plan.spread(t), self.plan.sources
-        assert isinstance(sources, ErrorSources)  # callouts have no corners
+        assert isinstance(sources, ErrorSources)  # callout zones have no corners
 
         def search() -> tuple:
             corner = worst_corner(
@@ -261,15 +261,14 @@ class Requirement:
         return Corner(float(value), signs, slopes)
 
     def perfect_parts(self) -> dict[str, tuple[float, str]]:
-        """Return the limited pose errors that clearances alone cause.
+        """Return the pose errors that clearances cause without geometric errors.
 
         Returns:
-            By quantity: a lower bound on the largest pose error [rad or m] without
-            errors over all postures, and its posture. The result is empty for clearance
-            models other than the worst.
+            For each limited pose error, a lower bound on its maximum over all postures
+            [rad or m], and the posture. Empty unless the clearance model is "worst".
 
         Raises:
-            BadInput: one of the pose errors exceeds its limit.
+            BadInput: a pose error exceeds its limit.
         """
         if self.plan.clearance != "worst" or not self.plan.limits_pose:
             return {}
@@ -288,24 +287,24 @@ class Requirement:
         return reached
 
     def _refuse_broken(self, reached: Mapping[str, tuple[float, str]]) -> None:
-        """Reject the limit that a robot without errors exceeds by the most, if any."""
+        """Raise an error if a robot without geometric errors exceeds a limit."""
         limits = self.plan.limits
         for key in sorted(reached, key=lambda k: -reached[k][0] / limits[k]):
             value, where = reached[key]
             if value > limits[key]:
                 unit = UNITS[key]
                 raise BadInput(
-                    f"limit {key}: even perfect parts reach {value:.4g} {unit} "
-                    f"by clearances alone at {where}; expected at most "
+                    f"limit {key}: even without geometric errors, clearances cause "
+                    f"{value:.4g} {unit} at {where}; expected at most "
                     f"{limits[key]:g} {unit}; tighten the clearances, loosen "
                     "the limit, or use --clearance least"
                 )
 
     def check_taken_up(self) -> None:
-        """Reject errors that neither a clearance nor a spring can take up.
+        """Raise an error if no clearance or spring can compensate an error.
 
         Raises:
-            BadInput: such an error exists; the message names the error.
+            BadInput: there is such an error.
         """
         sources, n = self.plan.sources, len(self.postures[0].robot.frames)
         for key, prepared in self.convex.items():
@@ -315,7 +314,7 @@ class Requirement:
                 if residual.max(initial=0.0) > 1e-9:
                     name = sources.labels[int(residual.argmax())]
                     raise BadInput(
-                        f"limit {key}: found an error {name} that no clearance "
-                        "or spring can close; leave this error out, or limit "
-                        "the energy of a robot with a spring there"
+                        f"limit {key}: found the error {name}, which no clearance "
+                        "or spring can compensate; omit this error, or add a "
+                        "spring and limit the energy"
                     )

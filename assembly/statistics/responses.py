@@ -24,10 +24,10 @@ from forcefit.assembly.statistics.worst_clearance import (
 )
 from forcefit.assembly.steps.bolted import bolted_errors
 
-_STEP = 1e-6  # step for differences of the stress formula, relative to the wrench
-_PRECISION = 1e-9  # [rad or m] required precision of the largest pose errors
-# finite-difference step for errors of bolted joints, relative to the largest absolute
-# value of the error; and a lower limit on that reference value
+_STEP = 1e-6  # finite-difference step for the stress, relative to the wrench
+_PRECISION = 1e-9  # [rad or m] precision of the largest pose errors
+# finite-difference step for robots with bolted joints, relative to the largest value of
+# an error, and smallest reference value
 _BOLT_STEP, _LEAST_VALUE = 1e-4, 1e-6
 _PARTS = {"moment": slice(0, 3), "force": slice(3, 6)}
 
@@ -37,30 +37,28 @@ def respond(
     key: str = "energy", clearance: str = "worst",
     contact_length: float | None = None,
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
-    """Evaluate a quantity and its derivatives for given errors.
+    """Compute a quantity and its derivatives for given errors.
 
     Args:
-        prepared: a posture prepared for margins, or one prepared for energies, which
-            is used for all other quantities.
+        prepared: prepared problem (21) for a margin, or linear response for another
+            quantity.
         sources: m sources of errors.
         values: (k, m) [rad or m] errors.
-        key: name of the quantity, for a posture prepared for energies: energy [J],
-            force [N], moment [N m], stress [Pa], rotation [rad] or translation [m].
+        key: quantity for a linear response: energy [J], force [N], moment [N m], stress
+            [Pa], rotation [rad] or translation [m].
         clearance: for a pose error, one of
             :data:`forcefit.assembly.statistics.clearance_positions.CLEARANCE_MODELS`.
-            In the worst model, the value and its derivatives are those of the largest
-            error found. For uniform and contact positions, the derivatives are those of
-            the minimum-energy solution (22), which omit the motion of clearances that
-            the minimum energy leaves undetermined.
+            In the models ``"uniform"`` and ``"contact"``, the derivatives omit the
+            motion of joints within their clearances.
         contact_length: [m] length of the contact model, see
             :class:`forcefit.assembly.statistics.experiment.Experiment`.
 
     Returns:
-        (k,) values and (k, m) derivatives; NaN without a solution. Bolted joints lock
-        in the clearances with the smallest sum of squares for these errors.
+        Values, (k,), and derivatives, (k, m); NaN without a solution. Bolted joints are
+        fixed at the clearances with the smallest sum of squares.
 
     Raises:
-        CannotBolt: a robot cannot be assembled at the pose where its joint is bolted.
+        CannotBolt: a robot cannot be assembled at the pose where a joint is bolted.
     """
     robot = prepared.posture.robot
     errors = bolted_errors(robot, sources.errors(values))
@@ -74,7 +72,7 @@ def respond(
         return draws.energy, -by_number(draws.wrenches)
     size = np.full(len(values), np.nan)
     slopes = np.full(errors.shape, np.nan)
-    # without known clearances, the active clearance bounds are unknown too
+    # The derivatives require known clearances.
     known = np.isfinite(draws.energy) & np.isfinite(draws.clearances).all(axis=1)
     solved = np.flatnonzero(known)
     if len(solved):
@@ -96,10 +94,10 @@ def respond(
 def _by_number(
     robot: Robot, sources: Sources, values: NDArray, slopes: NDArray
 ) -> NDArray:
-    """Return derivatives (k, m) by m sources, from derivatives by all frame errors.
+    """Return the derivatives with respect to the m sources, (k, m).
 
-    The clearance that a bolted joint locks in depends on the errors; its derivatives
-    are central differences.
+    The frame error of a bolted joint depends on all errors. Its derivatives are
+    computed by central differences.
     """
     if not any(frame.locked_at for frame in robot.frames):
         return sources.of_numbers(slopes)
@@ -115,7 +113,7 @@ def _pose_error(
     prepared: LinearResponse, draws: Assembly, key: str,
     model: tuple[str, float | None], numbers: NDArray,
 ) -> tuple[NDArray, NDArray, NDArray | None]:  # fmt: skip
-    """Return a pose error, and its derivatives by platform screw and clearances."""
+    """Return a pose error, and its derivatives for platform screw and clearances."""
     part, (clearance, contact_length) = 3 * POSE_ERRORS.index(key), model
     if clearance == "worst":
         precision = (_PRECISION, np.inf) if key == "rotation" else (np.inf, _PRECISION)
@@ -135,7 +133,7 @@ def _pose_error(
 
 
 def _wrench_quantity(some: Assembly, key: str) -> tuple[NDArray, NDArray]:
-    """Return the largest moment, force or stress, and its derivatives by wrench."""
+    """Return the largest moment, force or stress, and its derivatives."""
     wrenches, at_tips = some.wrenches, some.frame_loads.at_tips
     slopes, draws = np.zeros_like(wrenches), np.arange(len(wrenches))
     if key != "stress":
@@ -156,7 +154,7 @@ def _wrench_quantity(some: Assembly, key: str) -> tuple[NDArray, NDArray]:
 
 
 def _size(parts: NDArray) -> tuple[NDArray, NDArray]:
-    """Return the norms of vectors, and their derivatives by component."""
+    """Return the norms of vectors, and the derivatives of the norms."""
     size = np.linalg.norm(parts, axis=-1)
     return size, parts / np.maximum(size, 1e-300)[..., None]
 
@@ -164,9 +162,8 @@ def _size(parts: NDArray) -> tuple[NDArray, NDArray]:
 def _stress_slopes(
     link: LinkStress, wrenches: NDArray, at_tip: NDArray = WEIGHTLESS
 ) -> NDArray:
-    """Differentiate the peak stress with respect to the wrench of a link (k, 6)."""
-    # The formula, not the solution, is differenced. A fibre's stress is the root of a
-    # quadratic form, so the relative error is 1e-10.
+    """Differentiate the peak stress of a link with respect to its wrench, (k, 6)."""
+    # Central differences of the stress formula have a relative error of about 1e-10.
     slopes = np.zeros_like(wrenches)
     for part in (slice(0, 3), slice(3, 6)):
         step = _STEP * np.linalg.norm(wrenches[:, part], axis=1).max(initial=1e-9)

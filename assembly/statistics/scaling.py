@@ -1,4 +1,4 @@
-"""Uniform scaling of tolerances until error samples just meet all limits."""
+"""Uniform scaling of tolerances so that error samples satisfy all limits."""
 
 from dataclasses import dataclass
 
@@ -10,17 +10,17 @@ from forcefit.assembly.statistics.requirement import Requirement
 from forcefit.assembly.statistics.worst_case import CORNERS, random_corners
 from forcefit.inputs.table import BadInput
 
-_FINE = 1e-4  # precision of the largest utilisation (value divided by limit)
+_FINE = 1e-4  # relative precision of the largest quotient of value and limit
 _MOST_TRIALS = 80
 
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """Error samples that must meet every limit at every posture, with few exceptions.
+    """Error samples that must satisfy every limit at every posture.
 
     Attributes:
         values: (k, m) errors divided by their tolerances.
-        allowed: number of samples that may fail.
+        allowed: number of samples that may violate a limit.
     """
 
     values: NDArray
@@ -28,19 +28,19 @@ class Samples:
 
 
 def draw_samples(requirement: Requirement, stream: int, times: int = 1) -> Samples:
-    """Draw random error samples or, for a yield of 1, corners of the tolerance box.
+    """Return random errors or, for a yield of 1, corners of the tolerance box.
 
     Args:
         requirement: requirement at all postures.
         stream: random number stream.
-        times: factor on the number of the plan's draws.
+        times: factor on the plan's number of draws.
 
     Returns:
-        The samples. If no more than the allowed number fail, the required yield is
-        demonstrated with 95 % confidence.
+        The samples. The allowed number of violations demonstrates the required yield
+        with 95 % confidence.
 
     Raises:
-        BadInput: there are too few draws to demonstrate that yield.
+        BadInput: there are too few draws to demonstrate the yield.
     """
     plan = requirement.plan
     if plan.asked_yield == 1.0:
@@ -54,15 +54,15 @@ def draw_samples(requirement: Requirement, stream: int, times: int = 1) -> Sampl
 def with_worst_corners(
     requirement: Requirement, samples: Samples, t: NDArray
 ) -> Samples:
-    """Extend samples by the worst corner for each limit and posture.
+    """Add the worst corner for each limit and posture to samples.
 
     Args:
-        requirement: requirement at all postures; no failure is allowed.
+        requirement: requirement at all postures, with a yield of 1.
         samples: current corners.
         t: (G,) [rad or m] tolerances.
 
     Returns:
-        The samples, extended by the worst corners that are not yet among them.
+        The samples and all new worst corners.
     """
     corners = np.vstack([
         samples.values[: CORNERS // 2],
@@ -82,20 +82,20 @@ def with_worst_corners(
 def scale_uniformly(
     requirement: Requirement, samples: Samples, t: NDArray, precision: float = _FINE
 ) -> NDArray:
-    """Scale tolerances by one factor, within bounds, until samples just meet limits.
+    """Multiply tolerances by the largest factor with which samples satisfy the limits.
 
     Args:
         requirement: requirement at all postures.
         samples: samples of the errors.
-        t: (G,) [rad or m] proportions of the tolerances.
-        precision: relative precision of the largest utilisation, or of the factor.
+        t: (G,) [rad or m] tolerances.
+        precision: relative precision of the largest quotient of value and limit, or of
+            the factor.
 
     Returns:
-        (G,) [rad or m] tolerances, or their upper bounds if the samples meet all limits
-        even there.
+        Scaled tolerances within their bounds, (G,) [rad or m].
 
     Raises:
-        BadInput: no scale factor makes the samples meet the limits.
+        BadInput: the samples exceed the limits for all factors.
     """
     plan = requirement.plan
     low, high, factor, power = 0.0, np.inf, 1.0, 1.0
@@ -105,7 +105,7 @@ def scale_uniformly(
         utilisations = requirement.utilisations(samples.values * plan.spread(trial))[
             1
         ].max(axis=0)
-        # largest utilisation among all samples except the samples that may fail
+        # The samples that may violate a limit are excluded.
         utilisation = float(
             np.partition(utilisations, -1 - samples.allowed)[-1 - samples.allowed]
         )
@@ -117,8 +117,8 @@ def scale_uniformly(
             break
         if low == 0 and high < 1e-9:
             raise BadInput(
-                "tolerances: even a robot without geometric errors violates a limit; "
-                "loosen the limit or tighten the clearances"
+                "tolerances: even a robot without geometric errors exceeds a limit; "
+                "increase the limit or reduce the clearances"
             )
         if (
             0 < utilisation < np.inf
@@ -128,7 +128,7 @@ def scale_uniformly(
             steep = np.log(utilisation / previous[1]) / np.log(factor / previous[0])
             power = float(np.clip(steep, 0.3, 10.0))
         previous = factor, utilisation
-        # predict the factor with a power law of the utilisation, otherwise bisect
+        # Extrapolate by a power law of the utilisation, or bisect.
         factor = _next_factor(low, high, factor, utilisation, power, precision)
     return np.clip(low * t, plan.least, plan.most)
 
@@ -148,8 +148,8 @@ def _next_factor(
 
 
 def _allowed_failures(draws: int, asked: float) -> int:
-    """Return the largest number of failures that still demonstrates a yield at 95 %."""
-    # proportion() is monotonic in the number of failures, so bisection applies
+    """Return the largest number of violations that demonstrates a yield."""
+    # The lower bound decreases with the number of failures, so bisection applies.
     low, high = -1, draws
     while high - low > 1:
         middle = (low + high) // 2
@@ -157,7 +157,7 @@ def _allowed_failures(draws: int, asked: float) -> int:
         low, high = (middle, high) if held else (low, middle)
     if low < 0:
         raise BadInput(
-            f"tolerances: {draws} draws are too few to show a yield of "
-            f"{asked:g}, even if none fails; use more draws"
+            f"tolerances: {draws} draws are too few to demonstrate a yield of "
+            f"{asked:g}, even if none of them fails; use more draws"
         )
     return low

@@ -1,4 +1,4 @@
-"""3D scenes of robots with drawn errors, and maps of assembly margins."""
+"""3D scenes of robots with geometric errors, and maps of assembly margins."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -28,14 +28,14 @@ _CAPTION = (
 
 
 def drawn_robot(experiment: Experiment, data: "xarray.Dataset") -> str:
-    """Draw the robot whose pose error is closest to the 95 % quantile.
+    """Show the random draw whose pose error is closest to the 95 % quantile.
 
     Args:
         experiment: the experiment of the draws.
-        data: the draws, numbered from 0.
+        data: data set of all draws.
 
     Returns:
-        HTML of a scene with the assembled robot; empty if no draw assembles.
+        HTML of a scene with the assembled robot; empty if no draw can be assembled.
     """
     solved = data["status"].values == 0
     for key in ("translation", "energy"):
@@ -54,12 +54,12 @@ def drawn_robot(experiment: Experiment, data: "xarray.Dataset") -> str:
     robot = bolt_joints(robot, None if rngs is None else rngs[0])
     return _forced_robot(
         replace(experiment.posture, robot=robot), experiment.wrench, experiment.gravity,
-        why=f"Draw {draw}, whose {NAMES[key]} is nearest to 95 % of them.",
+        why=f"Draw {draw}, whose {NAMES[key]} is closest to the 95 % quantile.",
     )  # fmt: skip
 
 
 def tightest_robot(postures: Sequence[Posture], present: Mapping[str, Any]) -> str:
-    """Draw the robot with its present errors at the posture of largest margin.
+    """Show a robot with its geometric errors at the posture of the largest margin.
 
     Args:
         postures: the assessed postures.
@@ -70,7 +70,7 @@ def tightest_robot(postures: Sequence[Posture], present: Mapping[str, Any]) -> s
         HTML of a scene with the assembled robot; empty if it cannot be assembled.
     """
     worst = postures[int(np.nanargmax(present["margins"]))]
-    why = "The posture of the largest margin, with the present errors."
+    why = "Posture of the largest margin, with the errors in the robot file."
     return _forced_robot(worst, why=why)
 
 
@@ -81,7 +81,7 @@ def _forced_robot(
     *,
     why: str,
 ) -> str:
-    """Draw an assembled robot; the result is empty if the assembly has no solution."""
+    """Return a scene of an assembled robot; empty if there is no solution."""
     try:
         forced = solve_assembly(posture, load, gravity=gravity)
     except (CannotAssemble, SolverFailed):
@@ -90,7 +90,7 @@ def _forced_robot(
 
 
 def margin_map(postures: Sequence[Posture], present: Mapping[str, Any]) -> str:
-    """Plot the margins over a grid of postures as an HTML map.
+    """Plot margins over a grid of postures as an HTML map.
 
     Args:
         postures: the assessed postures.
@@ -119,5 +119,5 @@ def margin_map(postures: Sequence[Posture], present: Mapping[str, Any]) -> str:
     ]
     title = f"{NAMES[present['quantity']]}, eq. (21)"
     layer = Layer("margin", title, "", margins)
-    caption = "Up to 1 it assembles by its clearances alone."
+    caption = "Up to a margin of 1, the robot assembles by clearances alone."
     return value_map(axes, [layer], states.astype(str), caption)

@@ -1,12 +1,10 @@
-"""Derivatives of a solution with respect to every geometric error.
+"""Derivatives of a minimum-energy solution with respect to geometric errors.
 
-The minimum energy (22) equals the maximum of its dual ``-w.dl - ..`` over all balanced
-wrenches w.  The derivative of the energy with respect to delta l is therefore minus the
-wrench that the body transmits.
+By duality, the derivative of the minimum energy (22) with respect to the error delta l
+of a frame is minus the wrench w that the body transmits.
 
-Wrenches and the platform screw are part of the solution. As long as the set of active
-clearances does not change, their derivatives follow from the differentiated optimality
-conditions:
+The derivatives of wrenches and platform screw are obtained by differentiating the
+optimality conditions for constant active clearances:
 
     G^T (G u + h) + H^T eta + nu u = 0,   H u = k,   |u_c| = 1 where nu_c > 0,
 
@@ -14,8 +12,8 @@ so du is orthogonal to u_c in every active cone, and
 
     P (G^T G + nu) P du + P H^T deta = -P G^T dh,   H P du = dk
 
-where P is the projector on these directions.  A single solve with the transposed
-equations gives the derivatives with respect to any number of errors (adjoint method).
+where P is the projector on these directions. By the adjoint method, a single solution
+of the transposed equations gives the derivatives with respect to all errors.
 """
 
 import numpy as np
@@ -25,24 +23,22 @@ from forcefit.assembly.linear.energy import Assembly
 from forcefit.assembly.solvers.conic import GAP_WITHOUT_CLEARANCE
 from forcefit.assembly.statistics.linear_response import LinearResponse
 
-# forces below this fraction of the largest force on any clearance count as zero
+# fraction of the largest clearance force below which a force is zero
 _ACTIVE = 1e-7
-# relative size below which a singular value counts as zero; clearances are assumed to
-# stay fixed along the corresponding directions
+# relative singular value below which clearances are undetermined
 _RANK = 1e-10
 
 
 def energy_slopes(assembly: Assembly) -> NDArray:
-    """Differentiate the minimum energy with respect to every geometric error.
+    """Differentiate the minimum energy with respect to geometric errors.
 
     Args:
-        assembly: the assembly at minimum energy. Under a load, the result is the
-            derivative of the energy minus the work of the load.
+        assembly: the assembly at minimum energy. Under a load, the energy minus the
+            work of the load is differentiated.
 
     Returns:
-        (n, 6) [J/rad, J/m] derivatives with respect to delta l of every frame, in frame
-        axes. If rigid parts are overconstrained, the wrenches are not unique, and the
-        derivatives for the smallest wrenches are returned.
+        Derivatives with respect to delta l, (n, 6) [J/rad, J/m], in frame axes. For
+        overconstrained rigid bodies, they are those of the smallest wrenches.
     """
     return -assembly.wrenches
 
@@ -51,20 +47,20 @@ def solution_slopes(
     prepared: LinearResponse, draws: Assembly, by_wrench: NDArray, by_screw: NDArray,
     by_clearance: NDArray | None = None,
 ) -> NDArray:  # fmt: skip
-    """Differentiate a function of wrenches and platform screw with respect to errors.
+    """Differentiate a function of wrenches and platform screw by geometric errors.
 
     Args:
         prepared: the prepared posture.
-        draws: solutions of k draws, from :meth:`LinearResponse.solve`.
-        by_wrench: (k, n, 6) derivatives of the function by the wrench of every body.
-        by_screw: (k, 6) derivatives with respect to the platform's screw.
+        draws: solutions for k draws, from :meth:`LinearResponse.solve`.
+        by_wrench: (k, n, 6) derivatives of the function with respect to the wrenches.
+        by_screw: (k, 6) derivatives with respect to the platform screw.
         by_clearance: (k, nu) derivatives with respect to the clearances, relative to
             their bounds.
 
     Returns:
-        (k, n, 6) derivatives with respect to delta l of every frame, in frame axes. If
-        a clearance is weakly active, one of the one-sided derivatives is returned.
-        Undetermined clearances are assumed to stay fixed, and motion limits of passive
+        Derivatives with respect to delta l, (k, n, 6), in frame axes. For a weakly
+        active clearance, the derivative is one-sided. Clearances that the minimum
+        energy does not determine are assumed to be constant. Motion limits of passive
         joints are ignored.
     """
     A, nu, k = prepared.closures, prepared.starts[-1], len(draws.energy)
@@ -97,11 +93,11 @@ def solution_slopes(
 def _active_clearances(
     prepared: LinearResponse, draws: Assembly, forces: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Return projectors (k, nu, nu) normal to active clearances, and multipliers."""
+    """Return the projectors P and the multipliers nu, each (k, nu, nu)."""
     k, nu = forces.shape
     P, N = np.tile(np.eye(nu), (k, 1, 1)), np.zeros((k, nu, nu))
-    # inside an assembly zone the multipliers y are round-off: the energies y^2 / 2 are
-    # far below the forces G y
+    # Inside an assembly zone, the forces are round-off errors, and no clearance is
+    # active.
     pressed = draws.energy > GAP_WITHOUT_CLEARANCE * np.abs(forces).sum(
         axis=1, initial=0.0
     )

@@ -1,4 +1,4 @@
-"""Pictures of robots, of results at one point, and of data sets."""
+"""Figures of robots, of results at one point, and of data sets."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -31,38 +31,36 @@ def show(
     """Draw a robot, a result at one point, or a data set.
 
     Args:
-        thing: object to draw. A robot is drawn in its home pose. A posture is drawn
-            without errors. An assembly is drawn in its nominal and its forced state,
-            with exaggerated displacements; with finite motions, large displacements are
-            to scale. A platform stiffness is drawn as the compliance shares of its
-            parts. A data set, which may also be given as the path of a NetCDF file, is
-            drawn as maps over two axes or lines along one axis of a sweep, as
-            histograms of draws, or as bars of tolerances.
-        errors: for an assembly: ``"translation"`` or ``"rotation"`` to add the possible
-            platform errors within the clearances.
-        assumption: assumption of problem (27) for these errors: ``"frozen"``,
-            ``"free"`` or ``"budget"``.
-        interactive: True for an interactive scene, which a notebook displays and a
-            browser opens (attribute ``html``); False for a matplotlib figure; None for
-            a scene in a notebook and a figure elsewhere.  A data set has figures only.
-        quantities: for a data set: variables to draw, or their components, such as
+        thing: object to draw, or the path of a NetCDF file. A robot is drawn in its
+            home pose. A posture is drawn without errors. An assembly is drawn in its
+            nominal and its forced state with magnified displacements. A platform
+            stiffness is drawn as the compliance contribution of each body. Sweeps are
+            drawn as maps or lines, random draws as histograms, and tolerances as bars.
+        errors: for an assembly: ``"translation"`` or ``"rotation"`` to add the set of
+            platform errors due to clearances.
+        assumption: assumption of problem (27) for this set: ``"frozen"``, ``"free"`` or
+            ``"budget"``.
+        interactive: True for an interactive 3D scene, whose attribute ``html`` is a
+            page for the browser; False for a matplotlib figure; None for a scene in
+            notebooks and a figure elsewhere. Data sets are always drawn as figures.
+        quantities: for a data set: variables or components to draw, such as
             ``["energy", "stiffness.FX"]``; by default those of figure 5 of the paper.
-        at: for a sweep: values on the remaining axes by name; the nearest points are
-            drawn. If no draw is selected, the median over all draws is drawn.
+        at: for a sweep: values of the axes that are not drawn, by name. The nearest
+            points are used. Without a value for ``draw``, medians over all draws are
+            drawn.
         kind: for draws or tolerances: ``"histogram"``, ``"tornado"`` or
-            ``"allocation"``; None to choose the kind that suits the data set.
+            ``"allocation"``; None to select the kind by the data set.
 
     Returns:
-        The scene or the figure. A notebook displays it as the result of a cell.
-        Otherwise a figure is not shown: use ``savefig`` to write it, or
-        ``pyplot.show()`` to open a window.
+        The scene or the figure, which a notebook displays as the result of a cell. In a
+        script, use ``savefig`` or ``pyplot.show()`` to see a figure.
 
     Raises:
         BadInput: the object has another type or many points; a file cannot be read; an
-            axis or a quantity is unknown; more than two axes of a sweep remain; errors
-            are requested for something else than an assembly, or for one with a free
-            motion; or matplotlib is not installed.
-        SolverFailed: the cone solver failed for the errors.
+            axis or a quantity is unknown; a sweep has more than two axes without a
+            value in ``at``; ``errors`` is given for another object than an assembly or
+            for an assembly with a free motion; or matplotlib is not installed.
+        SolverFailed: the cone solver failed for ``errors``.
     """
     if isinstance(thing, Statistics):
         thing = thing.data
@@ -72,8 +70,8 @@ def show(
     if isinstance(thing, Shown):
         if quantities or at or kind:
             raise BadInput(
-                f"show: found quantities, at or kind for a {type(thing).__name__}, "
-                "expected them for a data set"
+                f"show: found quantities, at or kind for a {type(thing).__name__}; "
+                "they are valid only for a data set"
             )
         return show_point(
             thing, errors=errors, assumption=assumption, interactive=interactive
@@ -85,8 +83,8 @@ def show(
         )
     if errors is not None or interactive:
         raise BadInput(
-            "show: found errors or interactive=True for a data set, expected them for "
-            "a result at one point"
+            "show: found errors or interactive=True for a data set; they are valid "
+            "only for a result at one point"
         )
     try:
         drawn = figure_of_draws(thing, kind, quantities)

@@ -1,7 +1,7 @@
-"""Random errors in one call, from a posture and its errors to draws and yields.
+"""Monte Carlo statistics of a posture in one call.
 
-Start with :func:`statistics`; the command ``forcefit assembly statistics`` has the same
-options.
+The arguments of :func:`statistics` correspond to the options of the command ``forcefit
+assembly statistics``.
 """
 
 from collections.abc import Callable, Mapping
@@ -37,12 +37,12 @@ _WORDS: dict[str, tuple[str | None, ...]] = {
 
 @dataclass(frozen=True, eq=False)
 class Statistics:
-    """Draws of the random errors at a posture, with their yields.
+    """Results for random errors at a posture.
 
     Attributes:
-        data: data set over ``draw``, with units.
-        summary: yields, quantiles and most probable values in the format of ``forcefit
-            assembly statistics --json``; see
+        data: data set with the dimension ``draw``.
+        summary: yields, quantiles and most probable values, as in the output of
+            ``forcefit assembly statistics --json``; see
             :func:`forcefit.assembly.statistics.summary.summarise`.
     """
 
@@ -57,11 +57,11 @@ class Statistics:
         return self.data
 
     def to_pandas(self) -> "pandas.DataFrame":
-        """Return the draws as a table with one row for each draw."""
+        """Return the draws as a table with one row per draw."""
         return point_table(self.data)
 
     def plot(self) -> "Figure":
-        """Return histograms of the quantities."""
+        """Plot histograms of the quantities."""
         return histogram_figure(self.data)
 
 
@@ -90,47 +90,47 @@ def statistics(
     """Estimate the yield and the pose errors of a robot from random errors.
 
     Args:
-        posture: posture of the robot; drawn errors replace the robot file's errors.
-        errors: file with error distributions (TOML, see docs/statistics.md), in
-            addition to the tolerances and fits in the robot file; None to use only the
-            latter. Error sources are accepted too; those returned by
-            :func:`forcefit.assembly.statistics.callout_sources.sources_of` may include
-            constant errors, equal in every draw.
+        posture: posture of the robot; random errors replace those in the robot file.
+        errors: path of a TOML file with error distributions (see docs/statistics.md),
+            or error sources, such as those from
+            :func:`forcefit.assembly.statistics.callout_sources.sources_of`. They are
+            added to the tolerances and fits in the robot file. None to use only the
+            robot file.
         draws: number of draws, at least 2.
-        seed: seed of the draws.
-        clearance: positions within the clearances: ``"worst"``, ``"uniform"``,
-            ``"contact"`` or ``"least"``, see
+        seed: seed of the random numbers.
+        clearance: model of the positions within the clearances: ``"worst"``,
+            ``"uniform"``, ``"contact"`` or ``"least"``, see
             :data:`forcefit.assembly.statistics.clearance_positions.CLEARANCE_MODELS`.
-        contact_length: [m] ratio of random moments to random forces with ``"contact"``;
-            None for the length of the longest body.
-        load: load on the platform at its origin in base axes, (6,) [N m, N] or by
-            component, ``{"fz": -50}``.
+        contact_length: [m] ratio of random moments to random forces in the model
+            ``"contact"``; None for the length of the longest body.
+        load: load on the platform at its origin in base axes, (6,) [N m, N] or a
+            dictionary such as ``{"fz": -50}``.
         gravity: (3,) [m/s^2] gravity in base axes; None for no gravity.
-        limits: limits on results in SI units, such as ``{"translation": 2e-4}``. A draw
-            meets the limits if it exceeds none of them.
-        yield_strength: [Pa] yield strength of the links, used as limit on their stress.
-        capability: whether Cp, Cpk and parts per million of each limit are computed.
-        importance: number of base draws for the Sobol indices of the errors; None to
-            omit the indices.
-        by: groups of errors in the Sobol indices: ``"source"``, ``"frame"`` or
+        limits: limits on results in SI units, such as ``{"translation": 2e-4}``.
+        yield_strength: [Pa] yield strength of the links, which limits their stress.
+        capability: whether Cp, Cpk and the number of parts per million above each limit
+            are computed.
+        importance: number of base draws for Sobol indices; None to omit the indices.
+        by: grouping of errors for the Sobol indices: ``"source"``, ``"frame"`` or
             ``"kind"``.
         margins: whether the assembly margins, problem (21), are computed.
-        state: state for which the platform stiffness of each draw is computed,
-            ``"contact"`` or ``"exact"``; None to omit it.
+        state: state in which the platform stiffness of each draw is computed,
+            ``"contact"`` or ``"exact"``; None to omit the stiffness.
         confidence: confidence level of all intervals.
         workers: number of threads.
-        output: NetCDF file to write.  Finished draws are stored in
-            ``<output>.journal``.  After an interruption, the same call resumes from it.
-        progress: called with the number of finished draws and the number of all draws.
+        output: NetCDF file to write. An interrupted computation resumes from the draws
+            in ``<output>.journal``.
+        progress: function called with the number of finished draws and the number of
+            all draws.
 
     Returns:
         The draws and their summary.
 
     Raises:
-        BadInput: an argument is out of its range; a file violates a rule; the robot has
-            neither tolerances nor ``errors``; a limited quantity is not computed; the
-            load acts along a motion without stiffness; or the journal belongs to
-            another run.
+        BadInput: an argument is out of range; a file is invalid; there are neither
+            tolerances in the robot file nor ``errors``; a limited quantity is not
+            computed; the load acts along a motion without stiffness; or the journal
+            belongs to other draws.
         ModuleNotFoundError: xarray is missing.
 
     Example:
@@ -147,7 +147,8 @@ def statistics(
         raise BadInput("capability: found no limits, expected one or more")
     if contact_length is not None and clearance != "contact":
         raise BadInput(
-            f'contact_length: found with clearance "{clearance}", expected "contact"'
+            f'contact_length: found together with clearance "{clearance}"; '
+            'expected clearance "contact"'
         )
     g = None if gravity is None else tuple(np.array(gravity, dtype=float).tolist())
     experiment = Experiment(
@@ -169,7 +170,7 @@ def statistics(
 
 
 def _check_words(**words: str | None) -> None:
-    """Reject an argument whose value is not one of its valid words."""
+    """Raise an error if an argument is not one of its valid words."""
     for name, word in words.items():
         if word not in _WORDS[name]:
             valid = [one for one in _WORDS[name] if one is not None]
@@ -179,7 +180,7 @@ def _check_words(**words: str | None) -> None:
 def _check_numbers(
     draws: int, workers: int, confidence: float, yield_strength: float | None
 ) -> None:
-    """Reject a number that is out of range."""
+    """Raise an error if a number is out of range."""
     for name, count, least in (("draws", draws, 2), ("workers", workers, 1)):
         if count < least:
             raise BadInput(f"{name}: found {count}, expected at least {least}")

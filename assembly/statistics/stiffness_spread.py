@@ -1,9 +1,8 @@
-"""Distribution of the platform stiffness over draws of errors and clearances.
+"""Distribution of the platform stiffness for random geometric errors.
 
-Errors do not change the nominal platform stiffness K_C, but they determine which
-clearances are in contact, so the tangent stiffness of problem (22) differs between
-draws. The tangent of the exact equilibrium also includes internal forces and the
-rotation of parts.
+Errors determine which joints are in contact within their clearances. Therefore, the
+tangent stiffness of problem (22) differs between draws. The tangent stiffness of the
+exact equilibrium also depends on internal forces and on rotations of the bodies.
 """
 
 from collections.abc import Mapping
@@ -25,15 +24,15 @@ from forcefit.assembly.sweeps.point_stiffness import STATES
 from forcefit.results.display import numbers
 from forcefit.stiffness.screws import WRENCH
 
-_NAMED = 5  # largest number of free motions that are reported, most frequent first
-_ALIKE = 2  # number of decimals used to compare the motions of two draws
+_NAMED = 5  # largest number of reported free motions
+_ALIKE = 2  # number of decimals for the comparison of motions
 
 
 def draw_stiffnesses(
     posture: Posture, errors: NDArray, state: str,
     load: ArrayLike | None = None, gravity: ArrayLike | None = None,
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
-    """Compute the stiffness of each draw along every axis, with the other axes free.
+    """Compute the platform stiffness along each axis, with the other axes free.
 
     Args:
         posture: the robot's configuration.
@@ -43,9 +42,9 @@ def draw_stiffnesses(
         gravity: (3,) [m/s^2] gravity in base axes.
 
     Returns:
-        (k, 6) [N m/rad, N/m] for ``[mx my mz fx fy fz]``: 0 for a free motion, for
-            example within a clearance, and NaN without equilibrium. Second, (k, 6, 6)
-            [rad, m] unit screws of the free motions in rows; unused rows are NaN.
+        Stiffnesses along ``[mx my mz fx fy fz]``, (k, 6) [N m/rad, N/m]: 0 along a free
+        motion and NaN without an equilibrium. Unit screws of the free motions, (k, 6,
+        6) [rad, m], in rows; unused rows are NaN.
     """
     stiffnesses = np.full((len(errors), 6), np.nan)
     motions = np.full((len(errors), 6, 6), np.nan)
@@ -73,13 +72,13 @@ def stiffness_report(
     Args:
         stiffnesses: (k, 6) result of :func:`draw_stiffnesses`.
         motions: (k, 6, 6) free motions from the same function.
-        state: state of the tangents, ``"contact"`` or ``"exact"``.
+        state: state in which the stiffness was computed, ``"contact"`` or ``"exact"``.
         level: confidence level.
 
     Returns:
-        By axis: the number of draws with a result; the fractions of draws with a free
-            motion and, if any, with a rigid platform; and mean and quantiles of the
-            remaining draws, with intervals. Also the most frequent free motions.
+        For each axis: number of draws with a result, fractions of draws with zero and
+        with infinite stiffness, and mean and quantiles of the other draws. Also the
+        most frequent free motions.
     """
     axes: dict[str, Any] = {}
     for name, values in zip(WRENCH, stiffnesses.T, strict=True):
@@ -112,7 +111,7 @@ def stiffness_report(
 
 
 def stiffness_spread_text(report: Mapping[str, Any]) -> str:
-    """Format the distribution as text, with one line for each axis."""
+    """Format the distribution as text with one line per axis."""
     lines = [f"stiffness of the platform, {report['means']}:"]
     for name, one in report["axes"].items():
         shares = {

@@ -1,8 +1,7 @@
-"""Summary of an experiment's draws: yields, quantiles and most probable values.
+"""Summary of random draws: yields, quantiles and most probable values.
 
-Yields count all draws.  Energies, wrenches and pose errors exist only for draws that
-can be assembled, whose number is reported.  Margins exist for all draws and are also
-summarised over all draws.  Every pose error is reported with its clearance model.
+Yields refer to all draws. Energies, wrenches and pose errors are defined only for draws
+that can be assembled. Margins are defined for all draws.
 """
 
 import json
@@ -39,7 +38,7 @@ if TYPE_CHECKING:
     import xarray
 
 QUANTILES = (0.05, 0.5, 0.95, 0.99)
-_ROUNDING = 1e-18  # values below this fraction of the largest value count as zero
+_ROUNDING = 1e-18  # fraction of the largest value below which a value is zero
 _MARGINS = {"margin": "rigid", "margin_free": "rigid_compliant_free"}
 WORDS = {
     "forced": "assembles, by force if necessary",
@@ -59,22 +58,20 @@ def summarise(
 
     Args:
         data: the draws.
-        limits: limits by quantity; a draw meets the limits if it exceeds none.
+        limits: limits by quantity.
         strength: [Pa] yield strength of the links.
         level: confidence level of all intervals.
-        capable: whether Cpk and parts per million are computed for every limit.
+        capable: whether Cp, Cpk and parts per million are computed for every limit.
 
     Returns:
-        ``draws``, and how many of them are ``assembled``; ``clearance``, its meaning
-        and its ``contact_length`` [m].  Probabilities among all draws: ``assembles``
-        (with any energy, or by clearances with compliant joints rigid or free),
-        ``exceeds`` and ``within_limits``.  ``perfect_parts``, and the limits that
-        perfect parts exceed.  Mean, quantiles and most probable value of every quantity
-        over the assembled draws, and for margins also over all draws.  Mean, covariance
-        and most probable value of the platform screw.
+        Number of ``draws`` and number of ``assembled`` draws. Clearance model and
+        ``contact_length`` [m]. Probabilities that a draw ``assembles``, ``exceeds``
+        each limit, and is ``within_limits``. Results for ``perfect_parts``. Mean,
+        quantiles and most probable value of every quantity over the assembled draws.
+        Mean, covariance and most probable value of the platform screw.
 
     Raises:
-        BadInput: the quantity of a limit was not computed.
+        BadInput: a limited quantity was not computed.
     """
     limits = dict(limits or {})
     if strength is not None:
@@ -116,7 +113,7 @@ def summarise(
         }  # fmt: skip
     if strength is not None:
         largest = data["stress"].values[solved].max(axis=0, initial=0.0)
-        with np.errstate(divide="ignore"):  # infinite for zero stress
+        with np.errstate(divide="ignore"):  # the safety is inf for zero stress
             report["safety"] = strength / largest
         errors = data["stress"].attrs.get("estimated_relative_error")
         if errors is not None:
@@ -141,7 +138,7 @@ def summarise(
 def _yields(
     data: "xarray.Dataset", solved: NDArray, limits: Mapping[str, float], level: float
 ) -> dict[str, Any]:
-    """Estimate the probability that each limit, and any limit, is exceeded."""
+    """Estimate the probability that each limit is exceeded, and the yield."""
     count = len(solved)
     met, failed, exceeds = solved.copy(), ~solved, {}
     for key, limit in limits.items():
@@ -152,8 +149,7 @@ def _yields(
             )
         values, lower = _worst(data, key), f"{key}_lower"
         over = ~(values <= limit)
-        # a largest pose error has two bounds in each draw, all other quantities one
-        # value
+        # Largest pose errors have a lower and an upper bound.
         least = data[lower].values if lower in data else values
         surely = ~solved | (least > limit)
         met &= ~over
@@ -174,7 +170,7 @@ def _yields(
 
 
 def _worst(data: "xarray.Dataset", key: str) -> NDArray:
-    """Return a quantity's (k,) values; for links, the maximum over all links."""
+    """Return the values of a quantity, (k,), or the maximum over all links."""
     values = np.asarray(data[key].values, dtype=float)
     return values.max(axis=1) if values.ndim == 2 else values
 
@@ -182,7 +178,7 @@ def _worst(data: "xarray.Dataset", key: str) -> NDArray:
 def _described(
     data: "xarray.Dataset", key: str, solved: NDArray, level: float
 ) -> dict[str, Any]:
-    """Compute mean, quantiles and mode; the mode is 0 if most values are zero."""
+    """Compute mean, quantiles and most probable value of a quantity."""
     every = _worst(data, key)
     values = every[solved]
     finite = values[np.isfinite(values)]
@@ -200,7 +196,7 @@ def _described(
         }
     if len(finite) < 2:
         return description
-    # draws inside an assembly zone store no energy, so their values are round-off
+    # Inside an assembly zone, the energy is zero except for round-off errors.
     zero = finite <= _ROUNDING * finite.max()
     often = dict.fromkeys(("value", "lower", "upper"), 0.0)
     if zero.sum() <= len(finite) / 2:
@@ -217,19 +213,19 @@ def summary_text(summary: Mapping[str, Any]) -> str:
     """Format the results of :func:`summarise` as text."""
     draws, assembled = summary["draws"], summary["assembled"]
     lines = [
-        f"{draws} draws; in brackets {summary['confidence']:.0%} intervals",
+        f"{draws} draws; in brackets: {summary['confidence']:.0%} confidence intervals",
         f"pose errors: clearance {summary['clearance']}: {summary['clearance_means']}",
     ]
     if summary["clearance"] == "contact" and not summary.get("load"):
         lines.append(
-            "the contact length determines which clearances close; specify a known "
-            "service load with --load to close them as in service"
+            "the positions within the clearances depend on the contact length; if the "
+            "service load is known, specify it with --load"
         )
     if summary.get("clearance_not_mixed"):
         lines.append(
-            f"warning: in {summary['clearance_not_mixed']} draws the random "
-            "walk of the uniform clearances has not mixed: the spread of these "
-            "pose errors is underestimated"
+            f"warning: in {summary['clearance_not_mixed']} draws, the random walk of "
+            "the uniform model did not mix, so the variation of these pose errors is "
+            "underestimated"
         )
     lines += [f"{WORDS[k]}: {_share(v)}" for k, v in summary["assembles"].items()]
     for key, results in summary["exceeds"].items():
@@ -270,14 +266,14 @@ def summary_text(summary: Mapping[str, Any]) -> str:
 
 
 def _titled(name: str, results: Mapping[str, Any]) -> str:
-    """Return a quantity's name, with the clearance model if the value depends on it."""
+    """Return the name of a quantity with the clearance model, if any."""
     return (
         f"{name} [clearance {results['clearance']}]" if "clearance" in results else name
     )
 
 
 def _share(interval: Mapping[str, float]) -> str:
-    """Format a probability, its interval and the number of undecided draws as text."""
+    """Format a probability and its confidence interval as text."""
     low, high = interval["lower"], interval["upper"]
     text = f"{interval['probability']:.5g} ({low:.5g} to {high:.5g})"
     undecided = interval.get("undecided", 0)
@@ -285,7 +281,7 @@ def _share(interval: Mapping[str, float]) -> str:
 
 
 def _named(value: float, unit: str) -> str:
-    """Format a number as text with its unit."""
+    """Format a number and its unit as text."""
     return f"{value:.4g}" if unit == "1" else f"{value:.4g} {unit}"
 
 

@@ -1,4 +1,4 @@
-"""Report tiles that name the most influential error or clearance."""
+"""Report tiles on the errors and clearances with the largest effect."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -8,17 +8,17 @@ from forcefit.assembly.statistics.ranking import leaders, named_together, ranked
 from forcefit.page.page import Tile
 from forcefit.page.tables import Value
 
-_NAMED = 3  # largest number of contributors named in a tile
+_NAMED = 3  # largest number of names in a tile
 
 
 def tightening_tiles(summary: Mapping[str, Any]) -> list[Tile]:
-    """Return tiles with results without errors, main contributor and advice to tighten.
+    """Return tiles on clearances, main errors and tolerances to tighten.
 
     Args:
         summary: result of :func:`forcefit.assembly.statistics.summary.summarise`.
 
     Returns:
-        The tiles, including tiles on errors if their importance is known.
+        The tiles. Without the importance of errors, there are no tiles on errors.
     """
     tiles = _clearance_tiles(summary)
     broken, key = summary["perfect_parts_break"], _deciding(summary)
@@ -31,9 +31,11 @@ def tightening_tiles(summary: Mapping[str, Any]) -> list[Tile]:
         )
         largest, (value, *_) = shares[0]
         each = "" if names[0] == largest else " each"
-        note = f"share of the {key}'s variance that involves it."
+        note = f"fraction of the {key}'s variance, including interactions."
         if len(names) > 1:
-            note = f"{note[:-1]}; these draws do not distinguish: {_listed(names)}."
+            note = (
+                f"{note[:-1]}; the order of these errors is unknown: {_listed(names)}."
+            )
         answer = f"{names[0]}: {100 * value:.0f} %{each}"
         tiles.append(Tile("Governing errors", [answer], [note]))
     if broken:
@@ -42,13 +44,13 @@ def tightening_tiles(summary: Mapping[str, Any]) -> list[Tile]:
         note = f"all {summary['draws']} draws meet all limits."
         tiles.append(Tile("Tolerance to tighten", ["nothing"], [note]))
     elif names:
-        note = "not distinguished by these draws." if len(names) > 1 else ""
+        note = "the order of these errors is unknown." if len(names) > 1 else ""
         tiles.append(Tile("Tolerance to tighten", [_listed(names)], [note]))
     return tiles
 
 
 def _deciding(summary: Mapping[str, Any]) -> str:
-    """Return the quantity whose limit is exceeded most often (default translation)."""
+    """Return the quantity whose limit is exceeded most often."""
     exceeds = sorted(
         summary["exceeds"], key=lambda k: -summary["exceeds"][k]["probability"]
     )
@@ -58,7 +60,7 @@ def _deciding(summary: Mapping[str, Any]) -> str:
 
 
 def _clearance_tiles(summary: Mapping[str, Any]) -> list[Tile]:
-    """Return tiles on the pose error that clearances cause without errors."""
+    """Return a tile on the pose error due to clearances alone."""
     parts = summary["perfect_parts"]
     answer: list[str | Value] = []
     for key in ("rotation", "translation"):
@@ -68,19 +70,27 @@ def _clearance_tiles(summary: Mapping[str, Any]) -> list[Tile]:
     if not answer:
         return []
     largest = next(iter(parts.get("translation", {}).get("clearances", {})), "")
-    note = f"of perfect parts; most of the translation: {largest}." if largest else ""
+    note = f"without geometric errors; main contribution: {largest}." if largest else ""
     loads = " and loads" if summary.get("load") else ""
-    return [Tile(f"Clearances{loads} alone", answer[1:], [note or "of perfect parts."])]
+    return [
+        Tile(
+            f"Clearances{loads} alone",
+            answer[1:],
+            [note or "without geometric errors."],
+        )
+    ]
 
 
 def _broken_tile(broken: Mapping[str, Any]) -> Tile:
-    """Return the tile with the advice to tighten clearances instead of errors."""
+    """Return the tile that recommends tightening clearances."""
     key, one = next(iter(broken.items()))
     largest = next(iter(one.get("clearances", {})), "")
     note: list[str | Value] = [
-        f"Perfect parts reach a {key} of ", Value(one["reached"], one["unit"], 4),
-        ", limit ", Value(one["limit"], one["unit"], 4),
-        ": no tolerance of the errors meets it.",
+        f"Without geometric errors, the {key} is ",
+        Value(one["reached"], one["unit"], 4),
+        ", limit ",
+        Value(one["limit"], one["unit"], 4),
+        ", so no tolerances of errors satisfy the limit.",
     ]  # fmt: skip
     if largest:
         note.append(f" First: {largest}.")
@@ -89,6 +99,6 @@ def _broken_tile(broken: Mapping[str, Any]) -> Tile:
 
 
 def _listed(names: list[str]) -> str:
-    """List the first names, followed by the number of remaining names."""
+    """Return the first names and the number of the others as text."""
     more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
     return ", ".join(names[:_NAMED]) + more

@@ -1,4 +1,4 @@
-"""Reader of tolerance files: classes of errors, their costs, and limits on results.
+"""Reader for tolerance files: error classes, costs and limits.
 
 The format is described in ``docs/tolerances.md``.
 """
@@ -24,23 +24,23 @@ from forcefit.assembly.steps.bolted import refuse_bolted
 from forcefit.inputs.table import BadInput, Table, nearest, quoted, read_toml
 from forcefit.stiffness.screws import SCREW
 
-# [rad, m] largest accepted tolerances, for which small screws are still valid
+# [rad, m] largest accepted tolerances, for which errors are small screws
 _LOOSEST = (0.1, 0.01)
 
 
 def read_plan(path: Path | str, robot: Robot) -> Plan:
-    """Read the plan in a tolerance file.
+    """Read a tolerance file.
 
     Args:
         path: path of the TOML file.
-        robot: robot with the frames that the file names.
+        robot: robot whose errors have the tolerances.
 
     Returns:
         The plan.
 
     Raises:
-        BadInput: the file violates a rule, or the worst case of callouts is requested
-            for a robot with a joint that is bolted at a pose.
+        BadInput: the file is invalid, or the worst case of callouts is requested for a
+            robot with a bolted joint.
     """
     root = read_toml(path)
     cost = _choice(root, "cost", COSTS)
@@ -88,7 +88,7 @@ def read_plan(path: Path | str, robot: Robot) -> Plan:
 def _independent(
     robot: Robot, groups: "_Groups", distribution: str, deviations: float
 ) -> ErrorSources:
-    """Return the independent errors, scaled to tolerances of 1."""
+    """Return the independent errors for tolerances of 1 rad or 1 m."""
     frame, component = np.array(list(groups.of), dtype=int).reshape(-1, 2).T
     count = len(groups.of)
     return ErrorSources(
@@ -107,7 +107,7 @@ def _independent(
 def _with_callouts(
     robot: Robot, groups: "_Groups", independent: ErrorSources | None
 ) -> tuple[CalloutSources, list[int]]:
-    """Return the errors with callouts scaled to a width of 1 m, and their classes."""
+    """Return all errors for zone widths of 1 m, and the classes of the callouts."""
     placed = place_callouts(home_posture(robot))
     unit = [
         replace(placed[k], errors=placed[k].errors / placed[k].callout.first_width)
@@ -122,10 +122,10 @@ def _with_callouts(
 
 
 class _Groups(NamedTuple):
-    """Groups of errors with a common tolerance, from the tables ``[[tolerance]]``."""
+    """Classes of errors with the same tolerance, from ``[[tolerance]]`` tables."""
 
-    of: dict[tuple[int, int], int]  # number of the class, by frame and component
-    callouts: dict[int, int]  # number of the class, by callout
+    of: dict[tuple[int, int], int]  # index of the class, by frame and component
+    callouts: dict[int, int]  # index of the class, by callout
     names: list[str]
     costs: list[float]
     least: list[float]
@@ -133,7 +133,7 @@ class _Groups(NamedTuple):
 
 
 def _groups(root: Table, tables: Sequence[Table], robot: Robot) -> _Groups:
-    """Return the groups of errors that the tables define."""
+    """Return the classes of errors from the ``[[tolerance]]`` tables."""
     rows, callouts, names, costs, least, most = groups = _Groups({}, {}, [], [], [], [])
     for number, table in enumerate(tables):
         if table.has("callouts"):
@@ -165,13 +165,13 @@ def _groups(root: Table, tables: Sequence[Table], robot: Robot) -> _Groups:
 
 
 def _callouts(table: Table, robot: Robot, callouts: dict[int, int], number: int) -> str:
-    """Add the callouts of a table to its class; return the default class name."""
+    """Add the callouts of a class, and return its default name."""
     value = table.content["callouts"]
     if not isinstance(value, list) or not all(isinstance(v, str) for v in value):
         raise table.bad("callouts", "expected a list of names of [[tolerance]] entries")
     names = [callout.name for callout in robot.callouts]
     for name in value:
-        # a name without a leg's name selects the callout in every leg
+        # A name without a leg name selects the callout in every leg.
         found = [k for k, own in enumerate(names) if name in (own, kind_of(own))]
         if not found:
             raise table.bad("callouts", f"found {quoted(name)}{nearest(name, names)}")
@@ -179,7 +179,9 @@ def _callouts(table: Table, robot: Robot, callouts: dict[int, int], number: int)
             one = robot.callouts[k]
             if one.hole or any(datum.hole for datum in one.datums):
                 fault = f"found {quoted(names[k])}, which is at maximum material"
-                expected = "expected callouts without (M): their zones have one width"
+                expected = (
+                    "expected callouts without (M), whose zones have a constant width"
+                )
                 raise table.bad("callouts", f"{fault}, {expected}")
             if callouts.setdefault(k, number) != number:
                 raise table.bad("callouts", f"found {quoted(names[k])} twice")
@@ -190,7 +192,7 @@ def _callouts(table: Table, robot: Robot, callouts: dict[int, int], number: int)
 
 
 def _choice(table: Table, key: str, valid: tuple[str, ...]) -> str:
-    """Return the value of a key, one of the valid words; by default the first."""
+    """Return the value of a key, by default the first valid word."""
     word = table.text(key, valid[0])
     if word not in valid:
         raise table.bad(key, f"found {quoted(word)}{nearest(word, valid)}")
@@ -198,7 +200,7 @@ def _choice(table: Table, key: str, valid: tuple[str, ...]) -> str:
 
 
 def _limits(table: Table) -> dict[str, float]:
-    """Return the limits of a tolerance file by quantity."""
+    """Return the limits by quantity."""
     valid = limit_names()
     limits = {}
     for key in list(table.content):
@@ -209,7 +211,7 @@ def _limits(table: Table) -> dict[str, float]:
 
 
 def _places(table: Table, robot: Robot) -> tuple[list[tuple[int, int]], int]:
-    """Return a table's frames and components; also 0 for angles, 1 for lengths."""
+    """Return frames and components of a class; and 0 for angles, 1 for lengths."""
     names = table.require("frames", "a list of frame names")
     parts = table.require("components", 'a list such as ["TX"]')
     for key, value in (("frames", names), ("components", parts)):

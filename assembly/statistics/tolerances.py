@@ -1,4 +1,4 @@
-"""Workspace postures, and the assessment of a robot's present errors over them."""
+"""Assembly margins of a robot with given errors over a grid of postures."""
 
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -26,18 +26,18 @@ from forcefit.inputs.table import BadInput
 
 
 def grid_postures(robot: Robot, grid: str) -> tuple[list[Posture], dict[str, int]]:
-    """Return the grid postures that the robot can reach and use.
+    """Return the reachable and regular postures of a grid.
 
     Args:
         robot: the robot.
         grid: grid such as ``"tx=-0.2:0.2:0.1,tz=-0.5"``.
 
     Returns:
-        The postures, and the number of omitted postures by status, which is out of
-        reach or a status of :func:`forcefit.assembly.kinematics.verdict.verdicts`.
+        The postures, and the number of omitted postures by status: out of reach, or a
+        status of :func:`forcefit.assembly.kinematics.verdict.verdicts`.
 
     Raises:
-        BadInput: the grid is invalid, or none of its postures can be reached.
+        BadInput: the grid is invalid, or the robot reaches none of its postures.
     """
     targets = grid_targets(parse_grid(grid))
     rows = targets.at(np.arange(int(np.prod(targets.shape))))
@@ -61,16 +61,16 @@ def grid_postures(robot: Robot, grid: str) -> tuple[list[Posture], dict[str, int
 
 
 def left_out_text(left_out: dict[str, int]) -> str:
-    """Format the number of omitted postures by reason as a line of text."""
+    """Format the number of omitted postures by status as a line of text."""
     counts = ", ".join(f"{status}: {n}" for status, n in left_out.items())
-    text = f"postures left out: {counts}"
+    text = f"omitted postures: {counts}"
     if SINGULAR in left_out:
         text += f" ({SINGULAR_WORDS})"
     return text
 
 
 def identity_of(postures: Sequence[Posture], plan: Plan, fresh: int) -> dict[str, Any]:
-    """Return values that must be equal for two allocations to share results."""
+    """Return values that identify an allocation."""
     arrays = [p.transforms for p in postures]
     arrays += [v for v in vars(plan).values() if isinstance(v, np.ndarray)]
     arrays += plan.sources.identity
@@ -96,20 +96,19 @@ def present_errors(
     compliant: Compliant = "free",
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> dict[str, Any]:
-    """Assess the errors in the robot file: largest margin over postures, and causes.
+    """Compute the assembly margins for the errors in the robot file.
 
     Args:
         postures: postures of a robot with errors.
         compliant: whether compliant joints are ``"free"`` or ``"rigid"`` about their
             axis.
-        progress: called with the number of finished postures and the number of all
-            postures.
+        progress: function called with the number of finished postures and the number of
+            all postures.
 
     Returns:
-        The margins; the largest margin and its posture; the factor on all errors at
-        which the largest margin becomes 1; and, at this posture, the derivatives of
-        margin and energy with respect to each error, in order of decreasing effect on
-        the margin.
+        Margins, largest margin and its posture, and factor on all errors for a largest
+        margin of 1. Derivatives of margin and energy with respect to each error at this
+        posture, in order of decreasing effect on the margin.
     """
     prepared, zones = [], []
     for i, posture in enumerate(postures):
@@ -152,7 +151,7 @@ def present_errors(
 
 
 def present_text(results: dict[str, Any]) -> str:
-    """Format :func:`present_errors` as text, with the five largest derivatives."""
+    """Format the results of :func:`present_errors` as text."""
     where = ", ".join(
         f"{k} = {v:.4g}" for k, v in results["at"].items() if abs(v) > 1e-9
     )
@@ -160,11 +159,12 @@ def present_text(results: dict[str, Any]) -> str:
         f"{results['postures']} postures, {results['assemblable_share']:.1%} "
         f"assemble; largest margin {results['largest_margin']:.4g} "
         f"at {where or 'the origin'}",
-        f"everywhere with all errors times {results['factor_on_errors']:.4g}",
+        "all postures assemble if all errors are multiplied by "
+        f"{results['factor_on_errors']:.4g}",
     ]
     for error in results["slopes"][:5]:
         lines.append(
-            f"  {error['error']} = {error['value']:.3g} makes "
-            f"{error['share_of_margin']:.1%} of that margin"
+            f"  {error['error']} = {error['value']:.3g} contributes "
+            f"{error['share_of_margin']:.1%} to this margin"
         )
     return "\n".join(lines)

@@ -1,4 +1,4 @@
-"""HTML report on tolerances, their requirement, and the effect of clearances alone."""
+"""HTML report on tolerances, their limits, and the effect of clearances."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -12,13 +12,13 @@ from forcefit.page.charts import Axis, bars, grid
 from forcefit.page.page import Page, Provenance, Tile, page, paragraph, section
 from forcefit.page.tables import Cell, Column, Value, table
 
-_LISTED = 20  # largest number of errors in a table of shares
-# difference below which two shares count as equal, relative to the largest share
+_LISTED = 20  # largest number of rows in the table of errors
+# relative difference below which two shares are equal
 _ALIKE = 0.01
 _ASSUMED = (
     "Limits are checked only at the postures of the grid, not between them.",
     "Errors are independent and stay within their tolerances.",
-    "Small screws: the closures are linear in the errors.",
+    "The closure equations are linearised (small screws).",
 )
 _COST_LAWS = {
     "reciprocal": "sum of cost / tolerance [rad or m]",
@@ -26,7 +26,7 @@ _COST_LAWS = {
 }
 _GOVERNED = {
     "reciprocal": "of the price",
-    "logarithm": "of the saving by looser tolerances",
+    "logarithm": "of the saving by larger tolerances",
 }
 
 
@@ -36,14 +36,14 @@ def tolerances_page(
     """Format the results of ``assembly tolerances`` as an HTML page.
 
     Args:
-        results: results that contain ``present``, ``allocation`` or both, the number of
+        results: dictionary with ``present``, ``allocation`` or both, the number of
             ``postures`` and their ``grid``.
-        provenance: the command and its input files.
-        pictures: HTML from :mod:`forcefit.assembly.statistics.scenes`, with the present
-            errors.
+        provenance: command line and input files.
+        pictures: HTML of 3D scenes and maps from
+            :mod:`forcefit.assembly.statistics.scenes`.
 
     Returns:
-        Self-contained HTML.
+        HTML that includes all data and scripts.
     """
     present, allocation = (results.get(key) for key in ("present", "allocation"))
     tiles, body, sentences = [], [], []
@@ -51,12 +51,16 @@ def tolerances_page(
         share = 100 * present["assemblable_share"]
         sentences.append(
             f"{share:.1f} % of {present['postures']} postures assemble by "
-            "clearances alone; all of them with the errors times "
+            "clearances alone; all postures assemble if the errors are multiplied by "
             f"{present['factor_on_errors']:.4g}"
         )
         tiles += _present_tiles(present)
         body.append(_present_section(present))
-        body += [section("Where it is tight", *pictures)] if any(pictures) else []
+        body += (
+            [section("Posture of the largest margin", *pictures)]
+            if any(pictures)
+            else []
+        )
     if allocation is not None:
         sentences.append(_allocation_sentence(allocation))
         tiles += _allocation_tiles(allocation)
@@ -78,7 +82,7 @@ def tolerances_page(
 
 
 def _sentence(parts: Sequence[str]) -> str:
-    """Join parts into one sentence."""
+    """Join clauses to one sentence."""
     text = "; ".join(parts)
     return f"{text[:1].upper()}{text[1:]}."
 
@@ -86,9 +90,9 @@ def _sentence(parts: Sequence[str]) -> str:
 def _good(
     present: Mapping[str, Any] | None, allocation: Mapping[str, Any] | None
 ) -> bool | None:
-    """Return whether all postures assemble and new draws demonstrate the yield.
+    """Return whether all postures assemble and the yield is demonstrated.
 
-    Return None if some postures assemble only by force, or if new draws do not decide.
+    Return None if some postures assemble only by force, or if the yield is uncertain.
     """
     verdict = "shown"
     if allocation is not None:
@@ -100,7 +104,7 @@ def _good(
 
 
 def _present_tiles(present: Mapping[str, Any]) -> list[Tile]:
-    """Return tiles for the largest margin and for the error that contributes most."""
+    """Return tiles on the largest margin and on the main error."""
     at = ", ".join(f"{k} = {v:.4g}" for k, v in present["at"].items() if abs(v) > 1e-9)
     note = f"at {at or 'the origin'} [m, rad]; it assembles up to 1."
     tiles = [Tile("Largest margin", [Value(present["largest_margin"])], [note])]
@@ -116,7 +120,7 @@ def _present_tiles(present: Mapping[str, Any]) -> list[Tile]:
 
 
 def _present_section(present: Mapping[str, Any]) -> str:
-    """Return the section on each present error's share of the largest margin."""
+    """Return the section on the contribution of each error to the largest margin."""
     rows: list[list[Cell]] = [
         [one["error"], Value(one["value"], _error_unit(one["error"])),
          one["share_of_margin"]]
@@ -141,11 +145,11 @@ def _error_unit(name: str) -> str:
 
 
 def _allocation_sentence(allocation: Mapping[str, Any]) -> str:
-    """Format a sentence on whether the tolerances meet the limits."""
+    """Return a clause on whether the tolerances satisfy the limits."""
     text = f"tolerances for a yield of {allocation['yield']:g}"
     proven = allocation["proven_scale"]
     if np.isfinite(proven):
-        text += f", proven when scaled by {proven:.4f}"
+        text += f", proven for all tolerances multiplied by {proven:.4f}"
     check = allocation["verification"]
     if check:
         text += f", by {check['draws']} new draws at all postures: {check['verdict']}"
@@ -153,7 +157,7 @@ def _allocation_sentence(allocation: Mapping[str, Any]) -> str:
 
 
 def _allocation_tiles(allocation: Mapping[str, Any]) -> list[Tile]:
-    """Return tiles: yield, pose error due to clearances, most expensive tolerances."""
+    """Return tiles on yield, pose error due to clearances and largest costs."""
     tiles = []
     check = allocation["verification"]
     if check:
@@ -171,10 +175,10 @@ def _allocation_tiles(allocation: Mapping[str, Any]) -> list[Tile]:
 
 
 def _tighten_tile(allocation: Mapping[str, Any]) -> Tile:
-    """Return a tile that names the tolerances with the largest share of the cost."""
+    """Return a tile on the tolerances with the largest share of the cost."""
     tight = [one for one in allocation["tolerances"] if not one["at_loosest"]]
     if not tight:
-        why = "every tolerance may be the loosest allowed."
+        why = "every tolerance can have its largest allowed value."
         return Tile("Tolerance to tighten", ["nothing"], [why])
     most = max(one["share"] for one in tight)
     first = [one for one in tight if one["share"] >= (1.0 - _ALIKE) * most]
@@ -190,7 +194,7 @@ def _tighten_tile(allocation: Mapping[str, Any]) -> Tile:
 
 
 def _asked_section(results: Mapping[str, Any], allocation: Mapping[str, Any]) -> str:
-    """Format the requirement as a table: limits, yield, distribution, postures."""
+    """Return the section on limits, yield, distribution and postures."""
     rows: list[list[Cell]] = [
         [f"{NAMES[key]}, at most", Value(limit, UNITS[key].removesuffix("1"), 6)]
         for key, limit in allocation["limits"].items()
@@ -208,7 +212,7 @@ def _asked_section(results: Mapping[str, Any], allocation: Mapping[str, Any]) ->
         means = clearance_means(model, allocation["contact_length"])
         clearances = f"clearance {model}: {means}"
     check = allocation["verification"]
-    fresh = f"; {check['draws']} fresh ones verify" if check else ""
+    fresh = f"; {check['draws']} new draws for verification" if check else ""
     rows += [
         ["yield", "1: every robot within tolerance" if asked == 1.0 else f"{asked:g}"],
         ["clearances", clearances],
@@ -236,27 +240,27 @@ def _allocation_section(allocation: Mapping[str, Any]) -> str:
         for key, one in allocation["worst"].items()
     ]  # fmt: skip
     charts = [
-        # bars start at zero, so their axis cannot be logarithmic
+        # Angles and lengths have separate charts.
         bars(some, Axis("tolerance, plus or minus", unit), "", np.nan)
         for unit in ("rad", "m")
         if (some := {one["name"]: one["tolerance"] for one in classes
                      if one["unit"] == unit})
     ]  # fmt: skip
     share = Column(f"share {_GOVERNED[allocation['cost']]}")
-    head: list[str | Column] = ["class", "tolerance, plus or minus", "loosest allowed"]
+    head: list[str | Column] = ["class", "tolerance, plus or minus", "largest allowed"]
     pieces = [
         grid(*charts),
         table([*head, Column("cost"), share], rows, "tolerances"),
         _price_paragraph(allocation),
     ]
     if worst:
-        columns = ["quantity", "limit", "worst found", "proven at most"]
+        columns = ["quantity", "limit", "largest value found", "upper bound"]
         pieces.append(table(columns, worst, "limits"))
     return section("Allocated tolerances", *pieces)
 
 
 def _price_paragraph(allocation: Mapping[str, Any]) -> str:
-    """Format a paragraph on the cost and, if one is proved, its lower bound."""
+    """Return a paragraph on the cost and its lower bound."""
     price, bound = (allocation[key] for key in ("price", "price_bound"))
     if np.isfinite(bound):
         return paragraph(
@@ -271,7 +275,7 @@ def _price_paragraph(allocation: Mapping[str, Any]) -> str:
 
 
 def _clearance_sections(allocation: Mapping[str, Any]) -> list[str]:
-    """Return the sections on pose errors caused by clearances alone."""
+    """Return the sections on pose errors due to clearances alone."""
     taken = {k: v for k, v in allocation["perfect_parts"].items() if v["reached"] > 0.0}
     if not taken:
         return []
@@ -286,14 +290,13 @@ def _clearance_sections(allocation: Mapping[str, Any]) -> list[str]:
         "quantity",
         "limit",
         "used by clearances",
-        "remaining for errors",
+        "available for errors",
         "at [m, rad]",
     ]
     looser, price = Value(one["looser_without"], "", 3), Value(one["price_without"])
     text = paragraph(
-        "Without clearances all tolerances could be about ", looser, " times looser, "
-        "at a price of about ", price, ": pose errors by clearances and by errors add "
-        "up, nearly.",
+        "Without clearances, all tolerances could be larger by a factor of about ",
+        looser, ", at a cost of about ", price, ".",
     )  # fmt: skip
     return [
         section(

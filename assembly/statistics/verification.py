@@ -1,4 +1,4 @@
-"""Verification of tolerances by proven upper bounds and new random draws."""
+"""Verification of tolerances by upper bounds and by new random draws."""
 
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -17,16 +17,16 @@ from forcefit.assembly.statistics.worst_case import (
     random_corners,
 )
 
-_BATCH = 256  # number of draws between two progress reports
-_ROUNDING = 1e-9  # relative excess over a limit that counts as round-off error
-# largest number of verification tests, and their joint confidence level
+_BATCH = 256  # number of draws between two calls of ``progress``
+_ROUNDING = 1e-9  # relative tolerance for the comparison with a limit
+# largest number of verifications, and their joint confidence level
 LOOKS, CONFIDENCE = 4, 0.95
 
 
 def prove_worst(
     requirement: Requirement, t: NDArray, progress: Callable[[str, int, int], None]
 ) -> tuple[dict[str, tuple[float, float]], float]:
-    """Bound the worst case over all errors within tolerance and all postures.
+    """Bound the limited quantities over all errors within tolerance and all postures.
 
     Args:
         requirement: requirement at all postures.
@@ -34,10 +34,9 @@ def prove_worst(
         progress: called with the name of a step, its progress and its total.
 
     Returns:
-        For each limit: the value at the worst corner found, and the proven upper bound,
-        NaN if the limit is not convex.  Also the factor, at most 1, by which the
-        tolerances must be scaled so that the upper bounds meet all limits; NaN if a
-        limit is not convex.
+        For each limit, the value at the worst corner found and the proven upper bound
+        (NaN if the limit is not convex). The factor <= 1 on all tolerances at which the
+        upper bounds satisfy all limits (NaN if a limit is not convex).
     """
     plan = requirement.plan
     spread, worst, scale = plan.spread(t), {}, np.inf
@@ -59,14 +58,15 @@ def prove_worst(
         if key not in requirement.convex:
             scale = np.nan
             continue
-        # the margin is proportional to the tolerances, the energy to their square
+        # If the tolerances decrease by a factor, the margin decreases by this factor
+        # and the bound on the energy at least by its square.
         power = 0.5 if key == "energy" else 1.0
         scale = np.minimum(scale, (plan.limits[key] / max(upper, 1e-300)) ** power)
     return worst, float(np.minimum(1.0, scale))
 
 
 def _proof(bound: Callable, *given: Any) -> tuple[float]:
-    """Return a proven upper bound on a limited quantity at one posture."""
+    """Return an upper bound on a limited quantity at one posture."""
     return (bound(*given),)
 
 
@@ -76,19 +76,19 @@ def verify(
     fresh: int,
     progress: Callable[[str, int, int], None],
 ) -> tuple[NDArray, dict[str, Any]]:
-    """Verify tolerances with new draws, and tighten tolerances that fail.
+    """Verify tolerances with new random draws, and tighten them if they fail.
 
-    Each verification uses independent draws, and the error probability is divided
-    equally among all verifications (Bonferroni).
+    Each verification uses independent draws. The error probability is divided equally
+    among all verifications (Bonferroni correction).
 
     Args:
         requirement: requirement at all postures.
         t: (G,) [rad or m] tolerances.
-        fresh: number of draws per verification, each used only once.
+        fresh: number of draws per verification.
         progress: called with the name of a step, its progress and its total.
 
     Returns:
-        (G,) [rad or m] tolerances, and the results of the last verification.
+        Tolerances, (G,) [rad or m], and the results of the last verification.
     """
     asked = requirement.plan.asked_yield
     for look in range(LOOKS):
@@ -112,20 +112,20 @@ def verify_yield(
     progress: Callable[[str, int, int], None], stream: int = FRESH,
     level: float = CONFIDENCE,
 ) -> dict[str, Any]:  # fmt: skip
-    """Estimate the yield from new draws, at each posture and at all postures together.
+    """Estimate the yield of tolerances from new random draws.
 
     Args:
         requirement: requirement at all postures.
         t: (G,) [rad or m] tolerances.
-        fresh: number of draws, used only in this verification.
+        fresh: number of draws.
         progress: called with the name of a step, its progress and its total.
         stream: random number stream.
         level: confidence level of the interval.
 
     Returns:
-        A dictionary with the yield and its interval, the yield at every posture, and
-        the verdict.  A draw whose pose error is undecided counts as failed; the
-        interval covers both outcomes.
+        A dictionary with the yield and its confidence interval, the yield at each
+        posture, and the verdict. If the bounds on a pose error include its limit, the
+        draw is a failure in the yield, and the interval includes both outcomes.
     """
     plan = requirement.plan
     values = plan.draws_of(stream, fresh) * plan.spread(t)
@@ -149,7 +149,7 @@ def verify_yield(
 
 
 def _verdict(interval: Mapping[str, float], asked: float) -> str:
-    """Return whether the confidence interval contradicts the required yield."""
+    """Return how the confidence interval compares with the required yield."""
     if asked == 1.0:
         return "no draw failed" if interval["probability"] == 1.0 else "contradicted"
     if interval["lower"] >= asked:

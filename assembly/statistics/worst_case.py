@@ -1,13 +1,11 @@
-"""Lower and upper bounds on the worst case of errors within tolerances.
+"""Lower and upper bounds on a quantity over all errors within tolerances.
 
-Margin and energy are convex in the errors. Their worst case is therefore a corner of
-the tolerance box, where every error is at one end of its tolerance.  The derivatives at
-a corner point to another corner whose value is at least as large, and repeating this
-step from many corners gives a lower bound. The worst case of a wrench, a stress or a
-pose error need not be a corner, but the search still gives a lower bound. The upper
-bound restricts the clearances to affine functions of the errors: ``u = sum_i V_i s_i``
-for errors ``t_i s_i``, abs(s_i) <= 1.  A single cone programme finds V, which certifies
-the bound.
+Margin and energy are convex in the errors, so their maximum is at a corner of the
+tolerance box. The search moves repeatedly to the corner given by the signs of the
+derivatives. The largest value found is a lower bound on the maximum, also for
+quantities that are not convex. For the upper bound, the clearances are restricted to
+linear functions of the errors, ``u = sum_i V_i s_i`` for errors ``t_i s_i`` with
+abs(s_i) <= 1. A cone programme computes the optimal V.
 
 Sources:
     Ben-Tal, El Ghaoui, Nemirovski (2009), Robust Optimization, ch. 14 (affinely
@@ -25,19 +23,19 @@ from forcefit.assembly.statistics.posture_margins import PostureMargins
 from forcefit.assembly.statistics.responses import respond
 
 CORNERS = 24  # number of random starting corners of the search
-# largest number of steps from corner to corner; three are usually enough
+# largest number of steps of a search; three are usually sufficient
 _ITERATIONS = 12
 
 
 @dataclass(frozen=True, eq=False)
 class Corner:
-    """Worst corner of the tolerance box that a search found.
+    """Worst corner found in the tolerance box.
 
     Attributes:
-        value: the quantity at the corner, a lower bound on the worst case.
+        value: value of the quantity at the corner, a lower bound on its maximum.
         signs: (m,) signs of the errors, -1 or 1.
-        slopes: (m,) [unit of the value per rad or m] derivatives with respect to each
-            error.
+        slopes: (m,) [unit of the value per rad or m] derivatives with respect to the
+            errors.
     """
 
     value: float
@@ -51,14 +49,14 @@ def worst_corner(
     clearance: str = "worst",
     contact_length: float | None = None,
 ) -> Corner:  # fmt: skip
-    """Search for the worst corner from several starting corners.
+    """Search for the worst corner of the tolerance box.
 
     Args:
-        prepared: a posture prepared for margins, or one prepared for energies, which
-            is used for all other quantities.
-        sources: m sources of errors; their distributions are not used.
+        prepared: prepared problem (21) for a margin, or linear response for another
+            quantity.
+        sources: m errors, whose distributions are not used.
         tolerances: (m,) [rad or m] half widths of the tolerances.
-        corners: (k, m) signs at the start of each search.
+        corners: (k, m) signs of the errors at the start of each search.
         key: the quantity, see :func:`forcefit.assembly.statistics.responses.respond`.
         clearance: clearance model, see the same function.
         contact_length: [m] contact length, see the same function.
@@ -68,7 +66,8 @@ def worst_corner(
     """
     signs = corners.copy()
     if isinstance(prepared, LinearResponse):
-        # the energy has zero derivative if clearances compensate an error completely
+        # The derivative of the energy is zero if clearances compensate all errors, so
+        # the solution without clearances is an additional start.
         signs = np.vstack([
             signs,
             _worst_without_clearance(prepared, sources, tolerances, signs),
@@ -93,7 +92,7 @@ def _worst_without_clearance(
     prepared: LinearResponse, sources: ErrorSources, tolerances: NDArray,
     corners: NDArray,
 ) -> NDArray:  # fmt: skip
-    """Return the worst corners (k, m) of the energy (h s)^2 / 2 without clearances."""
+    """Return corners of large energy (h s)^2 / 2 without clearances, (k, m)."""
     h = prepared.misfit[:, 6 * sources.frame + sources.component] * tolerances
     signs = corners
     for _ in range(_ITERATIONS):
@@ -103,22 +102,22 @@ def _worst_without_clearance(
 
 
 def random_corners(count: int, sources: int, seed: int = 1) -> NDArray:
-    """Return the signs (count, sources) of random corners."""
+    """Return the signs of the errors at random corners, (count, sources)."""
     return np.random.default_rng(seed).choice([-1.0, 1.0], size=(count, sources))
 
 
 def bound_margin(
     zone: PostureMargins, sources: ErrorSources, tolerances: NDArray
 ) -> float:
-    """Bound the margin from above over all errors within tolerances.
+    """Return an upper bound on the margin over all errors within tolerances.
 
     Args:
-        zone: a posture prepared for margins; the margin is a factor on all clearances.
+        zone: prepared problem (21) of a posture.
         sources: m sources of errors.
         tolerances: (m,) [rad or m] half widths of the tolerances.
 
     Returns:
-        The bound; inf if no clearance can close one of the errors.
+        The bound; inf if no clearance can compensate one of the errors.
     """
     columns = 6 * sources.frame + sources.component
     if np.abs(zone.infeasible[:, columns] * tolerances).max(initial=0.0) > 1e-12:
@@ -134,17 +133,17 @@ def bound_margin(
 def bound_energy(
     prepared: LinearResponse, sources: ErrorSources, tolerances: NDArray
 ) -> float:
-    """Bound the energy from above over all errors within tolerances.
+    """Return an upper bound on the energy over all errors within tolerances.
 
     Args:
-        prepared: a posture prepared for energies.
+        prepared: linear response of a posture.
         sources: m sources of errors.
         tolerances: (m,) [rad or m] half widths of the tolerances.
 
     Returns:
-        [J] bound for clearances and springs that are affine in the errors.  It adds up
-        the norms of their deflections, so it may be several times the worst case. The
-        bound is inf if no spring can close one of the errors.
+        Bound [J]; inf if no clearance or spring can compensate one of the errors. It is
+        a sum of norms over all errors and may exceed the maximum by a factor of
+        several.
     """
     columns = 6 * sources.frame + sources.component
     if np.abs(prepared.infeasible[:, columns] * tolerances).max(initial=0.0) > 1e-12:
@@ -159,14 +158,14 @@ def bound_energy(
 
 
 def _reach(V: NDArray, starts: NDArray) -> NDArray:
-    """Return each cone's largest clearance norm (cones,) for affine clearances."""
+    """Return the largest norm of each clearance over all errors, (cones,)."""
     return np.sqrt(np.add.reduceat(V**2, starts[:-1], axis=0)).sum(axis=1)
 
 
 def _affine_clearances(
     B: NDArray, asked: NDArray, starts: NDArray, G: NDArray | None, h: NDArray | None
 ) -> NDArray:
-    """Return the map V (nu, m) with B V = asked: smallest norms or minimum energy."""
+    """Return V, (nu, m), with B V = asked or, for given G, with minimum energy."""
     import cvxpy as cp
 
     nu, m = starts[-1], asked.shape[1]

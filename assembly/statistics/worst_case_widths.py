@@ -1,11 +1,10 @@
-"""Minimum-cost zone widths of callouts with which every machine meets the limits.
+"""Minimum-cost widths of callout zones for a yield of 1.
 
-The worst pose error is the maximum over directions n of a sum of support functions,
-``sum_g t_g s_g(n) + c(n)``. This formula requires that no loop is over-constrained, or
-that parts are elastic and joints have no clearance. The worst pose error is then convex
-in the tolerances t, and all tolerances that meet the limit satisfy ``sum_g t_g s_g(n)
-<= limit - c(n)`` for each direction. Minimising the cost subject to such planes
-therefore proves the minimum cost, see
+The worst pose error is the maximum of ``sum_g t_g s_g(n) + c(n)`` over all directions
+n, where s_g are support functions of the zones and c that of the clearances. This
+applies if no loop is over-constrained, or if bodies are elastic and joints have no
+clearance. Tolerances t are therefore feasible if and only if ``sum_g t_g s_g(n) <=
+limit - c(n)`` for all n. These inequalities are used as cutting planes, see
 :mod:`forcefit.assembly.statistics.cutting_planes`.
 """
 
@@ -33,7 +32,7 @@ from forcefit.assembly.statistics.verification import verify
 from forcefit.assembly.statistics.worst_pose import farthest_screw
 from forcefit.inputs.table import BadInput
 
-_TOLERANCE = 1e-3  # largest violation before the final scaling, relative to a limit
+_TOLERANCE = 1e-3  # accepted violation before the final scaling, relative to a limit
 _MOST_STEPS = 200
 
 Progress = Callable[[str, int, int], None]
@@ -41,22 +40,22 @@ Progress = Callable[[str, int, int], None]
 
 @dataclass(frozen=True, eq=False)
 class _Case:
-    """A limit at a posture, with zones at their largest widths and their classes."""
+    """A limit at a posture."""
 
     key: str
     sets: ErrorSets
-    classes: tuple[int, ...]  # class of each zone; -1 for a clearance
+    classes: tuple[int, ...]  # class index of each zone; -1 for a clearance
     where: str
 
     def scaled(self, shares: NDArray) -> ErrorSets:
-        """Return the error sets for given fractions (G,) of the largest widths."""
+        """Return the error sets for tolerances relative to the largest ones, (G,)."""
         factors = np.ones(self.sets.screws.shape[1])
         for columns, g in zip(self.sets.columns, self.classes, strict=True):
             factors[columns] = shares[g] if g >= 0 else 1.0
         return replace(self.sets, screws=self.sets.screws * factors)
 
     def worst(self, shares: NDArray) -> tuple[float, float, NDArray]:
-        """Return the worst pose error found, its bound, and its direction (3,)."""
+        """Return the worst pose error found, an upper bound, and the direction."""
         half = 3 * POSE_ERRORS.index(self.key)
         (low, high), screw = farthest_screw(self.scaled(shares), half)
         direction = screw[half : half + 3]
@@ -64,7 +63,7 @@ class _Case:
         return low, high, direction / size if size else np.eye(3)[0]
 
     def supports(self, direction: NDArray, count: int) -> tuple[NDArray, float]:
-        """Return the support functions of the classes (G,) and of the clearances."""
+        """Return the support functions of the classes, (G,), and of the clearances."""
         half = 3 * POSE_ERRORS.index(self.key)
         weights = direction @ self.sets.screws[half : half + 3]
         found = np.zeros(count + 1)
@@ -79,23 +78,21 @@ def allot_worst_case(
     postures: Sequence[Posture], plan: Plan, fresh: int, progress: Progress,
     replay: Replay | None = None,
 ) -> Allocation:  # fmt: skip
-    """Find the minimum-cost tolerances with which every machine meets the limits.
+    """Find the minimum-cost tolerances with which every robot satisfies the limits.
 
     Args:
         postures: postures of one robot.
-        plan: plan with callouts, limits on rotation and translation, and a yield of 1;
-            fits have their largest clearance.
-        fresh: number of new draws that verify the tolerances; 0 to skip the
-            verification.
+        plan: plan with callouts, limits on rotation or translation, and a yield of 1.
+        fresh: number of new draws for the verification; 0 to skip it.
         progress: called with the name of a step, its progress and its total.
-        replay: stored results of the draws.
+        replay: stored results of an interrupted computation.
 
     Returns:
-        The tolerances, their worst case and a lower bound on the cost.
+        The tolerances, with the worst pose errors and a lower bound on the cost.
 
     Raises:
-        BadInput: the worst case is not a convex maximisation, or a limit is exceeded by
-            clearances alone or with the tightest tolerances.
+        BadInput: the worst pose error is not a maximum of support functions, or a limit
+            is exceeded by clearances alone or with the tightest tolerances.
     """
     if plan.clearance != "worst":
         fault = f"found {plan.clearance} with callouts and a yield of 1"
@@ -132,7 +129,7 @@ def allot_worst_case(
 
 
 def _case(posture: Posture, plan: Plan, key: str) -> _Case:
-    """Return a limit at a posture; reject it if its worst case is not convex."""
+    """Return a limit at a posture, with the zones for the largest widths."""
     sources = plan.sources
     assert isinstance(sources, CalloutSources)
     sets = error_sets(linear_response(posture), sources)
@@ -140,9 +137,9 @@ def _case(posture: Posture, plan: Plan, key: str) -> _Case:
     if len(sets.rigid_rows) or (len(sets.spring_rows) and sets.clearances):
         kind = "rigid" if len(sets.rigid_rows) else "elastic with clearance"
         raise BadInput(
-            f"yield: found 1 for parts that are over-constrained and {kind} "
-            f"(at {where}), expected less than 1; statistics --worst-case is their "
-            "worst case"
+            f"yield: found 1 for an over-constrained robot that is {kind} "
+            f"(at {where}), expected less than 1; use statistics --worst-case to "
+            "compute its worst case"
         )
     firsts = np.cumsum([0, *(len(unit) for _, _, unit in zones_of_errors(sources))])
     own = [int(plan.group[first]) for first in firsts[:-1]]
@@ -154,7 +151,7 @@ def _case(posture: Posture, plan: Plan, key: str) -> _Case:
 
 
 def _plane(case: _Case, plan: Plan, shares: NDArray) -> list[NDArray]:
-    """Return the plane ``a.t <= 1`` that excludes tolerances beyond a limit, if any."""
+    """Return the cutting plane ``a.t <= 1`` if the tolerances violate a limit."""
     limit = plan.limits[case.key]
     low, _, direction = case.worst(shares)
     if low <= limit * (1 + _TOLERANCE):
@@ -163,15 +160,16 @@ def _plane(case: _Case, plan: Plan, shares: NDArray) -> list[NDArray]:
     if clearance >= limit:
         value = f"{clearance:.4g} {UNITS[case.key]} at {case.where}"
         raise BadInput(
-            f"limit {case.key}: found clearances that alone reach {value}, expected "
+            f"limit {case.key}: clearances alone cause {value}, expected "
             f"less than {limit:g} {UNITS[case.key]}"
         )
     return [supports / plan.most / (limit - clearance)]
 
 
 def _factor(case: _Case, plan: Plan, shares: NDArray) -> float:
-    """Return the factor on tolerances for which the certified bound meets the limit."""
-    # the worst pose error is convex in the factor, so it lies below a chord from zero
+    """Return a factor on tolerances with which the bound satisfies the limit."""
+    # The worst pose error is a convex function of the factor, so linear interpolation
+    # between zero and the tolerances gives an upper bound.
     limit, high = plan.limits[case.key], case.worst(shares)[1]
     if high <= limit:
         return 1.0
@@ -180,7 +178,7 @@ def _factor(case: _Case, plan: Plan, shares: NDArray) -> float:
 
 
 def _worst(cases: Sequence[_Case], shares: NDArray) -> dict[str, tuple[float, float]]:
-    """Return the largest value and bound over all postures, by quantity."""
+    """Return the largest value found and the largest bound for each quantity."""
     found: dict[str, tuple[float, float]] = {}
     for case in cases:
         low, high, _ = case.worst(shares)

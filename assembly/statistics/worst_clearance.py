@@ -1,17 +1,11 @@
-"""Largest pose errors over all clearance positions, problem (27), for many draws.
+"""Largest pose errors over all positions within the clearances, problem (27).
 
-The assumption ``frozen`` is used: springs keep their deformations from the
-minimum-energy solution (22), and unloaded clearances may be anywhere within their
-bounds.  By strict convexity, all minimum-energy solutions have the same spring
-deformations. By complementary slackness, they have the same loaded clearances.  The set
-of positions is therefore the set of *all* minimum-energy solutions, inside and outside
-an assembly zone. The set contains the positions of the uniform and the contact model as
-well as the solution that the solver returns. The alternative assumptions change the
-robot: ``free`` lets compliant joints rotate without energy, and ``budget`` allows more
-than the minimum energy.
+The set of positions is the set of all minimum-energy solutions (22), which is the
+assumption ``frozen`` of problem (27). All solutions have the same spring deformations,
+because the energy is strictly convex in them. They also have the same clearances at
+joints that transmit a force. The other joints may be anywhere within their clearances.
 
-Under a load, the energy minus the work of the load takes the place of the energy, and
-only clearances that transmit no force are free.
+Under a load, the energy minus the work of the load is minimised.
 """
 
 import numpy as np
@@ -31,26 +25,25 @@ from forcefit.assembly.statistics.linear_response import LinearResponse
 from forcefit.assembly.statistics.quantities import POSE_ERRORS
 
 ASSUMPTION = "frozen"
-PRECISION = (1e-6, 1e-6)  # [rad, m] required difference of upper and lower bounds
-# [rad or m] precision of the support function, whose multipliers give the derivatives
+PRECISION = (1e-6, 1e-6)  # [rad, m] default difference of upper and lower bounds
+# [rad or m] precision of the support function for derivatives
 _SUPPORT_PRECISION = 1e-12
 
 
 def bound_worst_errors(
     draws: Assembly, precision: tuple[float, float] = PRECISION
 ) -> tuple[NDArray, NDArray]:
-    """Compute certified bounds on the largest pose errors over all clearance positions.
+    """Bound the largest pose errors over all positions within the clearances.
 
     Args:
-        draws: solutions of k draws at one posture.
-        precision: [rad, m] required difference of upper and lower bounds; inf for a
-            bound that is not needed.
+        draws: solutions for k draws at one posture.
+        precision: [rad, m] required difference of upper and lower bounds; inf to omit
+            an upper bound.
 
     Returns:
-        (k, 2, 2) lower and upper bounds on the rotation [rad] and the translation [m],
-        at least as large as the errors of the screw in ``draws``.  NaN for a draw
-        without a solution; an upper bound is inf if not proved. Second, (k, 2, 6) [rad,
-        m] screws that attain the lower bounds, at least nearly.
+        Lower and upper bounds on rotation [rad] and translation [m], (k, 2, 2); NaN
+        without a solution, and inf for an unknown upper bound. Screws that attain the
+        lower bounds, (k, 2, 6) [rad, m].
     """
     bounds = np.full((len(draws), 2, 2), np.nan)
     screws = np.tile(draws.platform_screw[:, None], (1, 2, 1))
@@ -60,7 +53,7 @@ def bound_worst_errors(
     else:
         for i in solved.tolist():
             bounds[i], screws[i] = _under_load(draws, i, precision)
-    # two solutions of problem (22) differ by up to the square root of their duality gap
+    # The computed solution is one of the positions, so its error is a lower bound.
     least = np.stack([
         np.linalg.norm(draws.platform_screw[:, part], axis=1)
         for part in (slice(0, 3), slice(3, 6))
@@ -77,7 +70,7 @@ def bound_worst_errors(
 def _without_load(
     draws: Assembly, precision: tuple[float, float]
 ) -> tuple[NDArray, NDArray]:
-    """Return bounds and screws of unloaded draws, computed by the C++ kernel."""
+    """Return bounds and screws of draws without loads."""
     found = bound_pose_error(
         draws, ASSUMPTION,
         tolerance_rotation=precision[0], tolerance_translation=precision[1],
@@ -91,7 +84,7 @@ def _without_load(
 def _under_load(
     draws: Assembly, i: int, precision: tuple[float, float]
 ) -> tuple[NDArray, NDArray]:
-    """Return bounds and screws of one loaded draw; NaN if the solver failed."""
+    """Return bounds and screws of one draw with loads; NaN if the solver failed."""
     try:
         error_bound = bound_pose_error(
             draws[i], ASSUMPTION,
@@ -106,28 +99,28 @@ def _under_load(
 def worst_error_slopes(
     prepared: LinearResponse, draws: Assembly, key: str, screws: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Differentiate the largest pose error with respect to screw and clearances.
+    """Differentiate the largest pose error with respect to platform screw and bounds.
 
-    The farthest point attains the support function in its own direction. By the
-    envelope theorem, its derivatives equal those of this support function.
+    By the envelope theorem, the derivatives are those of the support function in the
+    direction of the pose error.
 
     Args:
         prepared: the prepared posture.
-        draws: solutions of k draws without loads.
+        draws: solutions for k draws without loads.
         key: ``"rotation"`` or ``"translation"``.
-        screws: (k, 6) [rad, m] screws that attain the largest error, from
+        screws: (k, 6) [rad, m] screws of the largest error, from
             :func:`bound_worst_errors`.
 
     Returns:
-        (k, 6) derivatives of the largest error by the platform's screw, and (k, nu)
-        multipliers of the bounds of the clearances that carry no load.
+        Derivatives with respect to the platform screw, (k, 6), and multipliers of the
+        bounds of clearances that transmit no force, (k, nu).
     """
     part = 3 * POSE_ERRORS.index(key)
     size = np.linalg.norm(screws[:, part : part + 3], axis=1, keepdims=True)
     by_screw, by_clearance = np.zeros_like(screws), np.zeros_like(draws.clearances)
     by_screw[:, part : part + 3] = screws[:, part : part + 3] / np.maximum(size, 1e-300)
     loaded = loaded_clearances(prepared, draws)
-    # derivative of the pose error by clearances; a clearance at its bound is fixed
+    # derivative of the pose error with respect to the clearances
     along = by_screw @ prepared.screws[:, : draws.clearances.shape[1]]
     patterns, pattern_of = np.unique(loaded, axis=0, return_inverse=True)
     for k, pattern in enumerate(patterns):
@@ -143,7 +136,7 @@ def worst_error_slopes(
 def _pressing(
     prepared: LinearResponse, free: NDArray, along: NDArray, clearances: NDArray
 ) -> NDArray:
-    """Return directions (k, ..) of free clearances that satisfy closure equations."""
+    """Return the multipliers of the bounds of free clearances, (k, ..)."""
     rows = clearance_constraints(prepared, ~free)[:, free]
     size = np.linalg.norm(along, axis=1, keepdims=True)
     moving = size[:, 0] > 0.0

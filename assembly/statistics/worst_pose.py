@@ -1,19 +1,18 @@
 """Worst pose error over all errors within tolerance and all clearance positions.
 
-If a machine is over-constrained, the worst pose error depends on its definition:
+For over-constrained robots, there are four definitions of the worst case:
 
 =========== ====================================================================
-rigid       errors and clearances that close without any force: a convex set
-elastic     no clearance: the platform's screw is linear in the errors
-equilibrium minimum energy (22) at given errors, worst position in the clearances
-bound       clearances are added like errors: an upper bound on ``equilibrium``
+rigid       over all errors and clearances for which loops close without force
+elastic     elastic bodies without clearances: the pose is linear in the errors
+equilibrium over all errors and all solutions of problem (22) for these errors
+bound       clearances treated as errors: an upper bound on ``equilibrium``
 =========== ====================================================================
 
-The rigid and the elastic worst case are convex maximisations: the maximum over all
-directions of a sum of support functions. The same is true of all four definitions if no
-loop is over-constrained. Otherwise the equilibrium with clearances is no convex
-maximisation: a search from corner to corner gives its lower bound, and ``bound`` is its
-upper bound.
+Without over-constrained loops, all definitions agree. The definitions ``rigid``,
+``elastic`` and ``bound`` maximise a sum of support functions over all directions. For
+``equilibrium``, a search over corners of the tolerance box gives a lower bound, and
+``bound`` gives an upper bound.
 
 Sources:
     Hoffman (1981), see :mod:`forcefit.assembly.solvers.outer_cuts`.
@@ -51,35 +50,34 @@ from forcefit.inputs.table import BadInput, describe, nearest
 from forcefit.results.display import Figures, html_table, short_repr
 from forcefit.results.text import in_unit
 
-# accepted difference of the bounds, relative to the support along x, y and z
+# accepted difference of the bounds, relative to the support function
 _TOLERANCE = 3e-4
 _STARTS = 24  # number of random starting corners of the tolerance box
-_CLIMBS = 12  # largest number of steps from one corner of the tolerance box to another
+_CLIMBS = 12  # largest number of steps of the search
 
 MEANINGS = {
     "linear": "no loop is over-constrained: all definitions agree",
-    "rigid": "rigid parts: only errors and clearances that close without force",
-    "elastic": "elastic parts without clearance: the response is linear",
-    "equilibrium": "elastic parts with clearance: between the largest equilibrium "
-    "found by searching and the bound with clearances counted as errors",
+    "rigid": "rigid bodies: errors and clearances for which loops close without force",
+    "elastic": "elastic bodies without clearances: the response is linear",
+    "equilibrium": "elastic bodies with clearances: between the largest equilibrium "
+    "found and an upper bound that treats clearances as errors",
 }
 
 
 @dataclass(frozen=True, eq=False)
 class WorstPose:
-    """Worst pose error over errors and clearances.
+    """Worst pose error over all errors within tolerance and all clearance positions.
 
     Attributes:
         quantity: ``"rotation"`` or ``"translation"``.
         reading: a key of :data:`MEANINGS`.
-        attained: [rad or m] the largest value found.
-        bound: [rad or m] a certified upper bound.
-        direction: (3,) unit vector of the value attained, base axes.
-        shares: [rad or m] contribution of each callout, independent error or clearance
-            along that direction, largest first; they sum to the support function of the
-            bound.
-        rigid: [rad or m] value attained by the rigid definition, which the equilibrium
-            includes; NaN for the other definitions.
+        attained: [rad or m] largest value found.
+        bound: [rad or m] upper bound.
+        direction: (3,) unit vector of the largest value found, in base axes.
+        shares: [rad or m] contribution of each callout, independent error and clearance
+            along ``direction``, in descending order.
+        rigid: [rad or m] largest value for the definition ``rigid``, if the definition
+            is ``equilibrium``; otherwise NaN.
     """
 
     quantity: str
@@ -93,7 +91,7 @@ class WorstPose:
     __repr__, _repr_html_ = short_repr, html_table
 
     def _figures(self) -> Figures:
-        """Format both bounds and the three largest shares as lines of text."""
+        """Format the bounds and the three largest contributions as text."""
         unit = "mrad" if self.quantity == "rotation" else "um"
         return {
             "quantity": self.quantity,
@@ -111,23 +109,22 @@ def worst_pose(
     quantity: str = "translation",
     seed: int = 1,
 ) -> WorstPose:
-    """Compute the worst pose error over all errors within tolerance and clearances.
+    """Compute the worst pose error over all errors and clearance positions.
 
     Args:
         posture: a posture without loads, or its linear response.
-        errors: file of independent errors that are bounded and symmetric (TOML), in
-            addition to the callouts and fits of the robot, each fit at its largest
-            clearance; None to use only the callouts and fits. Error sources are
-            accepted too.
+        errors: path of a TOML file with independent errors, or error sources, in
+            addition to the callouts and fits of the robot. The errors must be bounded
+            and symmetric about zero. Fits have their largest clearance.
         quantity: ``"rotation"`` or ``"translation"``.
         seed: seed of the random starting corners of the search.
 
     Returns:
-        The worst case, with the definition that applies.
+        The worst case and its definition.
 
     Raises:
-        BadInput: the quantity is unknown, a joint is bolted at a pose, the posture is
-            loaded, or an independent error is unbounded or not symmetric about zero.
+        BadInput: the quantity is unknown, a joint is bolted, there is a load, or an
+            independent error is unbounded or not symmetric about zero.
     """
     if quantity not in POSE_ERRORS:
         raise BadInput(
@@ -154,7 +151,7 @@ def worst_pose(
     direction = direction / size if size else np.eye(3)[0]
     along = direction @ sets.screws[half : half + 3]
     parts = rigid_parts(sets, along) if reading == "rigid" else parts_of(sets, along)
-    shares: dict[str, float] = {}  # all contacts of a joint are listed under one name
+    shares: dict[str, float] = {}  # sum over all contacts of a joint
     for name, part in zip(sets.names, parts, strict=True):
         shares[name] = shares.get(name, 0.0) + part
     ordered = tuple(sorted(shares.items(), key=lambda share: -share[1]))
@@ -164,17 +161,17 @@ def worst_pose(
 def bound_worst_pose(
     prepared: LinearResponse, sources: Sources, tolerance: float = _TOLERANCE
 ) -> tuple[str, dict[str, float]]:
-    """Compute certified upper bounds on the worst pose error, without attained values.
+    """Compute upper bounds on the worst pose errors.
 
     Args:
         prepared: as for :func:`worst_pose`.
         sources: as for :func:`worst_pose`.
-        tolerance: [-] largest difference between the bounds and the maximum of the
-            convex problem, relative to the support functions along x, y and z.
+        tolerance: [-] precision of the bounds, relative to the largest support function
+            along x, y and z.
 
     Returns:
-        The definition, a key of :data:`MEANINGS`, and bounds of the ``rotation`` [rad]
-        and the ``translation`` [m].
+        A key of :data:`MEANINGS`, and bounds on the ``rotation`` [rad] and the
+        ``translation`` [m].
 
     Raises:
         BadInput: as for :func:`worst_pose`.
@@ -190,7 +187,7 @@ def bound_worst_pose(
 def _at_largest_clearances(
     prepared: LinearResponse, sources: Sources
 ) -> tuple[LinearResponse, Sources]:
-    """Return the posture with largest fit clearances, and the sources except fits."""
+    """Return the response for the largest fit clearances, and the other errors."""
     refuse_bolted(prepared.posture.robot, "worst case")
     if prepared.loads is not None:
         raise BadInput(
@@ -205,8 +202,8 @@ def _at_largest_clearances(
 
 
 def _reading(sets: ErrorSets) -> str:
-    """Return the key in MEANINGS of the worst-case definition that applies."""
-    # parallel contacts of one joint constrain each other, but no other joint
+    """Return the definition of the worst case, a key of ``MEANINGS``."""
+    # Several contacts of the same joint do not over-constrain a loop.
     held = len(sets.rigid_rows) > len(sets.contact_rows)
     sprung = len(sets.spring_rows) > 0
     if sprung and sets.clearances:
@@ -215,14 +212,15 @@ def _reading(sets: ErrorSets) -> str:
 
 
 def farthest_screw(sets: ErrorSets, half: int) -> tuple[tuple[float, float], NDArray]:
-    """Bracket the largest platform rotation or translation if loops may open.
+    """Bound the largest platform rotation or translation if loops need not close.
 
     Args:
         sets: zones of errors and clearances.
         half: 0 for the rotation, 3 for the translation.
 
     Returns:
-        [rad or m] value attained and certified bound, and (6,) screw that attains it.
+        Largest value found and upper bound [rad or m], and the screw of the largest
+        value, (6,).
     """
     return _farthest(sets, sets.contact_rows, half)
 
@@ -230,14 +228,14 @@ def farthest_screw(sets: ErrorSets, half: int) -> tuple[tuple[float, float], NDA
 def _farthest(
     sets: ErrorSets, rows: NDArray, half: int, tolerance: float = _TOLERANCE
 ) -> tuple[tuple[float, float], NDArray]:
-    """Bracket the largest rotation or translation over zones with rows @ z = 0."""
+    """Bound the largest rotation or translation subject to ``rows @ z = 0``."""
     support = _support(sets, rows, half)
     sizes = [support(direction)[0] for direction in np.eye(3)]
     if not max(sizes) > 0:
         return (0.0, 0.0), np.zeros(6)
     bounds, screw, _ = farthest(np.zeros(6), half, tolerance * max(sizes), support)
     low = bounds[0]
-    # the farthest screw along a screw's direction is at least as long as that screw
+    # Each iteration increases the size of the screw.
     for _ in range(50):
         further = support(screw[half : half + 3] / low)[1]
         size = float(np.linalg.norm(further[half : half + 3]))
@@ -248,8 +246,9 @@ def _farthest(
 
 
 def _sum_of_sizes(sets: ErrorSets, half: int) -> float:
-    """Bound the pose error [rad or m] by the sum of the errors of all ball zones."""
-    # cutting planes converge slowly if the screws form a ball; there this sum is exact
+    """Return the sum of the largest pose errors of all zones [rad or m]."""
+    # Cutting planes converge slowly if the set of screws is a ball. For a ball, this
+    # sum is exact.
     total = 0.0
     for zone, columns in zip(sets.zones, sets.columns, strict=True):
         ends = np.cumsum(zone.dimensions)[:-1]
@@ -261,7 +260,7 @@ def _sum_of_sizes(sets: ErrorSets, half: int) -> float:
 def _support(
     sets: ErrorSets, rows: NDArray, half: int
 ) -> Callable[[NDArray], tuple[float, NDArray, NDArray]]:
-    """Return the support function of the platform's screws and the farthest screw."""
+    """Return a function that computes the support function and the farthest screw."""
     P = sets.screws[half : half + 3]
     if not len(rows):
 
@@ -285,7 +284,7 @@ def _support(
 def _climb(
     prepared: LinearResponse, sources: Sources, quantity: str, seed: int, start: NDArray
 ) -> tuple[float, NDArray]:
-    """Search for the largest equilibrium pose error and its direction (3,)."""
+    """Search for the largest pose error at equilibrium, and return its direction."""
     half = 3 * POSE_ERRORS.index(quantity)
     own = zones_of_errors(sources)
     sizes = [sum(zone.dimensions) for _, zone, _ in own]
@@ -293,7 +292,7 @@ def _climb(
     scale = np.concatenate([unit for _, _, unit in own])
 
     def corners(slopes: NDArray) -> NDArray:
-        """Return the errors (k, m) that maximise their product with slopes (k, m)."""
+        """Return the errors with the largest product with slopes, (k, m)."""
         u = np.zeros_like(slopes)
         for row, w in zip(u, slopes * scale, strict=True):
             for (_, zone, _), columns in zip(own, parts, strict=True):

@@ -1,4 +1,4 @@
-"""Worst pose error as plain values, as text and as a section of a report."""
+"""Worst pose errors as a dictionary, as text and as a section of a report."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -10,14 +10,14 @@ from forcefit.assembly.statistics.worst_pose import MEANINGS, worst_pose
 from forcefit.page.page import paragraph, section
 from forcefit.page.tables import Cell, Column, Value, table
 
-_LISTED = 8  # largest number of shares in the text
-_LEAST = 1e-6  # smallest listed share of the sum; smaller shares are round-off
+_LISTED = 8  # largest number of contributions in the text
+_LEAST = 1e-6  # smallest listed contribution, relative to the sum
 
 
 def worst_results(
     prepared: LinearResponse, sources: Sources, seed: int = 1
 ) -> dict[str, Any]:
-    """Compute the worst rotation and translation over errors and clearances.
+    """Compute the worst rotation and the worst translation.
 
     Args:
         prepared: a posture without loads.
@@ -25,9 +25,8 @@ def worst_results(
         seed: seed of the random starting corners of the search.
 
     Returns:
-        By quantity: definition and its meaning, value attained and certified bound,
-            unit, direction, and shares by name. For an equilibrium also the rigid
-            value.
+        For each quantity: definition and its meaning, largest value found, upper bound,
+        unit, direction and contributions by name.
     """
     results = {}
     for key in POSE_ERRORS:
@@ -48,7 +47,7 @@ def worst_text(results: Mapping[str, Any]) -> str:
         unit = worst["unit"]
         lines.append(
             f"worst case of the {key} over errors and clearances: "
-            f"{worst['attained']:.4g} {unit} attained, at most {worst['bound']:.4g} "
+            f"{worst['attained']:.4g} {unit} found, at most {worst['bound']:.4g} "
             f"{unit}; {worst['means']}"
         )
         if "rigid" in worst:
@@ -63,7 +62,7 @@ def worst_text(results: Mapping[str, Any]) -> str:
 
 
 def worst_section(results: Mapping[str, Any]) -> str:
-    """Format results of :func:`worst_results` as a section of a page."""
+    """Format results of :func:`worst_results` as a section of an HTML page."""
     rows: list[list[Cell]] = [
         [key, Value(one["attained"], one["unit"]), Value(one["bound"], one["unit"]),
          one["means"]]
@@ -77,7 +76,7 @@ def worst_section(results: Mapping[str, Any]) -> str:
         if share > _LEAST * sum(one["shares"].values())
     ]  # fmt: skip
     text = paragraph("Over all errors within tolerance and all clearances:")
-    of: list[str | Column] = ["error or clearance", "its part", Column("share")]
+    of: list[str | Column] = ["error or clearance", "contribution", Column("share")]
     return section(
         "Worst case", text, table(head, rows, "worst case"),
         table(of, shares, "parts of the worst case"),

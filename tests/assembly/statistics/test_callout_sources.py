@@ -1,4 +1,4 @@
-"""Statistics of callouts: a serial arm and a four-bar against hand calculation."""
+"""Random errors from callouts: a serial arm and a four-bar linkage."""
 
 import json
 from dataclasses import replace
@@ -34,7 +34,9 @@ def experiment(four_bar):
 
 
 def test_rotation_of_a_coupler_equals_hand_calculation(experiment):
-    """Standard deviation of the angle: 20 um / sqrt 3 times the root sum of squares."""
+    """The lengths are uniformly distributed within 20 um, so their standard deviation
+    is 20 um / sqrt(3).
+    """
     data = run_draws(experiment, 20_000)
     root = np.sqrt(sum(c**2 for c in COEFFICIENTS.values()))
     expected = root * 20e-6 / np.sqrt(3) / LEVER
@@ -77,7 +79,7 @@ def test_independent_errors_are_added_to_callouts(four_bar):
 
 
 def test_robot_without_tolerances_requires_an_errors_file(four_bar):
-    with pytest.raises(BadInput, match=r"found no \[\[tolerance\]\]"):
+    with pytest.raises(BadInput, match=r"a \[\[tolerance\]\] table"):
         sources_of(replace(four_bar, callouts=()))
 
 
@@ -91,8 +93,8 @@ frame = [
 
 
 def test_clearance_of_a_fit_differs_between_draws(write_file):
-    """The tip of an exact arm on one pin moves by its radial clearance. The diametral
-    clearance is 6 to 35 um, 20.5 um on average, with standard deviation 6.09 um.
+    """The diametral clearance of 12 H7/g6 is 6 to 35 um, with a mean of 20.5 um and a
+    standard deviation of 6.09 um. The tip error is the radial clearance.
     """
     robot = read_robot(write_file(ARM))
     assert robot.frame("shoulder").clearance.radial == pytest.approx(10.25e-6)
@@ -123,16 +125,17 @@ joint = [
 """  # noqa: E501
 
 
-def test_larger_hole_has_a_larger_zone_and_a_larger_clearance(write_file):
-    """Hole 12 H7 of size s above its minimum: ends of the bore within R = 25 um + s/2,
-    diametral clearance s + 6 to 17 um. Uniform s in 0 to 18 um and ends in their discs:
-    the covariance of r^2 and the clearance is cov(R^2/2, s) = 398.25 um^3.
+def test_larger_hole_has_larger_zone_and_clearance(write_file):
+    """A hole 12 H7 exceeds its minimum size by s, which is uniform from 0 to 18 um. The
+    ends of the bore are uniform in discs of radius R = 25 um + s/2. Therefore, the
+    covariance of the squared radius and the diametral clearance is cov(R^2/2, s) =
+    398.25 um^3.
     """
     sources = sources_of(read_robot(write_file(LOOSE)))
     values = sources.draw(0, 200_000, 1)
     radius = 25 * np.linalg.norm(values[:, :2], axis=1)
     diametral = 20.5 + 2e6 * values[:, -1]
-    size = 2 * np.maximum(0.0, radius - 25)  # the hole is at least so large
+    size = 2 * np.maximum(0.0, radius - 25)  # smallest possible value of s
     assert (diametral > size + 6 - 1e-9).all()
     assert np.cov(radius**2, diametral)[0, 1] == pytest.approx(398.25, rel=0.03)
     assert diametral.std() == pytest.approx(6.09, abs=0.03)
@@ -141,7 +144,7 @@ def test_larger_hole_has_a_larger_zone_and_a_larger_clearance(write_file):
     assert sorted(groups[name]) == list(range(5))
 
 
-def test_hole_at_maximum_material_has_the_size_given_by_its_fit(write_file):
+def test_hole_size_that_differs_from_its_fit_is_rejected(write_file):
     expected = 'found the hole "12 H8", expected that of the fit "12 H7/g6"'
     with pytest.raises(BadInput, match=expected):
         read_robot(write_file(LOOSE.replace('hole = "12 H7"', 'hole = "12 H8"')))
@@ -180,9 +183,10 @@ def test_command_reports_the_importance_by_callout(tmp_path):
     assert results["capability"]["translation"]["ppm"]["value"] == above * 1e6
 
 
-def test_position_in_one_direction_uses_the_drawn_size_of_its_hole(write_file):
-    """Ends within 25 um + s/2 along x alone; the diametral clearance is s + 6 at least
-    for a hole s above its least size."""
+def test_position_zone_along_one_axis_depends_on_hole_size(write_file):
+    """If the hole exceeds its minimum size by s, the ends of its axis are within 25 um
+    + s/2 along x, and the diametral clearance is at least s + 6 um.
+    """
     along_x = LOOSE.replace('hole = "12 H7"', 'hole = "12 H7", direction = [1, 0, 0]')
     sources = sources_of(read_robot(write_file(along_x)))
     values = sources.draw(0, 100_000, 1)

@@ -1,4 +1,4 @@
-"""Tolerances allocated to callouts, against independent errors and finite geometry."""
+"""Tolerances allocated to callouts."""
 
 from dataclasses import replace
 
@@ -58,19 +58,17 @@ def allotted(tmp_path, robot, text):
     return allocate([home_posture(robot)], plan, 0)
 
 
-def test_length_callouts_get_the_tolerances_of_independent_errors(tmp_path):
-    """An interval is drawn like an independent uniform error, so both plans must have
-    the same tolerances, regardless of the robot file.
-    """
+def test_length_callouts_have_the_tolerances_of_independent_errors(tmp_path):
+    """A length callout has the same distribution as an independent uniform error."""
     callouts = allotted(tmp_path, ARM, PLAN_OF_CALLOUTS)
     frames = allotted(tmp_path, ARM, PLAN.format(**OF_FRAMES))
     assert callouts.tolerances == pytest.approx(frames.tolerances, rel=1e-6)
     assert "arm: +-" in allocation_text(allocation_of(callouts))
 
 
-def test_width_of_a_position_meets_its_yield_in_finite_geometry(tmp_path):
-    """The tip 150 mm above a bore of 20 mm: its offset in units of the width follows
-    from both ends in discs, and the allocated width is the limit over the quantile.
+def test_width_of_a_position_zone_agrees_with_nonlinear_simulation(tmp_path):
+    """The tip is 150 mm above a bore of 20 mm length, whose ends are uniform in discs.
+    The width is the limit divided by the 90 % quantile of the offset for a width of 1.
     """
     robot = Robot(
         "post",
@@ -94,7 +92,7 @@ def test_width_of_a_position_meets_its_yield_in_finite_geometry(tmp_path):
     up, down = points[:half], points[half : 2 * half]
     offset = (up + down) / 2 + (up - down) / 0.02 * 0.15
     quantile = np.quantile(np.hypot(*offset.T), 0.9)
-    # enough draws to show a yield of 0.9 with 95 %: slightly tighter, by 1 %
+    # To demonstrate the yield with 95 % confidence, the width is about 1 % smaller.
     assert 0.97 * 1e-4 / quantile < found.tolerances[0] < 1e-4 / quantile
     text = allocation_text(allocation_of(found))
     assert "position of bore: " in text
@@ -113,7 +111,7 @@ MISTAKES = [
 
 
 @pytest.mark.parametrize(("text", "message"), MISTAKES)
-def test_mistake_in_a_plan_of_callouts_is_reported_in_one_line(tmp_path, text, message):
+def test_invalid_callouts_in_a_tolerance_file_are_rejected(tmp_path, text, message):
     with pytest.raises(BadInput, match=message) as error:
         allotted(tmp_path, ARM, text)
     assert "\n" not in str(error.value)

@@ -1,4 +1,4 @@
-"""Capability indices against hand calculation and exact coverage."""
+"""Process capability indices and their confidence intervals."""
 
 import numpy as np
 import pytest
@@ -27,22 +27,18 @@ from forcefit.assembly.statistics.estimates import proportion
         (2.0, 0.00197, 5e-6),
     ],
 )
-def test_fraction_outside_the_limits_of_a_centred_process_equals_the_known_ppm(
-    cpk, ppm, tol
-):
+def test_ppm_of_a_centred_process_equals_known_values(cpk, ppm, tol):
     assert share_outside(cpk, cpk) * 1e6 == pytest.approx(ppm, abs=tol)
 
 
-def test_intervals_of_cpk_1_33_from_fifty_values_equal_hand_calculation():
+def test_cpk_interval_of_fifty_values_equals_hand_calculation():
     assert cpk_interval(1.33, 50) == pytest.approx((1.051, 1.609), abs=5e-4)
     assert cpk_interval_one_sided(1.33, 50) == pytest.approx((1.051, 1.607), abs=5e-4)
     assert cp_interval(1.33, 50) == pytest.approx((1.067, 1.592), abs=5e-4)
 
 
-def test_intervals_cover_the_true_capability_index_at_the_stated_rate():
-    """With 2000 samples of 30 values, a coverage of 0.95 has a standard error
-    of 0.5 %.
-    """
+def test_capability_intervals_have_the_nominal_coverage():
+    """For 2000 samples, the standard error of a coverage of 95 % is 0.5 %."""
     rng = np.random.default_rng(1)
     found = [capability(x, -4.0, 4.0) for x in rng.normal(size=(2000, 30))]
     assert np.mean([c.cp[1] <= 4 / 3 <= c.cp[2] for c in found]) > 0.93
@@ -55,8 +51,10 @@ def test_capability_of_constant_values_is_rejected():
         capability([1.0, 1.0], 0.0, 2.0)
 
 
-def test_intervals_of_parts_per_million_equal_hand_calculation():
-    """270 of 1e5: 2388 to 3041 ppm; none of 1e6: at most 3.7 ppm, one-sided 3.0."""
+def test_ppm_intervals_equal_hand_calculation():
+    """For 270 of 1e5 draws, the interval is 2388 to 3041 ppm. For 0 of 1e6 draws, the
+    upper bound is 3.7 ppm.
+    """
     share = proportion(270, 100_000)
     assert share["lower"] * 1e6 == pytest.approx(2388, abs=1)
     assert share["upper"] * 1e6 == pytest.approx(3041, abs=1)
@@ -64,10 +62,8 @@ def test_intervals_of_parts_per_million_equal_hand_calculation():
     assert proportion(0, 10**6, 0.9)["upper"] * 1e6 == pytest.approx(3.0, abs=0.01)
 
 
-def test_quantile_indices_of_a_rayleigh_sample_equal_closed_forms():
-    """Rayleigh distribution: the quantile at p is s sqrt(-2 ln(1 - p)); the limit is 4
-    s.
-    """
+def test_cp_and_cpk_of_a_rayleigh_sample_equal_closed_forms():
+    """The quantile of a Rayleigh distribution at p is s sqrt(-2 ln(1 - p))."""
     low, middle, tail = np.sqrt(-2 * np.log(1 - np.array([0.00135, 0.5, 0.99865])))
     x = np.linalg.norm(np.random.default_rng(2).normal(size=(400_000, 2)), axis=1)
     for index, expected in (
@@ -78,12 +74,12 @@ def test_quantile_indices_of_a_rayleigh_sample_equal_closed_forms():
         assert lower < expected < upper
 
 
-def test_cpk_of_few_draws_has_no_lower_bound_above_zero():
+def test_cpk_of_few_draws_has_lower_bound_zero():
     assert quantile_cpk(np.arange(100.0), 200.0)[1] == 0.0
     assert quantile_cp(np.arange(100.0), 200.0)[1] == 0.0
 
 
-def test_text_on_few_draws_above_the_limit_has_no_negative_zero():
+def test_capability_text_contains_no_negative_zero():
     x = np.linspace(2.0, 3.0, 100)
     few = {"limit": 1.0, "unit": "m", "probability": 1.0, "lower": 0.96, "upper": 1.0}
     text = capability_text({"size": draws_capability(x, few)})

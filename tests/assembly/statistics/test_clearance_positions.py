@@ -1,4 +1,4 @@
-"""Clearance positions against known volumes, rejection and closed forms."""
+"""Positions within joint clearances for all clearance models."""
 
 import numpy as np
 import pytest
@@ -27,7 +27,7 @@ def generators(count, seed=3):
 
 
 def walked(rows, starts, count=1500, start=None):
-    """Sample many points, by default from the centre; all walks must mix."""
+    """Return uniform samples of a set of clearance positions."""
     starts = np.array(starts)
     u = np.zeros((count, starts[-1])) if start is None else np.tile(start, (count, 1))
     rows = np.array(rows, dtype=float).reshape(-1, starts[-1])
@@ -39,21 +39,21 @@ def walked(rows, starts, count=1500, start=None):
     return u
 
 
-def test_uniform_positions_in_a_disc_have_a_uniform_squared_radius():
+def test_uniform_model_in_a_disc_has_uniform_squared_radius():
     u = walked([], [0, 2], start=[0.9, 0.0])
     assert stats.kstest((u**2).sum(axis=1), "uniform").pvalue > 1e-3
     assert stats.kstest(np.arctan2(*u.T) / (2 * np.pi) + 0.5, "uniform").pvalue > 1e-3
 
 
 @pytest.mark.slow
-def test_uniform_positions_in_a_cut_disc_equal_rejection_sampling():
-    """Row u0 = u2 / 2 with |u2| <= 1 leaves the strip |u0| <= 1/2 of the unit disc."""
+def test_uniform_model_in_a_strip_agrees_with_rejection_sampling():
+    """The equation u0 = u2 / 2 restricts the unit disc to the strip |u0| <= 1/2."""
     u = walked([[1, 0, -0.5]], [0, 2, 3])
     assert np.abs(u[:, 0] - u[:, 2] / 2).max() < 1e-12
     rng = np.random.default_rng(1)
     tried = rng.uniform(-1, 1, size=(60_000, 2))
     kept = tried[(np.hypot(*tried.T) <= 1) & (abs(tried[:, 0]) <= 0.5)]
-    # the strip's area is 2 (1/2 sqrt(3)/2 + asin(1/2)) = 1.913 of the square's 4
+    # The area of the strip is sqrt(3)/2 + pi/3 = 1.913, and that of the square is 4.
     area = np.sqrt(3) / 2 + np.pi / 3
     assert len(kept) / len(tried) == pytest.approx(area / 4, abs=0.01)
     for own, other in zip(u.T, kept.T, strict=False):
@@ -63,10 +63,10 @@ def test_uniform_positions_in_a_cut_disc_equal_rejection_sampling():
 @pytest.mark.parametrize(
     "thin", [pytest.param(t, marks=pytest.mark.slow) for t in (1e-1, 1e-3, 1e-5)]
 )
-def test_uniform_clearance_walk_mixes_near_the_zone_edge(thin):
-    """Row u0 - thin u2 = 1 with |u2| <= 1 leaves the disc's cap 1 - thin <= u0; two
-    sides stay free. A walk with isotropic steps would need 1 / thin^2 of them. The
-    density of u0 is proportional to the cap's width, sqrt(1 - u0^2).
+def test_random_walk_mixes_near_the_zone_boundary(thin):
+    """The equation u0 - thin u2 = 1 with |u2| <= 1 restricts the unit disc to the cap
+    u0 >= 1 - thin. The density of u0 is proportional to sqrt(1 - u0^2), the width of
+    the cap. A random walk with isotropic steps would need about 1 / thin^2 steps.
     """
     u = walked(
         [[1, 0, -thin, 0, 0]], [0, 2, 3, 4, 5], start=[1 - thin / 2, 0, -0.5, 0.9, -0.9]
@@ -74,7 +74,7 @@ def test_uniform_clearance_walk_mixes_near_the_zone_edge(thin):
     for side in u[:, 3:].T:
         assert stats.kstest(side, stats.uniform(-1, 2).cdf).pvalue > 1e-3
 
-    # area of the cap beyond height x: acos(x) - x sqrt(1 - x^2)
+    # The area of the cap with u0 >= x is acos(x) - x sqrt(1 - x^2).
     def beyond(x):
         x = np.clip(x, -1, 1)
         return np.arccos(x) - x * np.sqrt(1 - x**2)
@@ -86,7 +86,7 @@ def test_uniform_clearance_walk_mixes_near_the_zone_edge(thin):
 
 
 def test_random_walk_that_does_not_mix_is_reported():
-    """The set has no interior, or the chains must not be doubled."""
+    """Either the set has no interior, or the walk is too short."""
     starts, rng = np.array([0, 1, 2]), generators(1)[0]
     along = np.array([[1.0], [1.0]]) / np.sqrt(2)
     corner, to_screw = np.array([1.0, -1.0]), np.eye(6)[:, :2].copy()
@@ -97,11 +97,11 @@ def test_random_walk_that_does_not_mix_is_reported():
     assert sample_uniform_position(along, starts, to_screw, middle, rng)
 
 
-def test_platform_between_two_pins_is_distributed_uniformly_over_their_common_range():
-    """Along z a pin of 2 mm on one side and of 1 mm on the other, errors 0.5 mm apart.
+def test_platform_with_two_clearances_is_uniform_in_the_common_range():
+    """Two axial clearances of 2 mm and 1 mm act on the platform in parallel.
 
-    The platform, on the first, moves from -2 to 2 mm, and on the second from 0.5 - 1 to
-    0.5 + 1: the common range is -0.5 to 1.5, not symmetric about the solution.
+    The first allows z from -2 to 2 mm. The second is offset by 0.5 mm and allows z from
+    -0.5 to 1.5 mm, which is the common range.
     """
     shift = [0.0, 0.0, 0.0, 0.0, 0.0, 5e-4]
     steel = MatrixLink(np.eye(6) * 1e6)
@@ -122,8 +122,10 @@ def test_platform_between_two_pins_is_distributed_uniformly_over_their_common_ra
 
 
 @pytest.mark.parametrize(("kind", "first"), [("radial", 3), ("tilt", 0)])
-def test_contact_positions_are_uniform_on_the_narrower_rim(kind, first):
-    """Two pins on one axis, of 2 and 1 mm or mrad: contact is on a circle of 1."""
+def test_contact_positions_are_uniform_on_the_smaller_circle(kind, first):
+    """Of two coaxial pins with clearances of 2 and 1 mm (or mrad), the second is in
+    contact, so the positions are on a circle of radius 1.
+    """
     steel = MatrixLink(np.eye(6) * 1e6)
     frames = (
         Frame("one", link=steel, clearance=Clearance(**{kind: 2e-3})),
@@ -138,7 +140,7 @@ def test_contact_positions_are_uniform_on_the_narrower_rim(kind, first):
     np.testing.assert_allclose(np.hypot(x, y), 1e-3, rtol=1e-6)
     angle = np.arctan2(y, x) / (2 * np.pi) + 0.5
     assert stats.kstest(angle, "uniform").pvalue > 1e-3
-    # twice an angle: nor does it prefer an axis
+    # Multiples of the angle are also uniform, so no axis is preferred.
     assert stats.kstest(angle * 2 % 1, "uniform").pvalue > 1e-3
     assert stats.kstest(angle * 4 % 1, "uniform").pvalue > 1e-3
 
@@ -156,8 +158,8 @@ def drawn():
 
 
 @pytest.mark.parametrize("play", ["uniform", "contact"])
-def test_unloaded_clearances_cause_finite_displacements_of_the_platform(drawn, play):
-    """Clearances are loaded only in draws that store energy."""
+def test_clearance_models_move_the_platform_of_irsbot2(drawn, play):
+    """Joints transmit forces only in draws with elastic energy."""
     one, found = drawn
     loaded = loaded_clearances(one, found)
     assert not loaded[found.energy < 1e-20].any()
@@ -169,7 +171,7 @@ def test_unloaded_clearances_cause_finite_displacements_of_the_platform(drawn, p
 
 
 @pytest.mark.slow
-def test_contact_position_is_at_least_as_far_along_its_force_as_uniform(drawn):
+def test_contact_position_is_farthest_along_its_wrench(drawn):
     one, found = drawn
     push = np.array([rng.normal(size=6) for rng in generators(DRAWN)])
     size = size_of(one.posture.robot)
@@ -184,7 +186,7 @@ def test_contact_position_is_at_least_as_far_along_its_force_as_uniform(drawn):
 
 @pytest.mark.parametrize("play", ["most", "worst"])
 def test_unknown_clearance_model_is_rejected(drawn, play):
-    """The worst model has no single position, so it is rejected too."""
+    """The model "worst" is rejected because it does not define a single position."""
     one, found = drawn
     with pytest.raises(ValueError, match=f"clearance is '{play}'") as error:
         position_clearances(one, found, play, generators(DRAWN))
@@ -192,7 +194,7 @@ def test_unknown_clearance_model_is_rejected(drawn, play):
 
 
 def moved(directions, starts, rows=(), free=None, positions=None):
-    """Return the farthest positions along directions, by default from the centre."""
+    """Return the farthest positions in the given directions."""
     directions, starts = np.array(directions, dtype=float), np.array(starts)
     nu = starts[-1]
     free = np.ones(nu, dtype=bool) if free is None else np.array(free)
@@ -203,9 +205,7 @@ def moved(directions, starts, rows=(), free=None, positions=None):
 
 @pytest.mark.parametrize("size", [1e-6, 1.0, 1e6])
 def test_farthest_positions_in_discs_and_intervals_equal_closed_forms(size, rng):
-    """A linear function is largest at d / |d| on a disc, and at the sign on an
-    interval.
-    """
+    """The maximum of d.u is at d / |d| on a disc and at sign(d) on an interval."""
     directions = rng.normal(size=(6, 3)) + 0.1
     expected = np.column_stack([
         directions[:, :2] / np.linalg.norm(directions[:, :2], axis=1)[:, None],
@@ -216,12 +216,12 @@ def test_farthest_positions_in_discs_and_intervals_equal_closed_forms(size, rng)
 
 
 @pytest.mark.parametrize("length", [0.05, 0.4, 5.0])
-def test_contact_length_weighs_moments_against_forces(length):
-    """A pin with tilt t, and the platform on an arm L along x across its axis z.
+def test_contact_length_is_the_ratio_of_moments_to_forces(length):
+    """A pin along z with tilt clearance t has an arm of length L along x.
 
-    The moments at the pin are M_x and M_y - L F_z, of deviations 1 and
-    s = sqrt(1 + (L / length)^2).  Their direction is that of the tilt, so the platform
-    moves along z by L t |cos|, whose median is L t s / sqrt(1 + s^2).
+    The moments M_x and M_y - L F_z at the pin have standard deviations 1 and s = sqrt(1
+    + (L / length)^2). The tilt is parallel to the moment, so the median displacement of
+    the platform along z is L t s / sqrt(1 + s^2).
     """
     tilt = 2e-3
     prepared = linear_response(home_posture(arm(tilt=tilt)))

@@ -1,4 +1,4 @@
-"""Confidence intervals and modes against closed forms and confidence levels."""
+"""Point estimates and their confidence intervals."""
 
 from math import comb
 
@@ -15,8 +15,8 @@ from forcefit.assembly.statistics.estimates import (
 
 
 def test_mean_and_interval_of_three_numbers_equal_hand_calculation():
-    """1, 2, 4: mean 7/3, deviation sqrt(7/3), Student's t for two degrees of freedom
-    4.302653.
+    """The numbers 1, 2 and 4 have mean 7/3 and standard deviation sqrt(7/3). The 97.5 %
+    quantile of Student's t distribution with two degrees of freedom is 4.302653.
     """
     answer = mean([1.0, 2.0, 4.0])
     assert answer["value"] == pytest.approx(7 / 3, rel=1e-14)
@@ -28,8 +28,8 @@ def test_mean_and_interval_of_three_numbers_equal_hand_calculation():
 
 @pytest.mark.parametrize("level", [0.9, 0.95])
 @pytest.mark.parametrize("share", [0.2, 0.5, 0.9])
-def test_quantile_interval_follows_from_binomial_sums(share, level):
-    """Order statistics outside which at most (1 - level) / 2 lies on either side."""
+def test_quantile_interval_agrees_with_binomial_distribution(share, level):
+    """The probability of a quantile beyond either bound is at most (1 - level) / 2."""
     x, count = np.arange(40.0) ** 2, 40
     pmf = [comb(count, k) * share**k * (1 - share) ** (count - k) for k in range(41)]
     at_most = np.cumsum(pmf)
@@ -40,8 +40,8 @@ def test_quantile_interval_follows_from_binomial_sums(share, level):
     assert found["value"] == pytest.approx(np.quantile(x, share))
 
 
-def test_quantile_among_infinite_values_is_a_value_of_the_sample():
-    """Between 3 and infinity there is no midpoint, so the larger value is returned."""
+def test_quantile_of_infinite_values_is_not_interpolated():
+    """Between 3 and inf, interpolation is not possible, so inf is returned."""
     x = [1.0, 2.0, 3.0, np.inf, np.inf, np.inf]
     assert quantile(x, 0.5)["value"] == np.inf
     assert quantile(x, 0.3)["value"] == 3.0
@@ -49,8 +49,10 @@ def test_quantile_among_infinite_values_is_a_value_of_the_sample():
     assert quantile([1.0, 2.0, 3.0, 4.0], 0.5)["value"] == 2.5
 
 
-def test_interval_with_undecided_trials_covers_both_outcomes():
-    """Of 20: 12 held, 5 failed; the interval covers from 12 of 20 to 15 of 20."""
+def test_interval_of_undecided_trials_includes_both_outcomes():
+    """Of 20 trials, 12 succeeded, 5 failed and 3 are undecided. The interval includes
+    those for 12 and for 15 successes.
+    """
     found = bracketed(12, 5, 20, 0.9)
     assert (found["probability"], found["undecided"]) == (0.6, 3)
     assert found["lower"] == pytest.approx(proportion(12, 20, 0.9)["lower"])
@@ -59,8 +61,8 @@ def test_interval_with_undecided_trials_covers_both_outcomes():
 
 
 def densest(x, positive):
-    """Find the mode of a kernel density estimate on a fine grid, with Silverman's width
-    0.9 min(s, IQR / 1.349) n^(-1/5), reflected at zero if asked.
+    """Find the mode of a kernel density estimate on a fine grid. The width is 0.9
+    min(s, IQR / 1.349) n^(-1/5) according to Silverman.
     """
     low, high = np.quantile(x, [0.25, 0.75])
     width = 0.9 * min(x.std(), (high - low) / 1.349) * len(x) ** -0.2
@@ -72,8 +74,8 @@ def densest(x, positive):
 
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("positive", [False, True])
-def test_mode_equals_the_maximum_of_silverman_kernels(positive, seed):
-    """150 numbers with two peaks: the maximum depends on the kernel width."""
+def test_mode_equals_maximum_of_kernel_density_estimate(positive, seed):
+    """The sample of 150 numbers has two peaks, so the mode depends on the width."""
     rng = np.random.default_rng(seed)
     x = np.concatenate([rng.gamma(2.0, 1.0, 90), rng.normal(3.0, 0.7, 60)])
     x = np.abs(x) if positive else x

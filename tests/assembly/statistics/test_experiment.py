@@ -1,4 +1,4 @@
-"""Results of draws for two springs in series, and for an arm with pin clearance."""
+"""Results of random draws for two springs in series and for IRSBot-2."""
 
 from dataclasses import replace
 
@@ -18,18 +18,18 @@ STIFFNESS = 1e6  # [N/m]
 
 
 def springs(radial=PLAY, **options):
-    """Two bars of 0.5 m that meet on the x axis, with clearance between them."""
+    """Return an experiment on two coaxial bars of 0.5 m with a joint clearance."""
     play = Clearance(radial=radial)
     robot = coaxial_beams(np.zeros(6), (STIFFNESS, STIFFNESS), clearance=play)
     sources = tolerance_sources(robot, [0, 0, 0, 4e-4, 4e-4, 0], ("one", "two"))
     return Experiment(home_posture(robot), sources, **options)
 
 
-def test_draws_of_compressed_springs_have_closed_form_energy_force_and_moment():
-    """Beyond the clearance p of a gap d: k (d - p)^2 / 4, k (d - p) / 2, half of that.
+def test_energy_and_force_of_two_springs_equal_closed_forms():
+    """For a gap d larger than the clearance p, the energy is k (d - p)^2 / 4.
 
-    Both margins are d/p, because no joint is compliant; the energy is minimal to
-    machine precision.
+    The force is k (d - p) / 2, the moment is this force times 0.5 m, and both margins
+    are d/p.
     """
     experiment = springs()
     values = experiment.sources.draw(0, 40, seed=1)
@@ -52,8 +52,8 @@ def test_draws_of_compressed_springs_have_closed_form_energy_force_and_moment():
 
 
 @pytest.mark.parametrize("axis", range(3))
-def test_draws_of_relative_rotation_carry_a_moment_and_no_force(axis):
-    """Springs k of both ends, turned by d about an axis on their line: k d / 2."""
+def test_twisted_springs_transmit_a_moment_without_force(axis):
+    """Two torsion springs k in series, twisted by d, transmit the moment k d / 2."""
     experiment = springs(margins=False, clearance="least")
     widths = np.zeros(6)
     widths[axis] = 1e-3
@@ -68,8 +68,8 @@ def test_draws_of_relative_rotation_carry_a_moment_and_no_force(axis):
     np.testing.assert_allclose(rows["force"], 0.0, atol=1e-3)
 
 
-def test_draws_that_cannot_be_assembled_have_a_status_and_nan_results():
-    """Rigid parts without clearance fit only if both errors are equal."""
+def test_draws_that_cannot_be_assembled_have_nan_results():
+    """Rigid bodies without clearance can be assembled only if both errors are equal."""
     robot = rigid_pair()
     sources = tolerance_sources(robot, [0, 0, 0, 3e-4, 0, 0], ("one", "two"))
     rows = Experiment(home_posture(robot), sources, margins=False).evaluate(
@@ -81,7 +81,7 @@ def test_draws_that_cannot_be_assembled_have_a_status_and_nan_results():
     assert "margin" not in rows.dtype.names
 
 
-def test_stress_of_draws_equals_single_solutions_and_can_be_omitted(rng):
+def test_stress_of_draws_equals_single_solutions(rng):
     posture = place_robot(load_robot("irsbot2"), {"tx": 0.1, "tz": -0.5})
     robot = posture.robot
     sources = tolerance_sources(robot, [0, 0, 0, 2e-3, 0, 0])

@@ -1,8 +1,9 @@
-"""Fits of bores and bearings: hole and shaft have one clearance at both ends.
+"""Clearances of fits at the ends of bores and at bearings.
 
-12 H7/g6: hole 0 to 18 um, shaft -17 to -6 um over 12 mm, so the radial clearance is 3
-to 17.5 um, of uniform sizes 10.25 um with a deviation of sqrt(18^2 + 11^2)/sqrt(12)/2.
-8 H8/h7: 0 to 22 and -15 to 0 um, radial 0 to 18.5 um, on average 9.25 um.
+In 12 H7/g6, the deviations of the hole are 0 to 18 um and those of the shaft -17 to -6
+um. The radial clearance is 3 to 17.5 um, with a mean of 10.25 um and a standard
+deviation of sqrt((18^2 + 11^2)/12)/2. In 8 H8/h7, the deviations are 0 to 22 um and -15
+to 0 um. The radial clearance is 0 to 18.5 um, with a mean of 9.25 um.
 """
 
 import numpy as np
@@ -16,8 +17,8 @@ from forcefit.assembly.statistics.experiment import Experiment
 from forcefit.assembly.statistics.linear_response import linear_response
 from forcefit.assembly.statistics.monte_carlo import run_draws
 
-FIRST = np.sqrt((18.0**2 + 11.0**2) / 12) / 2 * 1e-6  # [m] deviation of 12 H7/g6
-SECOND = np.sqrt((22.0**2 + 15.0**2) / 12) / 2 * 1e-6  # [m] of 8 H8/h7
+FIRST = np.sqrt((18.0**2 + 11.0**2) / 12) / 2 * 1e-6  # [m] std. dev. of 12 H7/g6
+SECOND = np.sqrt((22.0**2 + 15.0**2) / 12) / 2 * 1e-6  # [m] std. dev. of 8 H8/h7
 SPINDLE = """
 format = 2
 platform = "shaft"
@@ -52,14 +53,16 @@ def drawn_rotations(robot):
     return run_draws(experiment, 400)["rotation"].values
 
 
-def test_worst_case_of_a_bore_with_a_fit_is_at_its_largest_clearance(tmp_path):
-    """2 c / L and, 200 mm above the middle, 2 c h / L with c = 17.5 um."""
+def test_worst_case_of_a_fit_has_the_largest_clearance(tmp_path):
+    """For c = 17.5 um, the rotation is 2 c / L. At h = 200 mm above the middle of the
+    bore, the translation is 2 c h / L.
+    """
     robot = spindle(tmp_path, BORE)
     assert worst(robot, "rotation").attained == pytest.approx(875e-6, rel=1e-6)
     assert worst(robot, "translation").attained == pytest.approx(175e-6, rel=1e-6)
 
 
-def test_commands_with_a_single_clearance_use_the_mean_clearance_of_a_bore(tmp_path):
+def test_nominal_clearance_of_a_fit_is_its_mean(tmp_path):
     fitted = spindle(tmp_path, BORE)
     stated = spindle(tmp_path, 'clearance = { radial = "10.25 um", length = "40 mm" }')
     assert [f.name for f in fitted.frames] == [f.name for f in stated.frames]
@@ -70,10 +73,11 @@ def test_commands_with_a_single_clearance_use_the_mean_clearance_of_a_bore(tmp_p
     assert '"bore" 12 H7/g6, 10.25 um of 3 to 17.5' in remark
 
 
-def test_both_ends_of_a_bore_have_the_same_drawn_clearance(tmp_path):
-    """Rotation 2 c / L has the deviation of c; independent ends would have 0.71 of it.
+def test_both_ends_of_a_bore_have_the_same_random_clearance(tmp_path):
+    """The rotation is 2 c / L, so its standard deviation is that of c times 2 / L.
 
-    Three standard errors of 400 draws are 4.5 % of the mean and 11 % of the deviation.
+    For 400 draws, three standard errors are 4.5 % of the mean and 11 % of the standard
+    deviation.
     """
     found = drawn_rotations(spindle(tmp_path, BORE)) * 0.04 / 2
     assert found.mean() == pytest.approx(10.25e-6, rel=0.045)
@@ -82,8 +86,10 @@ def test_both_ends_of_a_bore_have_the_same_drawn_clearance(tmp_path):
     assert found.max() < 17.5e-6 * (1 + 1e-3)
 
 
-def test_two_bearings_have_independent_fit_clearances(tmp_path):
-    """Rotation (c1 + c2) / 50 mm, of variance FIRST^2 + SECOND^2."""
+def test_two_bearings_have_independent_clearances(tmp_path):
+    """The rotation is (c1 + c2) / 50 mm, and c1 + c2 has the variance FIRST^2 +
+    SECOND^2.
+    """
     robot = spindle(tmp_path, BEARINGS)
     found = drawn_rotations(robot) * 0.05
     assert found.mean() == pytest.approx(10.25e-6 + 9.25e-6, rel=0.045)
@@ -95,7 +101,7 @@ def test_two_bearings_have_independent_fit_clearances(tmp_path):
 
 
 def test_worst_case_of_two_bearings_with_fits_equals_hand_calculation(tmp_path):
-    """Offsets 17.5 um at -20 mm and -18.5 um at 30 mm: 141.1 um at 200 mm."""
+    """Offsets of 17.5 um at -20 mm and -18.5 um at 30 mm add to 141.1 um at 200 mm."""
     robot = spindle(tmp_path, BEARINGS)
     slope = (17.5e-6 + 18.5e-6) / 0.05
     assert worst(robot, "rotation").attained == pytest.approx(slope, rel=1e-6)
@@ -103,15 +109,15 @@ def test_worst_case_of_two_bearings_with_fits_equals_hand_calculation(tmp_path):
     assert worst(robot, "translation").attained == pytest.approx(reach, rel=1e-6)
 
 
-def test_bearing_with_a_given_gap_has_the_same_gap_in_every_draw(tmp_path):
+def test_bearing_without_a_fit_has_a_constant_clearance(tmp_path):
     clearance = BEARINGS.replace('fit = "8 H8/h7"', 'radial = "5 um"')
     found = drawn_rotations(spindle(tmp_path, clearance)) * 0.05
     assert found.mean() == pytest.approx(15.25e-6, rel=0.045)
     assert found.std() == pytest.approx(FIRST, rel=0.11)
 
 
-def test_cylindrical_and_universal_joints_have_bores_with_fits(tmp_path):
-    """Tilts of 17.5 um / 40 mm and 18.5 um / 25 mm at most."""
+def test_cylindrical_and_universal_joints_accept_fits(tmp_path):
+    """The largest tilts are 17.5 um / 40 mm and 18.5 um / 25 mm."""
     slide = spindle(tmp_path, BORE, "cylindrical", "")
     (fit,) = sources_of(slide).fits
     assert fit.name == "fit 12 H7/g6 of bore.turn"
@@ -132,7 +138,7 @@ def test_cylindrical_and_universal_joints_have_bores_with_fits(tmp_path):
 
 
 @pytest.mark.parametrize("clearance", [BORE, BEARINGS])
-def test_fitted_contacts_are_preserved_in_a_file_of_frames(tmp_path, clearance):
+def test_fits_are_preserved_in_a_file_of_frames(tmp_path, clearance):
     robot = spindle(tmp_path, clearance)
     write_robot(robot, tmp_path / "frames.toml")
     again = read_robot(tmp_path / "frames.toml")
@@ -166,9 +172,7 @@ def test_fitted_contacts_are_preserved_in_a_file_of_frames(tmp_path, clearance):
         ('{ bearings = [{ z = 0 }, { z = 0.1, radial = 0 }] }', "[1].radial: missing"),
     ],
 )  # fmt: skip
-def test_mistake_in_a_fitted_contact_is_reported_in_one_line(
-    tmp_path, clearance, message
-):
+def test_invalid_fit_of_a_joint_is_rejected_with_one_line(tmp_path, clearance, message):
     with pytest.raises(BadInput) as error:
         spindle(tmp_path, f"clearance = {clearance}")
     assert message in str(error.value)
@@ -192,13 +196,14 @@ tolerance = [{ feature = "slot", datums = ["pin"], length = "100 +- 0.03 mm" }]
     ("clearance", "largest", "share"),
     [('fit = "12 H7/g6"', 17.5e-6, 10.25 / 30), ("radial = 12e-6", 12e-6, 0.4)],
 )
-def test_bolted_slot_assembles_if_its_clearance_covers_the_error(
+def test_yield_of_a_bolted_slot_equals_hand_calculation(
     write_file, clearance, largest, share
 ):
-    """A rigid plate closes only if the clearance c exceeds the error e of the length: e
-    is uniform up to 30 um, so the yield is the mean of c over 30 um.
+    """A rigid plate can be bolted only if the length error is smaller than the
+    clearance. The error is uniform up to 30 um, so the yield is the mean clearance
+    divided by 30 um.
 
-    Three standard errors of 500 draws are 0.066.
+    For 500 draws, three standard errors are 0.066.
     """
     robot = read_robot(write_file(BOLTED.replace("CLEARANCE", clearance)))
     sources = sources_of(robot)
@@ -233,7 +238,7 @@ frame = [
         ("length = 0.04", "length = -1", "clearance.length: found -1"),
     ],
 )
-def test_mistake_in_a_fitted_frame_is_reported_in_one_line(
+def test_invalid_fit_of_a_frame_is_rejected_with_one_line(
     write_file, old, new, message
 ):
     with pytest.raises(BadInput) as error:

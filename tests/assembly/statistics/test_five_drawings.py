@@ -1,6 +1,6 @@
-"""Five drawings: worst cases and standard deviations against hand calculation. Each
-formula is that of a bore within its zone, of a rotation times its lever arm, or of a
-contact gap times its lever arm, worked out without the program.
+"""Worst cases and standard deviations of five mechanisms with callouts. The expected
+values are hand calculations: tilts of bores within their zones, and rotations and gaps
+multiplied by lever arms.
 """
 
 import numpy as np
@@ -13,7 +13,7 @@ from forcefit.assembly.statistics.callout_sources import sources_of
 from forcefit.assembly.statistics.linear_response import linear_response
 from forcefit.assembly.statistics.tolerance_file import read_plan
 
-# a shaft in two bearings of a house; its front bore is coaxial with the seat
+# shaft in two bearings of a housing, with a coaxiality tolerance
 SHAFT = """
 format = 2
 platform = "shaft"
@@ -27,7 +27,7 @@ joint = [
     { name = "front", type = "revolute", between = ["house", "shaft"], at = [0, 0, "100 mm"], axis = [0, 0, 1], actuated = true, clearance = { bearings = [{ z = 0, fit = "20 H7/h6" }, { z = "60 mm", fit = "15 H7/h6" }] } },
 ]
 """  # noqa: E501
-# a block in a guide; the rail is positioned on its foot
+# block in a linear guide, with a position tolerance of the rail
 GUIDE = """
 format = 2
 platform = "block"
@@ -41,7 +41,7 @@ joint = [
     { name = "slide", type = "prismatic", between = ["rail", "block"], at = [0, 0, 0], axis = [0, 0, 1], actuated = true, clearance = { guide = { fit = "40 H7/g6", length = "80 mm", width = "40 mm", height = "30 mm" } } },
 ]
 """  # noqa: E501
-# a crank with the general tolerances of ISO 2768-mK; its second bore is square
+# crank with general tolerances ISO 2768-mK
 LINK = """
 format = 2
 platform = "tip"
@@ -55,7 +55,7 @@ joint = [
     { name = "elbow", type = "revolute", between = ["crank", "tip"], at = ["400 mm", 0, 0], axis = [0, 0, 1], actuated = true },
 ]
 """  # noqa: E501
-# a plate whose hole is measured from a side face that is out of square
+# plate with a hole and a side face as datum
 PLATE = """
 format = 2
 platform = "pin"
@@ -74,7 +74,7 @@ joint = [
     { name = "hole", type = "revolute", between = ["plate", "pin"], at = ["80 mm", 0, 0], axis = [0, 0, 1], actuated = true, clearance = { fit = "12 H7/g6", length = "20 mm" } },
 ]
 """  # noqa: E501
-# a bracket on a face A and a hole B at maximum material, with a bore C
+# bracket with a face A, a hole B at maximum material, and a bore C
 BRACKET = """
 format = 2
 platform = "rod"
@@ -92,20 +92,20 @@ joint = [
 
 
 def bore_variance(radius, length, height):
-    """Variance along x at a height: ends uniform in their discs."""
+    """Return the variance along x at a height above a bore with ends in discs."""
     return radius**2 * (1 / 8 + (height / length) ** 2 / 2)
 
 
 def grown_mean_square(radius, growth):
-    """Mean square of a radius that is uniform from smallest to largest hole."""
+    """Return the mean square of a radius that is uniformly distributed."""
     return ((radius + growth) ** 3 - radius**3) / (3 * growth)
 
 
-# [um] worst translation, [um] deviations along x, y and z (None: not by hand)
+# [um] worst translation and standard deviations along x, y and z
 um = 1e-6
 SHAFT_WORST = 10 * 2 * 200 / 15 + 17 * (200 / 60 - 1) + 14.5 * 200 / 60
 GUIDE_WORST = 25 + (200 - 40) * 30 / 80 + 25 * np.sqrt(2) * 2 * 200 / 80
-# hole and fit at the largest hole; the side face is 60 mm along y and 40 mm along z
+# offset of the hole and its fit at maximum size, and tilts of the side face
 PLATE_REACH = (34 + 17.5) * 2 * 60 / 20
 PLATE_TILTS = 25 / 20 * np.array([0, 1, 0]), 25 / 30 * np.array([0, 0, 1])
 PLATE_WORST = max(
@@ -113,7 +113,7 @@ PLATE_WORST = max(
     for moved in (np.cross(tilt, [80, 0, 60]) for tilt in PLATE_TILTS)
 )
 _GROWN = grown_mean_square(25, 9)
-_TILT = np.array([(25 / 20) ** 2, (25 / 30) ** 2]) / 6  # of a diamond: about y, z
+_TILT = np.array([(25 / 20) ** 2, (25 / 30) ** 2]) / 6  # about y and z, in a rhombus
 CASES = {
     "shaft": (SHAFT, SHAFT_WORST, [np.sqrt(bore_variance(10, 15, 200))] * 2 + [0]),
     "guide": (GUIDE, GUIDE_WORST, None),
@@ -128,7 +128,7 @@ CASES = {
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_worst_case_of_a_drawing_equals_hand_calculation(write_file, name):
+def test_worst_case_of_callouts_equals_hand_calculation(write_file, name):
     text, expected, _ = CASES[name]
     robot = read_robot(write_file(text))
     prepared = linear_response(home_posture(robot))
@@ -140,26 +140,27 @@ def test_worst_case_of_a_drawing_equals_hand_calculation(write_file, name):
 @pytest.mark.parametrize(
     "name", [n for n, case in CASES.items() if case[2] is not None]
 )
-def test_standard_deviations_of_a_drawing_equal_hand_calculation(write_file, name):
-    """The standard deviation of 200 000 draws is within 0.3 % of the true one."""
+def test_standard_deviations_of_callouts_equal_hand_calculation(write_file, name):
+    """For 200 000 draws, the error of the standard deviation is about 0.3 %."""
     text, _, expected = CASES[name]
     moved = translations(read_robot(write_file(text)))
     assert moved.std(axis=0) == pytest.approx(np.array(expected) * um, rel=0.006)
 
 
 def translations(robot):
-    """Translations of the platform for the drawn errors alone."""
+    """Return platform translations due to random errors, without clearances."""
     sources, prepared = sources_of(robot), linear_response(home_posture(robot))
     errors = sources.errors(sources.draw(0, 200_000, 3)).reshape(200_000, -1)
     return errors @ prepared.platform[3:].T
 
 
-def test_variance_of_a_bracket_is_the_sum_of_bore_and_datum_shift_variances(
+def test_variance_of_a_bracket_includes_the_datum_shift(
     write_file,
 ):
-    """Perpendicularity 0.02 in position 0.04 on 20 mm: an own sample of both ends in
-    their discs.  The tilt moves a point 200 mm away along z; the datum's shift of up
-    to 9 um adds 81/12 um^2 along x and y."""
+    """A bore of 20 mm length has position 0.04 mm and perpendicularity 0.02 mm. The
+    expected values are those of an independent sample of both ends in discs. The datum
+    shift of up to 9 um adds a variance of 81/12 um^2 along x and y.
+    """
     moved = translations(read_robot(write_file(BRACKET)))
     rng = np.random.default_rng(11)
     angle, radius = rng.uniform(0, 2 * np.pi, (2, 400_000)), rng.random((2, 400_000))
@@ -174,7 +175,7 @@ def test_variance_of_a_bracket_is_the_sum_of_bore_and_datum_shift_variances(
     )
 
 
-def test_callout_at_maximum_material_is_not_allocated(tmp_path, write_file):
+def test_tolerance_file_rejects_callouts_at_maximum_material(tmp_path, write_file):
     robot = read_robot(write_file(PLATE))
     plan = tmp_path / "plan.toml"
     plan.write_text(

@@ -1,4 +1,4 @@
-"""Sobol indices against the literature and closed forms."""
+"""Sobol indices of functions and of robots."""
 
 from dataclasses import replace
 
@@ -25,8 +25,8 @@ from forcefit.assembly.statistics.summary import summarise, summary_text
 from tests.tolerances_for_tests import arm
 
 
-def test_sobol_indices_of_ishigamis_function_equal_published_values():
-    """a = 7, b = 0.1 (Saltelli et al. 2008, p. 196), from its partial variances."""
+def test_sobol_indices_of_ishigami_function_equal_published_values():
+    """Parameters a = 7 and b = 0.1, see Saltelli et al. (2008), p. 196."""
 
     def ishigami(x):
         value = np.sin(x[:, 0]) * (1 + 0.1 * x[:, 2] ** 4) + 7 * np.sin(x[:, 1]) ** 2
@@ -39,24 +39,24 @@ def test_sobol_indices_of_ishigamis_function_equal_published_values():
     groups = [(str(i), np.array([i])) for i in range(3)]
     found = sobol_importance(ishigami, sample, groups, 20_000)
     first, total = [0.3139, 0.4424, 0.0], [0.5576, 0.4424, 0.2437]
-    for row in range(2):  # a scale and a shift change nothing
+    for row in range(2):  # the indices do not depend on scale and offset
         np.testing.assert_allclose(found.first[row, :, 0], first, atol=0.03)
         np.testing.assert_allclose(found.total[row, :, 0], total, atol=0.03)
     inside = (found.total[..., 1] <= total) & (total <= found.total[..., 2])
     assert inside.mean() >= 0.5
-    # variance 1/2 + a^2/8 + b pi^4/5 + b^2 pi^8/18 = 13.845
+    # The variance is 1/2 + a^2/8 + b pi^4/5 + b^2 pi^8/18 = 13.845.
     assert found.variance[0] == pytest.approx(13.845, rel=0.03)
 
 
 def additive(scale=1.0, shift=0.0):
-    """A design of 400 draws of three numbers, with the result 3 x + 2 y + z."""
+    """Return a design of 400 draws and the results 3 x + 2 y + z."""
     A, B = np.random.default_rng(4).normal(size=(2, 400, 3))
     design = SaltelliDesign(A, B, [(n, np.array([k])) for k, n in enumerate("xyz")])
     x = design.rows(0, len(design))
     return design, scale * (x @ [3.0, 2.0, 1.0])[:, None] + shift
 
 
-def test_sobol_indices_of_a_result_that_varies_only_by_round_off_are_nan():
+def test_sobol_indices_of_a_constant_result_are_nan():
     design, results = additive()
     rounded = 1e6 + 1e-8 * np.sign(results)
     found = sobol_indices(design, np.hstack([results, rounded, np.nan * results]))
@@ -66,8 +66,8 @@ def test_sobol_indices_of_a_result_that_varies_only_by_round_off_are_nan():
 
 
 @pytest.mark.slow
-def test_sobol_indices_without_clearance_equal_the_linear_closed_form():
-    """Without clearance, the platform screw is linear in the errors."""
+def test_sobol_indices_of_a_linear_robot_equal_closed_form():
+    """The platform screw is linear in the errors."""
     robot = load_robot("irsbot2")
     robot = replace(
         robot, frames=tuple(replace(f, clearance=None) for f in robot.frames)
@@ -82,7 +82,7 @@ def test_sobol_indices_without_clearance_equal_the_linear_closed_form():
         lambda values: one.solve(sources.errors(values)).platform_screw,
         lambda stream, k: sources.draw(0, k, 1, stream), groups, 4000,
     )  # fmt: skip
-    # 1 / sqrt(4000) is 0.016, and four of these
+    # Four standard errors are about 4 / sqrt(4000).
     np.testing.assert_allclose(found.first[..., 0], expected, atol=0.065)
     np.testing.assert_allclose(found.total[..., 0], expected, atol=0.065)
     slopes = one.screws[:, columns]
@@ -91,7 +91,7 @@ def test_sobol_indices_without_clearance_equal_the_linear_closed_form():
 
 
 def failing(x, share):
-    """A sum without a result where the last number, which it does not use, is small."""
+    """Return 4 a + b, or NaN if the third variable is small."""
     value = 2 * x[:, 0] + x[:, 1]
     return np.where(x[:, 2] < share, np.nan, value)[:, None]
 
@@ -103,20 +103,20 @@ def three(stream, k):
 THREE = [(str(i), np.array([i])) for i in range(3)]
 
 
-def test_few_failed_draws_are_omitted_and_counted():
-    """For 4 a + b, with shares 4/5 and 1/5, a draw of A, B or the mixed set fails."""
+def test_failed_draws_are_omitted_and_counted():
+    """The failures do not depend on a and b."""
     found = sobol_importance(lambda x: failing(x, 0.01), three, THREE, 8000)
     np.testing.assert_allclose(found.first[0, :, 0], [0.8, 0.2, 0.0], atol=0.05)
     np.testing.assert_allclose(found.total[0, :, 0], [0.8, 0.2, 0.0], atol=0.05)
-    # A and B fail apart; mixing the third number takes it from B, which is one of them
+    # A and B fail independently. For the third variable, the mixed draw fails with B.
     np.testing.assert_allclose(found.failed[0], 1 - 0.99**2, atol=0.006)
     assert np.isfinite(found.variance).all()
 
 
 @pytest.fixture(scope="module")
 def stiff():
-    """A platform on two springs of 9e6 and 1e6 N/m, which follows errors by 0.9 and
-    0.1.
+    """Return a platform on two springs of 9e6 and 1e6 N/m. It moves by 0.9 and 0.1
+    times their errors.
     """
     frames = (
         Frame("one", translation=[0.5, 0, 0], link=MatrixLink(np.eye(6) * 9e6)),
@@ -128,8 +128,10 @@ def stiff():
     return Experiment(home_posture(robot), sources)
 
 
-def test_importance_table_states_platform_motion_per_um_of_error(stiff):
-    """Gains of 0.9 and 0.1 um per um, and parts of 1e-5 / sqrt(3) times these."""
+def test_importance_table_contains_gains_in_um_per_um(stiff):
+    """The gains are 0.9 and 0.1. The parts are the gains times the standard deviation
+    1e-5 / sqrt(3).
+    """
     data = run_draws(stiff, 50, importance=ImportanceOptions(3000, "source"))
     said = summarise(data)
     report = said["importance"]["platform"]
@@ -145,10 +147,9 @@ def test_importance_table_states_platform_motion_per_um_of_error(stiff):
     assert float(gain) == pytest.approx(0.9, rel=0.05)
 
 
-def test_random_clearance_does_not_change_the_importance_of_errors():
-    """A driven arm has a clearance disc of 0.1 mm at its pin, and its tip follows its
-    error. The gain is 1 um per um in every model, although clearance alone moves the
-    tip by 100 um.
+def test_importance_of_errors_does_not_depend_on_clearance_model():
+    """The gain of an error at the tip of an arm is 1 in every clearance model, although
+    the pin clearance of 0.1 mm moves the tip.
     """
     robot = arm(radial=1e-4)
     sources = tolerance_sources(robot, [0, 0, 0, 1e-6, 0, 0], ("tip",))
@@ -165,7 +166,7 @@ def test_random_clearance_does_not_change_the_importance_of_errors():
         assert said["importance"]["clearance"] == expected
 
 
-def test_groups_by_kind_combine_the_legs():
+def test_groups_by_kind_include_all_legs():
     robot = load_robot("irsbot2")
     sources = tolerance_sources(robot, [1e-3, 0, 0, 1e-4, 0, 0])
     names = [name for name, _ in source_groups(sources, "kind")]
@@ -175,8 +176,8 @@ def test_groups_by_kind_combine_the_legs():
         source_groups(sources, "leg")
 
 
-def test_linear_shares_are_squared_slopes_times_variances(stiff):
-    """Uniform errors within 1 and 2: variances in the ratio 1 to 4."""
+def test_linear_importance_equals_squared_slopes_times_variances(stiff):
+    """Uniform errors within 1 and 2 have variances in the ratio 1 : 4."""
     limits = stiff.sources.limit * 0 + [1.0, 2.0]
     sources = replace(stiff.sources, scale=limits, least=0 * limits, centre=0 * limits)
     slopes = np.array([[3.0, 1.0], [0.0, 5.0]])

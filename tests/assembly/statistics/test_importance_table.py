@@ -1,4 +1,4 @@
-"""Importance of errors against lever arms, known indices and central differences."""
+"""Importance of errors: indices, parts, gains and ranks."""
 
 import numpy as np
 import pytest
@@ -35,14 +35,14 @@ NAMES = ["tip.RX", "tip.TX", "tip.TY"]
 
 
 def driven_arm(**options):
-    """A driven arm whose tip follows its errors of an angle and two lengths."""
+    """Return a driven arm with one angular error and two length errors."""
     robot = arm()
     sources = tolerance_sources(robot, WIDTHS, ("tip",))
     return Experiment(home_posture(robot), sources, margins=False, **options)
 
 
 def solved(by="source", draws=400, **options):
-    """The data set of an arm without clearance, and its plain values."""
+    """Return the importance for an arm, as a data set and as a dictionary."""
     experiment = driven_arm(clearance="least", **options)
     design = importance_design(experiment, ImportanceOptions(draws, by))
     rows = importance_rows(experiment, design, 0, len(design))
@@ -50,10 +50,9 @@ def solved(by="source", draws=400, **options):
     return data, importance_report(data)
 
 
-def test_platform_that_follows_each_error_has_gains_of_one():
-    """A uniform error of half width w, and hence the platform, has the standard
-    deviation w / sqrt(3), which 400 draws determine to 4 %. A gain is a slope and does
-    not depend on the draws.
+def test_gain_of_each_error_of_an_open_chain_is_one():
+    """A uniform error of half width w has the standard deviation w / sqrt(3), which 400
+    draws estimate to 4 %. Gains are exact.
     """
     data, report = solved()
     assert list(data["group"].values) == NAMES
@@ -69,15 +68,15 @@ def test_platform_that_follows_each_error_has_gains_of_one():
     assert (report["base_draws"], report["clearance"]) == (400, "least")
     quantities = report["quantities"]
     assert set(quantities) == {"energy", "rotation", "translation", "force"}
-    # an open chain is never pressed
+    # The energy of an open chain is zero.
     assert quantities["energy"]["reason"] == "it does not vary"
     assert "reason" not in quantities["translation"]
     total = quantities["rotation"]["total_index"]
     assert [total[name][0] for name in NAMES] == pytest.approx([1, 0, 0], abs=0.15)
 
 
-def test_group_of_angles_and_lengths_has_a_standard_deviation_but_no_gain():
-    """The part of a frame is the root sum of squares of the parts of its errors."""
+def test_group_of_angles_and_lengths_has_no_gain():
+    """The part of a frame is the root of the sum of squares of its errors' parts."""
     data, report = solved("frame")
     (one,) = report["platform"].values()
     assert one["error_unit"] == "rad, m"
@@ -88,10 +87,8 @@ def test_group_of_angles_and_lengths_has_a_standard_deviation_but_no_gain():
     assert data["part"].sel(component="rotation").item() == one["rotation_part"]
 
 
-def test_draws_without_a_solution_are_reported_with_the_reason():
-    """At most 5 % may be omitted; beyond that, the remaining draws are not
-    independent.
-    """
+def test_missing_indices_are_reported_with_a_reason():
+    """No indices are reported if more than 5 % of the draws are omitted."""
     experiment = driven_arm(clearance="least")
     design = importance_design(experiment, ImportanceOptions(100, "source"))
     rows = importance_rows(experiment, design, 0, len(design))
@@ -112,16 +109,15 @@ def test_draws_without_a_solution_are_reported_with_the_reason():
         assert "more than 5% of the draws have no solution: up to 6" in one["reason"]
         assert f"translation: {one['reason']}" in lines
         assert all(np.isnan(v).all() for v in one["total_index"].values())
-        # no part of a platform that is not known
+        # The parts are NaN.
         parts = [v["translation_part"] for v in report["platform"].values()]
         assert np.isnan(parts).all()
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_gain_of_a_rotation_error_equals_its_lever_arm(seed):
-    """A rotation of the pin moves a tip 0.4 m away by 0.4 um per urad, along y or z.
-    The tip does not move along x, so the gain of RX is 0 in translation and 1 in
-    rotation.
+    """A rotation of the pin about y or z moves the tip at a distance of 0.4 m by 0.4 um
+    per urad. A rotation about x does not move the tip.
     """
     robot = arm()
     sources = tolerance_sources(robot, [1e-3, 2e-3, 3e-3, 0, 0, 0], ("pin",))
@@ -132,8 +128,10 @@ def test_gain_of_a_rotation_error_equals_its_lever_arm(seed):
     np.testing.assert_allclose(translation, [0.0, 0.4, 0.4], atol=1e-12)
 
 
-def test_gain_of_a_group_is_the_root_mean_square_weighted_by_variance():
-    """RY at the pin (lever 0.4) and at the tip (none), deviations 1 and 2."""
+def test_gain_of_a_group_is_weighted_by_variance():
+    """RY at the pin has a lever arm of 0.4 m, and RY at the tip has none. Their
+    standard deviations are in the ratio 1 : 2.
+    """
     robot = arm()
     pin = tolerance_sources(robot, [0, 1e-3, 0, 0, 0, 0], ("pin", "tip"))
     pin.scale[1] *= 2.0
@@ -154,10 +152,8 @@ def test_gain_of_a_group_is_the_root_mean_square_weighted_by_variance():
         ("five_bar", [0, 0, 0, 20.0, -10.0, 0]),
     ],
 )
-def test_platform_slopes_equal_central_differences_also_under_load(name, load, rng):
-    """Differences of the screws from problem (22), with springs loaded by errors or
-    loads.
-    """
+def test_platform_slopes_equal_central_differences(name, load, rng):
+    """The robots are loaded by errors or by external loads."""
     robot = load_robot(name)
     pose = {"tx": 0.1, "tz": -0.5} if name == "irsbot2" else None
     posture = place_robot(robot, pose=pose) if pose else home_posture(robot)
@@ -178,9 +174,9 @@ def shares(**intervals):
     return {name: ((a + b) / 2, a, b) for name, (a, b) in intervals.items()}
 
 
-def test_overlapping_intervals_share_ranks():
-    """The intervals of a and b overlap, as do b and c, but a and c do not; d is last
-    for certain.
+def test_overlapping_intervals_have_common_ranks():
+    """The intervals of a and b overlap, and so do those of b and c, but not those of a
+    and c. The interval of d is below all others.
     """
     ranks = possible_ranks(
         shares(a=(0.5, 0.7), b=(0.4, 0.6), c=(0.3, 0.45), d=(0.0, 0.1))
@@ -190,7 +186,7 @@ def test_overlapping_intervals_share_ranks():
     assert [rank_text(ranks[k]) for k in "abd"] == ["1-2", "1-3", "4"]
 
 
-def test_shares_that_could_not_be_computed_have_no_rank():
+def test_nan_shares_have_no_rank():
     nan = float("nan")
     ranks = possible_ranks(shares(a=(0.5, 0.7)) | {"b": (nan, nan, nan)})
     assert ranks == {"a": (1, 1)}
@@ -198,11 +194,11 @@ def test_shares_that_could_not_be_computed_have_no_rank():
     assert possible_ranks({}) == {}
 
 
-def test_legs_with_equal_shares_are_reported_as_all_legs():
+def test_names_of_all_legs_are_merged():
     every = [f"leg{i}.hinge.{c}" for i in (1, 2, 3) for c in ("RX", "RY")]
     some = ["leg3.hinge.RX", "leg1.hinge.RX", "leg2.hinge.RX"]
     assert named_together(some, every) == ["hinge.RX of all legs"]
-    # one leg is surely not among them: the two others by their names
+    # If one leg is missing, the other legs keep their names.
     assert named_together(some[:2], every) == some[:2]
     assert named_together(["leg1.hinge.RY", *some], every) == [
         "leg1.hinge.RY",
@@ -210,14 +206,14 @@ def test_legs_with_equal_shares_are_reported_as_all_legs():
     ]
 
 
-def test_error_of_a_robot_without_legs_is_reported_by_its_name():
+def test_names_without_a_leg_are_not_merged():
     assert named_together(["tip.RX"], ["tip.RX", "tip.RY"]) == ["tip.RX"]
     assert kind_of("tip.RX") == "tip.RX"
     assert kind_of("leg1.upper.pin.TZ") == "upper.pin.TZ"
     assert kind_of("leg1.hinge") == "hinge"
 
 
-def test_sentence_states_no_share_beyond_the_whole_variance():
+def test_shares_in_a_sentence_are_at_most_100_percent():
     few = [("bore", (0.78, 0.3, 1.63)), ("pin", (0.01, -0.02, 0.02))]
     assert shares_sentence(few, "translation") == (
         "bore: 78 % of the variance of the translation (30 to 100 %); "

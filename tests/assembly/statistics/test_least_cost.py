@@ -1,4 +1,4 @@
-"""Minimum cost within limits: a known corner, and limits that cannot be met."""
+"""Minimum-cost tolerances for given limits."""
 
 from types import SimpleNamespace
 
@@ -14,7 +14,7 @@ from tests.tolerances_for_tests import silent
 
 
 class Sums:
-    """Limits on sums of sizes of three errors, of two classes."""
+    """Requirement on two sums of error sizes."""
 
     weights = np.array([[4.0, 0.5, 0.5], [1.0, 1.0, 1.0]])
     cases = [(0, 0), (1, 0)]
@@ -35,10 +35,8 @@ class Sums:
 CORNERS = Samples(np.array([[1.0, -1, 1], [-1, -1, 1]]), 0)
 
 
-def test_minimum_cost_of_two_crossing_limits_is_at_their_intersection():
-    """4 t1 + t2 <= 1 and t1 + 2 t2 <= 1 intersect at (1/7, 3/7), where c/t is
-    minimal.
-    """
+def test_minimum_cost_of_two_limits_is_at_their_intersection():
+    """The limits 4 t1 + t2 = 1 and t1 + 2 t2 = 1 intersect at (1/7, 3/7)."""
     t, _ = least_cost(Sums(), CORNERS, np.array([1.0, 1.0]), silent)
     np.testing.assert_allclose(t, [1 / 7, 3 / 7], rtol=5e-3)
 
@@ -49,21 +47,21 @@ NONE, LOOSE = np.zeros(3), np.full(3, 1e3)
 
 
 def plan(limits):
-    """Three classes of three errors."""
+    """Return a plan with three classes of errors."""
     return Plan(None, np.arange(3), ("a", "b", "c"), COSTS, NONE, LOOSE, limits)
 
 
-def test_smallest_tolerances_beyond_a_plane_are_rejected():
+def test_infeasible_smallest_tolerances_are_rejected():
     with pytest.raises(BadInput) as error:
         cheapest_within(plan({}), [PLANE], np.array([0.0, 0.21, 0.0]), LOOSE)
     assert str(error.value) == (
-        "tolerances: even the smallest allowed tolerances violate a limit; loosen the "
+        "tolerances: even the smallest allowed tolerances exceed a limit; increase the "
         "limit or allow smaller tolerances"
     )
 
 
 class Exceeded:
-    """A limit of 2 that perfect parts exceed: the worst corner is 2.1 and a sum."""
+    """Requirement whose limit of 2 is exceeded without errors."""
 
     plan, convex = plan({"a": 2.0}), {"a": [None]}
 
@@ -72,7 +70,7 @@ class Exceeded:
         return SimpleNamespace(value=2.1 + row @ t, slopes=row, signs=np.ones(3))
 
 
-def test_limit_exceeded_by_perfect_parts_is_rejected():
+def test_limit_exceeded_without_errors_is_rejected():
     with pytest.raises(
         BadInput, match="^even a robot without .* exceeds a limit of 2;"
     ):

@@ -1,6 +1,4 @@
-"""Many draws of errors at one posture: properties, and comparison with single
-solutions.
-"""
+"""Solutions for many draws of errors at one posture."""
 
 from dataclasses import replace
 
@@ -21,9 +19,8 @@ LOAD, GRAVITY = [1.0, 2.0, 3.0, 30.0, 10.0, -100.0], [1.0, 2.0, -9.81]
 
 
 def assert_equal_single_solutions(posture, errors, *loads):
-    """Both certify the energy to 1e-8, so wrenches agree to about its square root,
-    1e-4. Under a load, the certificate compares the energy without the work of the
-    load.
+    """Check that solutions agree. Energies are certified to 1e-8, so wrenches agree to
+    about 1e-4.
     """
     found = linear_response(posture, *loads).solve(errors)
     wrenches = found.wrenches
@@ -51,7 +48,7 @@ def assert_equal_single_solutions(posture, errors, *loads):
     [(0.2, None, None), (1.0, None, None), (10.0, None, None), (4.0, LOAD, None),
      (4.0, LOAD, GRAVITY)],
 )  # fmt: skip
-def test_draws_equal_single_solutions(name, scale, load, gravity):
+def test_solutions_of_draws_equal_single_solutions(name, scale, load, gravity):
     robot = load_robot(name)
     errors = drawn_errors(robot, scale)
     assert_equal_single_solutions(place_robot(robot), errors, load, gravity)
@@ -61,7 +58,7 @@ def test_draws_equal_single_solutions(name, scale, load, gravity):
     ("seed", "load"), [*((k, None) for k in range(20)), *((k, LOAD) for k in range(6))]
 )
 def test_draws_of_random_robots_equal_single_solutions(seed, load):
-    """The robots include rigid rows, limited joints and parts that stay open."""
+    """Some of the robots have rigid loops, joint limits or loops that cannot close."""
     robot = random_robot(np.random.default_rng(seed))
     posture = place_robot(robot)
     draws = np.random.default_rng(seed + 100).normal(size=(4, len(robot.frames), 6))
@@ -82,10 +79,8 @@ def test_errors_of_a_wrong_shape_are_rejected():
         prepare_margins(posture).solve(np.full((1, 8, 6), np.nan))
 
 
-def test_margins_are_proportional_to_the_errors_and_convex():
-    """By Euler's theorem, slope . errors is the margin; the margin of a mean is at most
-    the mean.
-    """
+def test_margin_is_convex_and_proportional_to_errors():
+    """By Euler's theorem, the product of derivatives and errors is the margin."""
     robot = load_robot("irsbot2")
     errors = drawn_errors(robot, count=40)
     ready = prepare_margins(place_robot(robot), "free")
@@ -93,7 +88,7 @@ def test_margins_are_proportional_to_the_errors_and_convex():
     work = (ready.slopes(found) * errors).sum(axis=(1, 2))
     np.testing.assert_allclose(work, found.margin, rtol=1e-8)
     halves = ready.solve((errors[:20] + errors[20:]) / 2)
-    # bounds lie below the least factor, margins above it; both by less than 1e-8
+    # The margins are certified by lower bounds to 1e-8.
     assert (halves.bound <= (found.margin[:20] + found.margin[20:]) / 2).all()
     np.testing.assert_allclose(halves.bound, halves.margin, rtol=1e-8)
     np.testing.assert_allclose(ready.solve(3 * errors).margin, 3 * found.margin, 1e-8)
@@ -113,8 +108,8 @@ def test_margins_of_draws_of_random_robots_equal_single_solutions(seed):
             assert found.margin[i] == pytest.approx(zone.margin, rel=1e-6)
 
 
-def test_errors_that_cannot_be_closed_have_infinite_compiled_margins():
-    """A planar four-bar whose coupler is out of plane by more than round-off."""
+def test_margin_is_infinite_if_loops_cannot_close():
+    """The coupler of a planar four-bar linkage is out of plane."""
     robot = load_robot("four_bar")
     tight = tuple(replace(f, clearance=None) for f in robot.frames)
     robot = replace(robot, frames=tight)

@@ -1,4 +1,4 @@
-"""Draws of errors under loads and own weight."""
+"""Random errors of robots under loads and weight."""
 
 import json
 from dataclasses import replace
@@ -26,14 +26,14 @@ LOAD = [1.0, 2.0, 3.0, 30.0, 10.0, -100.0]
 
 
 def cantilever():
-    """A steel bar of 1 m length and 20 mm diameter, clamped at one end."""
+    """Return a steel bar of 1 m length and 20 mm diameter, clamped at one end."""
     bar = BeamLink({"radius": 0.01}, 200e9, 0.3, theory="euler")
     frames = (Frame("tip", translation=[1.0, 0, 0], link=bar),)
     return home_posture(Robot("bar", "tip", frames))
 
 
-def test_draws_of_a_loaded_cantilever_have_the_textbook_energy_and_stress():
-    """Energy F^2 L^3 / 6 E I, root moment F L, and stress F L / W."""
+def test_energy_and_stress_of_a_cantilever_equal_textbook_values():
+    """The energy is F^2 L^3 / 6 E I, the moment is F L, and the stress is F L / W."""
     posture, F = cantilever(), 100.0
     sources = tolerance_sources(posture.robot, [1e-3] * 3 + [1e-4] * 3)
     load = (0.0, 0.0, 0.0, 0.0, 0.0, -F)
@@ -48,8 +48,8 @@ def test_draws_of_a_loaded_cantilever_have_the_textbook_energy_and_stress():
 
 @pytest.mark.parametrize("play", ["uniform", "contact"])
 @pytest.mark.parametrize("load", [[0, 0, 0, 0, 0, -1], [0, 0, 0, 1, 0, 0]])
-def test_motion_of_unloaded_clearances_does_no_work_on_the_load(play, load):
-    """Otherwise, the minimum of energy minus work would have used them."""
+def test_load_does_no_work_for_motions_within_clearances(play, load):
+    """Otherwise, a lower value of energy minus work would exist."""
     robot = load_robot("3rrr")
     one = linear_response(home_posture(robot), load)
     found = one.solve(drawn_errors(robot, 4.0) / 50)
@@ -61,7 +61,7 @@ def test_motion_of_unloaded_clearances_does_no_work_on_the_load(play, load):
     assert np.abs(moved @ load).max() < 1e-9 * np.abs(moved).max()
 
 
-def test_draws_under_a_load_on_a_free_motion_are_rejected():
+def test_random_errors_with_a_load_on_a_free_motion_are_rejected():
     frames = (
         Frame("pin", joint="revolute"),
         Frame("tip", "pin", translation=[0.3, 0, 0]),
@@ -74,9 +74,7 @@ def test_draws_under_a_load_on_a_free_motion_are_rejected():
 
 
 def test_statistics_command_applies_load_and_gravity(tmp_path):
-    """A load a hundred times larger exceeds a force limit that the smaller
-    load meets.
-    """
+    """A force limit is satisfied for a small load and exceeded for a large load."""
     robot = cantilever().robot
     write_robot(robot, tmp_path / "bar.toml")
     (tmp_path / "errors.toml").write_text(
@@ -97,8 +95,8 @@ def test_statistics_command_applies_load_and_gravity(tmp_path):
 
 
 @pytest.mark.parametrize("load", [None, LOAD])
-def test_drawn_errors_replace_the_errors_of_the_robot(load):
-    """A robot with errors and one without give the same results for the same draws."""
+def test_random_errors_replace_errors_in_the_robot_file(load):
+    """The results do not depend on the errors in the robot file."""
     robot = load_robot("irsbot2")
     posture, errors = place_robot(robot), drawn_errors(robot, 4.0, 2)
     own = replace(posture, robot=robot.with_errors(0.5 * errors[::-1][0]))
@@ -110,8 +108,9 @@ def test_drawn_errors_replace_the_errors_of_the_robot(load):
 
 
 def test_load_and_error_together_move_a_joint_to_its_limit():
-    """A pin limited to L against a spring K rotates by M / K less the error. For M = K
-    L, errors of -L / 2 or L / 2 leave it free or at its bound.
+    """Under the moment M, a pin with motion limit L and spring K rotates by M / K minus
+    the error. For M = K L and errors of -L / 2 or L / 2, it is at its limit or within
+    it.
     """
     L, K = 1e-3, 2e4
     robot = Robot("pin", "end", (
@@ -125,16 +124,16 @@ def test_load_and_error_together_move_a_joint_to_its_limit():
     errors[:, 0, 2] = 0.5 * L, -0.5 * L
     found = linear_response(home_posture(robot), load).solve(errors)
     assert found.method.tolist() == ["compiled", "compiled"]
-    # the spring turns by L, or with the pin at its bound by L - L / 2
+    # The spring rotates by L or, with the pin at its limit, by L / 2.
     expected = K * np.array([L, 0.5 * L]) ** 2 / 2
     assert found.energy == pytest.approx(expected, rel=1e-6)
     assert found.platform_screw[:, 2] == pytest.approx([L, 0.5 * L], rel=1e-6)
-    # energies without the work are compared in the certificate
+    # The certificate refers to the energy without the work of the load.
     assert (found.duality_gap() < 1e-8 * found.energy).all()
 
 
-def test_load_resisted_only_by_a_motion_limit_moves_every_draw_to_the_limit():
-    """A link of stiffness K on a pin with motion L turns by L and M / K."""
+def test_load_moves_a_free_joint_to_its_motion_limit():
+    """A link of stiffness K on a pin with motion limit L rotates by L + M / K."""
     L, K, M = 1e-3, 2e4, 20.0
     robot = Robot("pin", "end", (
         Frame("pin", joint="revolute", clearance=Clearance(spin=L)),

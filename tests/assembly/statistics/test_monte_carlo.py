@@ -1,4 +1,4 @@
-"""Monte Carlo runs: complete, interrupted, resumed and threaded, and their commands."""
+"""Monte Carlo runs that are interrupted and resumed, and the commands for them."""
 
 import json
 import subprocess
@@ -52,7 +52,7 @@ def experiment():
 def test_killed_run_resumes_and_writes_the_same_file(
     experiment, monkeypatch, tmp_path, at
 ):
-    """The run is killed during its 100 draws and again during the importance."""
+    """The run is killed once during the draws and once during the importance."""
     monkeypatch.setattr(monte_carlo, "BLOCK", 64)
     groups = ImportanceOptions(16, "kind")
     path, whole = tmp_path / "draws.nc", tmp_path / "whole.nc"
@@ -75,7 +75,7 @@ def test_killed_run_resumes_and_writes_the_same_file(
 
 @pytest.mark.slow
 def test_repeatedly_killed_command_resumes_and_writes_the_same_file(tmp_path):
-    """SIGKILL after increasing times; finished results are never recomputed."""
+    """The process receives SIGKILL after increasing times."""
     limits = "margin_free = 2.0\ntranslation = 8e-4"
     plan = "yield = 0.9\ndraws = 200\n" + PLAN.replace("margin_free = 1.0", limits)
     (tmp_path / "plan.toml").write_text(plan)
@@ -96,7 +96,7 @@ def test_repeatedly_killed_command_resumes_and_writes_the_same_file(tmp_path):
         except subprocess.TimeoutExpired:
             process.kill()
             process.wait()
-        if path.exists():  # killed once it was written, perhaps
+        if path.exists():  # the process may have finished
             break
     assert path.read_bytes() == whole
 

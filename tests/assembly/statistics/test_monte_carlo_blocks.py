@@ -1,4 +1,4 @@
-"""Monte Carlo runs in blocks, their identity, and stored results of a killed run."""
+"""Blocks, provenance and journals of Monte Carlo runs."""
 
 from dataclasses import replace
 
@@ -18,7 +18,7 @@ from tests import tolerances_for_tests
 
 @pytest.fixture(scope="module")
 def arm():
-    """A driven arm whose tip has errors in three directions."""
+    """Return a driven arm with position errors of its tip."""
     robot = tolerances_for_tests.arm()
     sources = tolerance_sources(robot, [0, 0, 1e-3, 1e-4, 1e-4, 0], ("tip",))
     return Experiment(place_robot(robot), sources, clearance="least", margins=False)
@@ -26,7 +26,7 @@ def arm():
 
 @pytest.mark.parametrize("workers", [1, 2])
 def test_block_size_and_workers_do_not_change_the_draws(arm, monkeypatch, workers):
-    """21 draws and the 20 rows of a design, in one block and in blocks of 4."""
+    """The runs have 21 draws and 20 rows of a design."""
     asked = ImportanceOptions(4, "source", 0.5)
     whole = run_draws(arm, 21, importance=asked)
     monkeypatch.setattr(monte_carlo, "BLOCK", 4)
@@ -40,7 +40,7 @@ def test_block_size_and_workers_do_not_change_the_draws(arm, monkeypatch, worker
 
 
 def test_killed_run_resumes_with_another_confidence_level(arm, tmp_path):
-    """The same rows are solved; a different number of rows is rejected."""
+    """A different number of base draws is rejected."""
 
     def kill(done, total):
         if done:
@@ -68,7 +68,7 @@ def test_killed_run_resumes_with_another_confidence_level(arm, tmp_path):
     ],
 )  # fmt: skip
 def test_runs_with_different_options_have_different_provenance(arm, change):
-    """Only the changed option differs; equal runs have equal provenance."""
+    """Equal runs have equal provenance."""
     before, after = provenance(arm), provenance(replace(arm, **change))
     assert before == provenance(replace(arm))
     (name,) = change
@@ -91,11 +91,11 @@ def test_runs_with_different_errors_or_postures_have_different_hashes(arm):
 
 
 class Killed(Exception):
-    """What ends a computation."""
+    """Exception that interrupts a computation."""
 
 
 def run(path, values, computed, stop=None, whose="mine"):
-    """Compute squares and doubles of values one after another; list those computed."""
+    """Return squares and doubles of values, and the values that were computed."""
 
     def both(x):
         computed.append(x)

@@ -1,6 +1,4 @@
-"""Perfect parts: clearances against hand calculation, and limits exceeded by
-clearances.
-"""
+"""Results without geometric errors: contributions of clearances and loads."""
 
 import numpy as np
 import pytest
@@ -28,9 +26,9 @@ def experiment(robot, **options):
     return Experiment(home_posture(robot), sources, margins=False, **options)
 
 
-def test_clearance_shares_of_a_pin_sum_to_the_largest_error():
-    """The disc r is perpendicular to L t, so the error is hypot(r, L t) with parts r^2
-    and (L t)^2.
+def test_clearance_contributions_of_a_pin_sum_to_the_largest_error():
+    """The displacements r and L t are perpendicular, so the error is hypot(r, L t) with
+    contributions in the ratio r^2 : (L t)^2.
     """
     parts = perfect_parts(experiment(arm(radial=RADIAL, tilt=TILT)))
     largest = np.hypot(RADIAL, ARM * TILT)
@@ -43,8 +41,8 @@ def test_clearance_shares_of_a_pin_sum_to_the_largest_error():
     assert parts["rotation"]["clearances"] == pytest.approx({"pin.tilt": TILT})
 
 
-def test_clearance_of_a_ball_adds_to_the_tilt_of_its_pin():
-    """Both have the same direction, with parts b and L t."""
+def test_parallel_displacements_of_ball_and_pin_add_up():
+    """Both displacements are parallel, so the contributions are b and L t."""
     translation = perfect_parts(experiment(arm(ball=RADIAL, tilt=TILT)))["translation"]
     by_kind = translation["clearances"]
     assert translation["reached"] == pytest.approx(RADIAL + ARM * TILT, abs=2e-6)
@@ -53,8 +51,8 @@ def test_clearance_of_a_ball_adds_to_the_tilt_of_its_pin():
 
 
 @pytest.mark.parametrize("name", ["irsbot2", "delta", "hexapod"])
-def test_clearance_shares_of_a_closed_loop_sum_to_the_largest_error(name):
-    """Euler's sum for a homogeneous function, for any closures."""
+def test_clearance_contributions_of_a_loop_sum_to_the_largest_error(name):
+    """The largest error is a homogeneous function of the clearances."""
     robot = load_robot(name)
     pose = {"tx": 0.1, "tz": -0.5} if name == "irsbot2" else None
     posture = place_robot(robot, pose=pose) if pose else home_posture(robot)
@@ -65,10 +63,8 @@ def test_clearance_shares_of_a_closed_loop_sum_to_the_largest_error(name):
         assert total == pytest.approx(parts[key]["reached"], rel=5e-3)
 
 
-def test_perfect_parts_include_the_displacement_under_load():
-    """5 N along y press the pin against its rim: displacement of its radius,
-    force 5 N.
-    """
+def test_results_without_errors_include_displacement_under_load():
+    """A force of 5 N along y moves the pin by its radial clearance."""
     parts = perfect_parts(experiment(arm(radial=RADIAL), load=(0, 0, 0, 0, 5.0, 0)))
     assert parts["translation"]["reached"] == pytest.approx(RADIAL, rel=1e-6)
     assert parts["force"]["reached"] == pytest.approx(5.0)
@@ -76,10 +72,8 @@ def test_perfect_parts_include_the_displacement_under_load():
 
 
 @pytest.mark.parametrize("limit", [5e-4, 2e-3])
-def test_advice_names_the_clearances_if_perfect_parts_exceed_the_limit(
-    tmp_path, run, limit
-):
-    """Clearances alone move the tip by 0.806 mm; the errors are of 1 um."""
+def test_advice_names_clearances_that_exceed_the_limit(tmp_path, run, limit):
+    """Clearances move the tip by 0.806 mm, and errors only by 1 um."""
     write_robot(arm(radial=RADIAL, tilt=TILT), tmp_path / "arm.toml")
     (tmp_path / "errors.toml").write_text(ERRORS)
     page = tmp_path / "page.html"
@@ -91,13 +85,13 @@ def test_advice_names_the_clearances_if_perfect_parts_exceed_the_limit(
     assert status == 0, err
     answer, _ = tiles(page.read_text("utf-8"))["Tolerance to tighten"]
     broken = limit < np.hypot(RADIAL, ARM * TILT)
-    assert ("no tolerance of the errors meets it" in text) == broken
+    assert ("exceeds the limit of" in text) == broken
     assert answer == ("the clearances" if broken else "nothing")
     assert "perfect parts, clearances alone: rotation of 0.002 rad (pin.tilt" in text
 
 
-def test_free_platform_is_reported_without_a_bound(tmp_path, run):
-    """A passive hinge without a motion limit, and an arm across its axis."""
+def test_pose_error_of_a_free_platform_is_reported_as_unbounded(tmp_path, run):
+    """The platform is on an arm with a passive hinge without a motion limit."""
     write_robot(arm(passive=True, radial=RADIAL), tmp_path / "arm.toml")
     (tmp_path / "errors.toml").write_text(ERRORS)
     status, text, err = run(
@@ -106,11 +100,11 @@ def test_free_platform_is_reported_without_a_bound(tmp_path, run):
         "--report", tmp_path / "page.html",
     )  # fmt: skip
     assert status == 0, err
-    assert "perfect parts reach a translation without bound, limit 0.001 m" in text
+    assert "a translation without bound exceeds the limit of 0.001 m" in text
 
 
-def test_limited_motion_of_a_passive_joint_has_a_separate_share():
-    """A hinge limited to 1e-3 rad on the arm adds 0.4 mm, and the radius 0.1 mm."""
+def test_motion_of_a_passive_joint_has_a_separate_contribution():
+    """The motion limit contributes 0.4 mm, and the radial clearance 0.1 mm."""
     parts = perfect_parts(experiment(arm(passive=True, radial=RADIAL, spin=1e-3)))
     by_kind = parts["translation"]["clearances"]
     assert by_kind == pytest.approx(

@@ -1,4 +1,4 @@
-"""Present errors of a robot at several postures: bars in series with clearance."""
+"""Assembly margins for the errors in a robot file at several postures."""
 
 from dataclasses import replace
 
@@ -23,7 +23,7 @@ K = 1e6  # [N/m]
 
 
 def bars(play, errors):
-    """Two bars that meet with clearance, whose ends are off by some lengths along x."""
+    """Return two coaxial bars with a joint clearance and length errors."""
     robot = coaxial_beams(np.zeros(6), (K, K), clearance=Clearance(radial=play))
     delta = np.zeros((len(robot.frames), 6))
     for name, length in errors.items():
@@ -34,11 +34,11 @@ def bars(play, errors):
 ERRORS = {"one": 3 * PLAY, "two": -1 * PLAY, "mount": 0.5 * PLAY}
 
 
-def test_present_errors_rank_the_shares_of_the_largest_margin():
-    """A gap of 3 + 1 - 0.5 clearances; the other posture has four times the clearance.
+def test_present_errors_report_contributions_to_the_largest_margin():
+    """At one posture, the gap is 3 + 1 - 0.5 = 3.5 clearances.
 
-    The errors that open the gap have 3 / 3.5 and 1 / 3.5 of it, the other less than
-    none; the springs are pressed by 2.5 clearances.
+    The shares are 3 / 3.5, 1 / 3.5 and -0.5 / 3.5, and the springs are deformed by 2.5
+    clearances. The other posture has a larger clearance.
     """
     seen = []
     postures = [bars(4 * PLAY, ERRORS), bars(PLAY, ERRORS), bars(2 * PLAY, {})]
@@ -62,8 +62,8 @@ def test_present_errors_rank_the_shares_of_the_largest_margin():
     np.testing.assert_allclose(energy_slopes, signs * K * 2.5 * PLAY / 2, rtol=1e-6)
 
 
-def test_present_errors_within_clearance_have_zero_energy_and_rigid_parts_nan():
-    """The margin and the energy of rigid parts too far apart are NaN."""
+def test_energy_of_errors_within_clearance_is_zero():
+    """For rigid bodies that cannot be assembled, margin and energy are NaN."""
     within = present_errors([bars(PLAY, {"one": 0.5 * PLAY})], "rigid")
     assert within["energy_there"] == pytest.approx(0.0, abs=1e-12)
     assert within["assemblable_share"] == 1.0
@@ -113,9 +113,7 @@ def test_allocation_identity_changes_with_every_input():
 
 
 def test_singular_postures_of_a_grid_are_omitted_and_counted():
-    """Above the centre of a 3-UPU, the locked platform can rotate; elsewhere
-    it cannot.
-    """
+    """The 3-UPU robot is singular above its centre."""
     postures, left_out = grid_postures(
         three_upu(seed=1), "tx=-0.02:0.02:0.02,ty=0,tz=0.45"
     )

@@ -1,4 +1,4 @@
-"""Reports on draws and tolerances: their numbers equal those in the JSON."""
+"""HTML reports on random draws and tolerances."""
 
 import json
 from pathlib import Path
@@ -21,14 +21,14 @@ ERRORS = Path(__file__).parents[3] / "examples" / "hexapod_errors.toml"
 
 
 def shown(path):
-    """Return a page, and its numbers by the first words of each row."""
+    """Return a page, and the numbers in its tables by row."""
     seen = parse(path.read_text(encoding="utf-8"))
     rows = {row[0].text: row[1:] for table in seen.tables for row in table[1:]}
     assert seen.fetched == []
     return seen, rows
 
 
-def test_draws_report_shows_the_numbers_of_the_summary(tmp_path, run):
+def test_draws_report_contains_the_numbers_of_the_summary(tmp_path, run):
     page, written = tmp_path / "s.html", tmp_path / "s.json"
     status, _, err = run(
         "assembly", "statistics", "hexapod", "--errors", ERRORS, "--draws", 100,
@@ -40,7 +40,7 @@ def test_draws_report_shows_the_numbers_of_the_summary(tmp_path, run):
     seen, rows = shown(page)
     assert seen.results == summary
     limits = summary["within_limits"]
-    cells = rows["all limits kept"]
+    cells = rows["all limits satisfied"]
     assert [c.value for c in cells[:3]] == [
         limits[k] for k in ("probability", "lower", "upper")
     ]
@@ -57,10 +57,10 @@ def test_draws_report_shows_the_numbers_of_the_summary(tmp_path, run):
     largest = max(shares, key=lambda name: shares[name][0])
     assert "Governing errors" in page.read_text(encoding="utf-8")
     assert rows[largest][0].value == shares[largest][0]
-    assert str(ERRORS.name) in " ".join(rows)  # with its digest
+    assert str(ERRORS.name) in " ".join(rows)  # the provenance contains the file name
 
 
-def test_tolerance_report_ranks_the_declared_errors(tmp_path, run):
+def test_tolerance_report_lists_errors_by_contribution(tmp_path, run):
     write_robot(irsbot2_with(NUMBERS["cases"][0]), tmp_path / "robot.toml")
     page, written = tmp_path / "t.html", tmp_path / "t.json"
     status, _, err = run(
@@ -75,8 +75,8 @@ def test_tolerance_report_ranks_the_declared_errors(tmp_path, run):
     assert seen.numbers[0].value == present["largest_margin"]
 
 
-def test_robot_in_the_report_has_the_platform_displacement_of_its_draw():
-    """The draw closest to the 95 % quantile is solved as a single assembly."""
+def test_report_scene_has_the_platform_displacement_of_its_draw():
+    """The draw closest to the 95 % quantile is solved separately for comparison."""
     posture = place_robot(load_robot("hexapod"))
     experiment = Experiment(
         posture, read_sources(ERRORS, posture.robot), seed=3, clearance="least"
@@ -91,7 +91,7 @@ def test_robot_in_the_report_has_the_platform_displacement_of_its_draw():
     assert moved == pytest.approx(data["platform_screw"].values[draw, 3:], rel=1e-6)
 
 
-def test_report_maps_margins_over_a_grid_and_shows_the_tightest_robot():
+def test_tolerance_report_contains_margin_map_and_robot_scene():
     robot = irsbot2_with(NUMBERS["cases"][0])
     postures, _ = grid_postures(robot, "tx=-0.1:0.1:0.1,tz=-0.5:-0.4:0.1")
     present = present_errors(postures)

@@ -1,4 +1,4 @@
-"""Limits at every posture: random clearances, and limits that cannot be met."""
+"""Requirements on tolerances at several postures."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ ENDS = [("one", 3), ("two", 3)]
 
 
 def test_draws_that_cannot_be_assembled_exceed_every_limit():
-    """Rigid parts without clearance fit only with equal errors."""
+    """Rigid bodies without clearance can be assembled only if both errors are equal."""
     robot = rigid_pair()
     plan = plan_for(robot, ENDS, [1, 1], {"energy": 1.0, "force": 1.0})
     requirement = Requirement([home_posture(robot)], plan)
@@ -22,7 +22,7 @@ def test_draws_that_cannot_be_assembled_exceed_every_limit():
 
 
 def test_random_clearances_do_not_depend_on_the_batch():
-    """Draw 515 has the same clearance in any batch."""
+    """The last draws are solved in a different batch than the first ones."""
     posture = home_posture(arm(radial=PLAY))
     plan = plan_for(posture.robot, [("tip", 3)], [1], {"translation": 1e-3},
                     clearance="contact")  # fmt: skip
@@ -32,7 +32,7 @@ def test_random_clearances_do_not_depend_on_the_batch():
         values, range(516)
     )
     np.testing.assert_allclose(found[0], rows["translation"] / 1e-3, rtol=1e-9)
-    # clearance of 0.1 mm beside an error of 1 mm
+    # Random clearances of 0.1 mm add to an error of 1 mm.
     assert np.ptp(found[0, -8:] - np.abs(values[-8:, 0]) / 1e-3) > 0.01
 
 
@@ -45,11 +45,9 @@ def test_random_clearances_do_not_depend_on_the_batch():
         ({"energy": 1.0}, True, False),
     ],
 )
-def test_limit_below_the_pose_error_from_clearances_alone_is_rejected(
-    limits, worst_play, refused
-):
-    """The message names the posture with more clearance; this applies only to the worst
-    model.
+def test_limit_exceeded_by_clearances_alone_is_rejected(limits, worst_play, refused):
+    """The message contains the posture with the largest error. The limit is rejected
+    only in the worst clearance model.
     """
     postures = [home_posture(arm(radial=0.5 * PLAY)), home_posture(arm(radial=PLAY))]
     plan = plan_for(postures[0].robot, [("tip", 3)], [1], limits,
@@ -62,9 +60,9 @@ def test_limit_below_the_pose_error_from_clearances_alone_is_rejected(
     with pytest.raises(BadInput) as error:
         requirement.perfect_parts()
     assert str(error.value) == (
-        "limit translation: even perfect parts reach 0.0001 m by clearances alone at "
-        "tx = 0.4; expected at most 9e-05 m; tighten the clearances, loosen the limit, "
-        "or use --clearance least"
+        "limit translation: even without geometric errors, clearances cause 0.0001 m "
+        "at tx = 0.4; expected at most 9e-05 m; tighten the clearances, loosen the "
+        "limit, or use --clearance least"
     )
 
 
@@ -77,12 +75,10 @@ def test_limit_below_the_pose_error_from_clearances_alone_is_rejected(
         ("energy", [("two", 4)], "two.TY"),
     ],
 )
-def test_error_that_no_clearance_or_spring_can_close_is_rejected_by_name(
-    limit, places, named
-):
-    """Clearance in x and y takes up no error along z, and no spring does. The same
-    holds for an error along x of a frame rotated by 1e-3 rad about y, of which 1e-3 is
-    along z.
+def test_error_that_cannot_be_compensated_is_rejected_by_name(limit, places, named):
+    """A radial clearance does not compensate errors along z. The second error is along
+    x of a frame that is rotated by 1e-3 rad about y, so it has a small component along
+    z.
     """
     frames = (
         Frame("slanted", translation=[0.5, 0, 0], rotation=[0, 1e-3, 0]),
@@ -99,7 +95,6 @@ def test_error_that_no_clearance_or_spring_can_close_is_rejected_by_name(
     with pytest.raises(BadInput) as error:
         requirement.check_taken_up()
     assert str(error.value) == (
-        f"limit {limit}: found an error {named} that no clearance or spring can "
-        "close; leave this error out, or limit the energy of a robot with a spring "
-        "there"
+        f"limit {limit}: found the error {named}, which no clearance or spring can "
+        "compensate; omit this error, or add a spring and limit the energy"
     )

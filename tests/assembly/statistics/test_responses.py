@@ -1,4 +1,4 @@
-"""Limited quantities and their slopes: Euler's theorem, and an arm with clearance."""
+"""Limited quantities and their derivatives with respect to errors."""
 
 from dataclasses import replace
 
@@ -18,7 +18,7 @@ QUANTITIES = ["energy", "force", "moment", "stress", "rotation", "translation"]
 
 @pytest.fixture(scope="module")
 def stiff():
-    """The paper's robot without clearances, and some errors of its links."""
+    """Return IRSBot-2 without clearances and with errors of its links."""
     robot = load_robot("irsbot2")
     frames = tuple(replace(f, clearance=None) for f in robot.frames)
     robot = replace(robot, frames=frames)
@@ -30,9 +30,7 @@ def stiff():
 @pytest.mark.parametrize("key", QUANTITIES)
 @pytest.mark.parametrize("play", ["least", "worst"])
 def test_slopes_without_clearance_satisfy_eulers_theorem(stiff, key, play):
-    """The energy is homogeneous of degree two, and all other quantities of
-    degree one.
-    """
+    """The energy is homogeneous of degree 2, all other quantities of degree 1."""
     prepared, sources, values = stiff
     size, slopes = respond(prepared, sources, values, key, play)
     assert (size > 0).all()
@@ -45,14 +43,16 @@ def test_slopes_without_clearance_satisfy_eulers_theorem(stiff, key, play):
 
 
 def tip():
-    """An arm with clearance of its pin, and errors of its tip."""
+    """Return an arm with a pin clearance and errors of its tip."""
     robot = arm(radial=PLAY)
     sources = tolerance_sources(robot, [1e-3] * 3 + [3e-4] * 3, ("tip",))
     return home_posture(robot), sources
 
 
-def test_slopes_of_the_largest_error_of_an_arm_equal_its_closed_form():
-    """R = hypot(e_xy + p, e_z): dR/dx = (e_xy + p) x / (e_xy R), dR/dz = z / R."""
+def test_slopes_of_the_largest_pose_error_equal_closed_form():
+    """The largest error is R = hypot(e_xy + p, e_z), so dR/dx = (e_xy + p) x / (e_xy R)
+    and dR/dz = z / R.
+    """
     posture, sources = tip()
     values = sources.draw(0, 20, seed=1)
     size, slopes = respond(
@@ -63,7 +63,8 @@ def test_slopes_of_the_largest_error_of_an_arm_equal_its_closed_form():
     R = np.hypot(across + PLAY, z)
     np.testing.assert_allclose(size, R, atol=2e-9)
     expected = [(across + PLAY) * x / across, (across + PLAY) * y / across, z] / R
-    # known to 1e-9 of 1e-4 m the size leaves directions 5e-3 apart
+    # The error of 1e-9 m in a displacement of 1e-4 m allows an error of 5e-3 rad in its
+    # direction.
     np.testing.assert_allclose(slopes[:, 3:], expected.T, atol=1.5e-2)
     np.testing.assert_allclose(slopes[:, :3], 0.0, atol=1e-9)
     turn = values[:, :3]
@@ -78,10 +79,8 @@ def test_slopes_of_the_largest_error_of_an_arm_equal_its_closed_form():
 
 @pytest.mark.parametrize("play", ["least", "contact", "uniform"])
 @pytest.mark.parametrize("key", ["rotation", "translation"])
-def test_sampled_response_uses_the_random_clearances_of_the_experiment(play, key):
-    """This holds for each draw; the slopes are the direction of the platform's
-    error.
-    """
+def test_response_has_the_random_clearances_of_the_experiment(play, key):
+    """The derivatives are the direction of the platform error."""
     posture, sources = tip()
     values = sources.draw(0, 12, seed=1)
     rows = Experiment(posture, sources, seed=1, clearance=play, margins=False).evaluate(
@@ -96,10 +95,10 @@ def test_sampled_response_uses_the_random_clearances_of_the_experiment(play, key
 
 
 @pytest.mark.parametrize("component", [3, 4])
-def test_platform_attached_to_a_pin_follows_the_part_closed_with_the_pin(
+def test_pin_clearance_compensates_errors_of_the_body_below(
     component,
 ):
-    """With rigid parts, the pin clearance takes up the errors of the part below it."""
+    """The pin clearance compensates the errors of the rigid body below it."""
     robot = rigid_pair(radial=PLAY)
     widths = np.zeros(6)
     widths[component] = PLAY

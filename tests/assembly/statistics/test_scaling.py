@@ -1,4 +1,4 @@
-"""Uniform scaling of tolerances against utilisations with a known solution."""
+"""Uniform scaling of tolerances for given utilisations of the limits."""
 
 from types import SimpleNamespace
 
@@ -10,7 +10,7 @@ from forcefit.inputs.table import BadInput
 
 
 class Known:
-    """A requirement whose utilisation is a given function of the size of each error."""
+    """Requirement whose utilisation is a given function of the error size."""
 
     def __init__(self, utilisation, least=0.0, most=1e9, tolerances=1):
         self.utilisation = utilisation
@@ -20,7 +20,7 @@ class Known:
         )  # fmt: skip
 
     def utilisations(self, values):
-        """A second limit has half the utilisation; the lower bounds are zero."""
+        """Return lower bounds of zero, and upper bounds for two limits."""
         upper = self.utilisation(np.abs(values).max(axis=1))
         return np.zeros((2, len(values))), np.stack([upper, upper / 2])
 
@@ -30,8 +30,8 @@ ONE = Samples(np.ones((1, 1)), 0)
 
 @pytest.mark.parametrize("power", [0.4, 1.0, 2.0, 8.0])
 @pytest.mark.parametrize("start", [0.2, 1.0, 5.0])
-def test_scaled_errors_of_a_power_law_reach_the_limit_exactly(power, start):
-    """(t / 3)^power is 1 at 3."""
+def test_scaling_of_a_power_law_reaches_the_limit(power, start):
+    """The utilisation (t / 3)^power is 1 for t = 3."""
     known = Known(lambda size: (size / 3.0) ** power)
     (found,) = scale_uniformly(known, ONE, np.array([start]))
     assert 1 - 1e-4 <= (found / 3.0) ** power <= 1 + 1e-9
@@ -40,18 +40,16 @@ def test_scaled_errors_of_a_power_law_reach_the_limit_exactly(power, start):
 @pytest.mark.parametrize("start", [1e-6, 1.0, 1e6])
 @pytest.mark.parametrize("within", [0.0, 0.5])
 @pytest.mark.parametrize("beyond", [2.0, np.inf])
-def test_scaling_approaches_a_jump_from_the_admissible_side(start, within, beyond):
-    """The largest admissible factor, to the requested precision."""
+def test_scaling_at_a_discontinuity_satisfies_the_limit(start, within, beyond):
+    """The result is the largest admissible factor within the precision."""
     known = Known(lambda size: np.where(size <= 3.0, within, beyond))
     for precision in (1e-2, 1e-4):
         (found,) = scale_uniformly(known, ONE, np.array([start]), precision)
         assert 3.0 * (1 - precision) <= found <= 3.0
 
 
-def test_scaling_preserves_proportions_within_the_bounds_of_the_plan():
-    """Samples (1, 1) with tolerances from 1 to 4; tolerances at their upper bound stay
-    there.
-    """
+def test_scaling_preserves_proportions_within_bounds():
+    """A tolerance at its upper bound is not increased."""
     known = Known(lambda size: size / 6.0, least=0.5, most=8.0, tolerances=3)
     found = scale_uniformly(known, Samples(np.ones((1, 3)), 0), np.array([1.0, 2, 4]))
     np.testing.assert_allclose(found, [1.5, 3.0, 6.0], rtol=1e-4)
@@ -63,8 +61,8 @@ def test_scaling_preserves_proportions_within_the_bounds_of_the_plan():
 
 
 @pytest.mark.parametrize("allowed", [0, 1, 300])
-def test_scaling_allows_at_most_the_permitted_number_of_samples_to_fail(allowed):
-    """For sizes 1 to 1000 and limit 6, the largest size that must fit is 1000 -
+def test_scaling_accepts_the_allowed_number_of_failures(allowed):
+    """Of the sizes 1 to 1000, the largest size that must satisfy the limit is 1000 -
     allowed.
     """
     values = np.random.default_rng(1).permutation(np.arange(1.0, 1001.0))[:, None]
@@ -74,8 +72,8 @@ def test_scaling_allows_at_most_the_permitted_number_of_samples_to_fail(allowed)
 
 
 @pytest.mark.parametrize("least", [0.0, 0.7])
-def test_limits_that_no_scale_factor_meets_are_rejected(least):
-    """Perfect parts exceed the limit twofold, or the tightest tolerances exceed it."""
+def test_limits_exceeded_for_all_scale_factors_are_rejected(least):
+    """The limit is exceeded without errors or with the tightest tolerances."""
     constant = Known(lambda size: 2.0 + 0 * size, least)
     beyond = Known(lambda size: 2.0 + size, least)
     for known in (constant, beyond):
@@ -84,9 +82,9 @@ def test_limits_that_no_scale_factor_meets_are_rejected(least):
 
 
 @pytest.mark.parametrize(("draws", "allowed"), [(59, 0), (92, 0), (93, 1), (124, 2)])
-def test_number_of_allowed_failures_for_a_yield_equals_wilks_numbers(draws, allowed):
-    """Wilks (1942): 59, 93 and 124 draws demonstrate 95 % at 95 % with 0, 1 and 2
-    failures.
+def test_allowed_number_of_failures_equals_values_of_wilks(draws, allowed):
+    """According to Wilks (1942), 59, 93 and 124 draws with 0, 1 and 2 failures
+    demonstrate a yield of 95 % with 95 % confidence.
     """
     plan = SimpleNamespace(
         asked_yield=0.95, draws=draws, draws_of=lambda stream, count: (stream, count)
@@ -102,7 +100,7 @@ def test_too_few_draws_for_a_yield_are_rejected():
     with pytest.raises(BadInput) as error:
         draw_samples(requirement, 7, 2)
     assert str(error.value) == (
-        "tolerances: 58 draws are too few to show a yield of 0.95, even if none "
-        "fails; use more draws"
+        "tolerances: 58 draws are too few to demonstrate a yield of 0.95, even if none "
+        "of them fails; use more draws"
     )
     assert draw_samples(requirement, 7, 3).allowed == 0

@@ -1,4 +1,4 @@
-"""Derivatives from multipliers against finite differences."""
+"""Derivatives of solutions in comparison with finite differences."""
 
 from dataclasses import replace
 
@@ -29,9 +29,7 @@ def some_errors(robot, rng):
 
 @pytest.mark.parametrize("pose", POSES)
 @pytest.mark.parametrize("compliant", ["rigid", "free"])
-def test_margin_slopes_of_the_paper_robot_equal_central_differences(
-    pose, compliant, rng
-):
+def test_margin_slopes_of_irsbot2_equal_central_differences(pose, compliant, rng):
     robot = load_robot("irsbot2")
     posture = place_robot(robot, pose=pose)
     errors = some_errors(robot, rng)
@@ -49,7 +47,7 @@ def test_margin_slopes_of_the_paper_robot_equal_central_differences(
 
 @pytest.mark.parametrize("seed", range(10))
 def test_energy_slopes_of_random_robots_equal_central_differences(seed):
-    """Any frame may have errors, so steps are taken along random directions."""
+    """The directional derivative along a random direction of all errors is compared."""
     rng = np.random.default_rng(seed)
     robot = random_robot(rng)
     posture = place_robot(robot)
@@ -69,7 +67,7 @@ def test_energy_slopes_of_random_robots_equal_central_differences(seed):
 
 
 def test_margin_slopes_of_a_zero_margin_are_zero():
-    robot = load_robot("hexapod")  # mobile in every direction: margin 0, slopes 0
+    robot = load_robot("hexapod")  # has six degrees of freedom
     ready = prepare_margins(place_robot(robot), "free")
     margins = ready.solve(robot.errors[None])
     assert margins.margin == 0.0
@@ -78,7 +76,7 @@ def test_margin_slopes_of_a_zero_margin_are_zero():
 
 @pytest.mark.parametrize("seed", range(25))
 def test_wrench_slopes_of_random_robots_equal_central_differences(seed):
-    """A random combination of all wrenches, along a random direction of all errors."""
+    """The function is a random linear combination of all wrenches."""
     rng = np.random.default_rng(seed)
     robot = random_robot(rng)
     ready, errors = linear_response(place_robot(robot)), robot.errors
@@ -91,7 +89,7 @@ def test_wrench_slopes_of_random_robots_equal_central_differences(seed):
     both = ready.solve(np.array([errors + step, errors - step]))
     above, below = (both.wrenches * weights).sum(axis=(1, 2))
     scale = float((np.abs(slopes) * np.abs(step)).sum())
-    # gaps of 1e-10 leave wrenches 1e-5 off, nearly alike on both sides
+    # A duality gap of 1e-10 causes relative errors of 1e-5 in the wrenches.
     assert (above - below) / 2 == pytest.approx(
         float((slopes * step).sum()), abs=1e-3 * scale
     )
@@ -101,8 +99,8 @@ def test_wrench_slopes_of_random_robots_equal_central_differences(seed):
     "key", ["force", "moment", "stress", "rotation", "translation"]
 )
 @pytest.mark.parametrize("pose", POSES)
-def test_quantity_slopes_of_the_paper_robot_equal_central_differences(pose, key, rng):
-    """Random directions, at errors so large that every clearance is closed."""
+def test_quantity_slopes_of_irsbot2_equal_central_differences(pose, key, rng):
+    """The errors are so large that all joints are in contact."""
     robot = load_robot("irsbot2")
     posture = place_robot(robot, pose=pose)
     frames = tuple(f.name for f in robot.frames if f.link is not None)

@@ -1,4 +1,4 @@
-"""Statistics in one call, against distributions known in closed form."""
+"""The function ``statistics`` and its results."""
 
 import json
 from pathlib import Path
@@ -26,7 +26,7 @@ most = [0, 0, 0, 3e-5, 0, 4e-5]
 
 @pytest.fixture
 def tip():
-    """A rigid frame at the base: its error is the pose error."""
+    """Return a rigid frame on the base, whose error is the pose error."""
     return home_posture(Robot("block", "tip", (Frame("tip"),)))
 
 
@@ -37,8 +37,8 @@ def normal(tmp_path):
     return file
 
 
-def test_yield_of_a_normal_error_is_that_of_the_normal_distribution(tip, normal):
-    """P(|x| <= sigma) = 0.6827, and the median of |x| is 0.6745 sigma."""
+def test_yield_of_a_normal_error_equals_closed_form(tip, normal):
+    """P(|x| <= sigma) is 0.6827, and the median of |x| is 0.6745 sigma."""
     found = ff.statistics(tip, normal, draws=4000, limits={"translation": 1e-4})
     share = found.summary["within_limits"]
     assert share["lower"] < 0.68269 < share["upper"]
@@ -46,7 +46,7 @@ def test_yield_of_a_normal_error_is_that_of_the_normal_distribution(tip, normal)
     assert median["lower"] < 0.67449e-4 < median["upper"]
 
 
-def test_draws_convert_to_a_table_and_a_figure(tip, normal):
+def test_statistics_convert_to_a_table_and_a_figure(tip, normal):
     file = normal.with_suffix(".nc")
     found = ff.statistics(tip, normal, draws=50, output=file)
     table = found.to_pandas()
@@ -77,7 +77,7 @@ def test_statistics_in_python_equal_those_of_the_command(run):
         assert ours == expected[key], key
 
 
-def test_worst_pose_of_two_uniform_errors_is_the_diagonal_of_their_box(tip, tmp_path):
+def test_worst_pose_of_two_uniform_errors_equals_closed_form(tip, tmp_path):
     file = tmp_path / "uniform.toml"
     file.write_text(UNIFORM)
     worst = ff.worst_pose(tip, file)
@@ -96,7 +96,7 @@ def test_worst_pose_of_two_uniform_errors_is_the_diagonal_of_their_box(tip, tmp_
         ({"confidence": 2.0}, "confidence: found 2.0, expected a number between"),
         ({"yield_strength": -1.0}, "yield_strength: found -1.0, expected > 0 Pa"),
         ({"capability": True}, "capability: found no limits"),
-        ({"contact_length": 0.1}, "contact_length: found with clearance"),
+        ({"contact_length": 0.1}, "contact_length: found together with clearance"),
         ({"limits": {"enrgy": 1.0}}, "limit enrgy: found a quantity"),
     ],
 )
@@ -110,8 +110,8 @@ def test_worst_pose_rejects_an_unknown_quantity(tip, normal):
         ff.worst_pose(tip, normal, "translaton")
 
 
-def test_statistics_without_errors_report_what_is_missing(tip):
-    with pytest.raises(ff.BadInput, match="no --errors"):
+def test_statistics_without_errors_are_rejected(tip):
+    with pytest.raises(ff.BadInput, match="neither --errors"):
         ff.statistics(tip)
 
 
@@ -123,7 +123,7 @@ def test_statistics_without_errors_report_what_is_missing(tip):
         ({"quantities": ["enrgy"]}, "enrgy"),
     ],
 )
-def test_show_rejects_options_not_applicable_to_draws(tip, normal, options, message):
+def test_show_rejects_invalid_options_for_draws(tip, normal, options, message):
     found = ff.statistics(tip, normal, draws=4)
     with pytest.raises(ff.BadInput, match=message):
         ff.show(found, **options)
@@ -135,5 +135,5 @@ def test_show_rejects_a_file_that_is_not_a_data_set(normal):
 
 
 def test_show_rejects_data_set_options_for_a_robot():
-    with pytest.raises(ff.BadInput, match="expected them for a data set"):
+    with pytest.raises(ff.BadInput, match="valid only for a data set"):
         ff.show(ff.load_robot("five_bar"), quantities=["energy"])

@@ -1,4 +1,4 @@
-"""Spread of the platform stiffness over draws of the errors."""
+"""Distribution of the platform stiffness for random errors."""
 
 import json
 from dataclasses import replace
@@ -32,10 +32,8 @@ def spring(row, stiffness):
     return K
 
 
-def test_stiffness_of_drawn_bushes_depends_on_their_contact():
-    """Two springs k forced together: 2 k if the gap exceeds the clearance. Otherwise
-    the platform hangs on its own spring alone, with k.
-    """
+def test_stiffness_of_two_springs_depends_on_contact():
+    """The stiffness is 2 k if both springs are in contact, and k otherwise."""
     k, c = 1e5, 1e-4
     frames = (
         Frame("one", joint_stiffness=spring(3, k)),
@@ -54,7 +52,7 @@ def test_stiffness_of_drawn_bushes_depends_on_their_contact():
 
 
 @pytest.mark.parametrize("state", ["contact", "exact"])
-def test_drawn_stiffness_equals_that_of_the_robot_with_its_errors(state):
+def test_stiffness_of_a_draw_equals_single_solution(state):
     robot = load_robot("irsbot2")
     posture = place_robot(robot, {"tx": 0.1, "tz": -0.5})
     sources = tolerance_sources(robot, [2e-2] * 3 + [2e-4] * 3)
@@ -72,7 +70,7 @@ def test_drawn_stiffness_equals_that_of_the_robot_with_its_errors(state):
     assert np.ptp(data["stiffness"].values, axis=0).min() > 0.0
 
 
-def test_stiffness_report_separates_draws_with_free_motions_from_other_draws():
+def test_stiffness_report_counts_draws_with_free_motions():
     values = np.full((10, 6), 2e6)
     values[:4, 5], values[4, 5] = 0.0, np.nan
     motions = np.full((10, 6, 6), np.nan)
@@ -88,7 +86,7 @@ def test_stiffness_report_separates_draws_with_free_motions_from_other_draws():
     assert report["fz"]["mean"]["value"] == report["fx"]["mean"]["value"] == 2e6
 
 
-def test_statistics_command_writes_the_stiffness_spread(run, tmp_path):
+def test_statistics_command_writes_the_stiffness_distribution(run, tmp_path):
     errors = tmp_path / "errors.toml"
     errors.write_text(ERRORS)
     words = ["assembly", "statistics", "irsbot2", "--errors", str(errors), "--pose",
@@ -109,7 +107,7 @@ def test_statistics_command_writes_the_stiffness_spread(run, tmp_path):
 
 
 def test_small_stiffness_is_not_reported_as_a_free_motion():
-    """0.01 N m/rad is a spring; zero is free, and NaN has no solution."""
+    """A stiffness of 0 is a free motion, and NaN means that there is no solution."""
     stiffnesses = np.full((6, 6), 2.0)
     stiffnesses[:, 2] = 0.01, 0.02, 0.03, 0.0, 0.0, np.nan
     said = stiffness_report(stiffnesses, np.full((6, 6, 6), np.nan), "contact", 0.9)
@@ -120,8 +118,8 @@ def test_small_stiffness_is_not_reported_as_a_free_motion():
     assert about_z["quantiles"]["0.5"]["value"] == pytest.approx(0.02)
 
 
-def test_stiffness_of_a_platform_without_compliance_is_reported_as_rigid():
-    """Along fx all draws are rigid, along fy one of four; without draws, no shares."""
+def test_infinite_stiffness_is_reported_as_rigid():
+    """The platform is rigid along fx in all draws and along fy in one of four."""
     stiffnesses = np.full((4, 6), 2.0)
     stiffnesses[:, 3], stiffnesses[0, 4], stiffnesses[:, 5] = np.inf, np.inf, np.nan
     said = stiffness_report(stiffnesses, np.full((4, 6, 6), np.nan), "contact", 0.95)

@@ -1,4 +1,4 @@
-"""Summary of given draw results, counted by hand."""
+"""Summary of given results of draws."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ NAN = float("nan")
 
 
 def draws(play="least", status=None, screws=None, **values):
-    """A data set of draws: results by quantity, of links where they have two sizes."""
+    """Return a data set of draws with given results."""
     count = len(next(iter(values.values())))
     status = np.zeros(count) if status is None else np.array(status)
     screws = np.zeros((count, 6)) if screws is None else screws
@@ -26,10 +26,9 @@ def draws(play="least", status=None, screws=None, **values):
     return xarray.Dataset(variables, attrs={"clearance": play})
 
 
-def test_draws_without_a_solution_count_in_every_probability():
-    """Of eight draws, two do not assemble and three assemble by clearances alone. A
-    margin that exceeds 1 by round-off counts as 1; the largest gap is that of a solved
-    draw.
+def test_probabilities_include_draws_without_a_solution():
+    """Of eight draws, two cannot be assembled and three assemble by clearances alone. A
+    margin may exceed 1 by round-off.
     """
     data = draws(
         energy=[0.0, 0, 0, 1, 2, 3, NAN, NAN], status=[0, 0, 0, 0, 0, 0, 1, 1],
@@ -48,21 +47,21 @@ def test_draws_without_a_solution_count_in_every_probability():
     assert summarise(none)["duality_gap"] == 0.0
 
 
-def test_summary_counts_assembled_draws_with_unmixed_clearances():
+def test_summary_counts_draws_whose_random_walk_did_not_mix():
     data = draws("uniform", status=[0, 0, 0, 1], energy=[1.0, 1, 1, NAN],
                  clearance_mixed=[0, 1, 0, 0])  # fmt: skip
     said = summarise(data)
     assert said["clearance_not_mixed"] == 2
     text = summary_text(said)
-    assert "warning: in 2 draws the random walk of the uniform clearances" in text
+    assert "warning: in 2 draws, the random walk of the uniform model" in text
     mixed = summarise(data.assign(clearance_mixed=("draw", [1, 1, 1, 0])))
     assert mixed["clearance_not_mixed"] == 0
     assert "warning" not in summary_text(mixed)
     assert "clearance_not_mixed" not in summarise(draws(energy=[1.0]))
 
 
-def test_draw_with_bounds_that_enclose_a_limit_is_undecided():
-    """Bounds 0 to 2, 1 to 3, 2 to 3 and 3 to 4 of the translation, limit 2."""
+def test_draw_is_undecided_if_its_bounds_include_the_limit():
+    """The limit is 2, and the bounds are 0 to 2, 1 to 3, 2 to 3 and 3 to 4."""
     data = draws("worst", translation=[2.0, 3, 3, 4, NAN], status=[0, 0, 0, 0, 1],
                  translation_lower=[0.0, 1, 2, 3, NAN])  # fmt: skip
     said = summarise(data, {"translation": 2.0})
@@ -79,8 +78,8 @@ def test_draw_with_bounds_that_enclose_a_limit_is_undecided():
     )
 
 
-def test_yield_strength_is_the_stress_limit_unless_another_limit_is_given():
-    """Safety is the strength over the largest stress of a link, or infinite."""
+def test_yield_strength_is_the_default_stress_limit():
+    """The safety is the yield strength divided by the largest stress."""
     data = draws(stress=[[1e6, 0.0], [4e6, 0.0], [9e6, 0.0]], status=[0, 0, 1])
     said = summarise(data, strength=2e6)
     assert said["exceeds"]["stress"]["limit"] == 2e6
@@ -92,7 +91,7 @@ def test_yield_strength_is_the_stress_limit_unless_another_limit_is_given():
     assert "safety" not in summarise(data)
 
 
-def test_quantity_is_described_by_draws_with_finite_values():
+def test_summary_of_a_quantity_omits_infinite_values():
     data = draws(force=[1.0, 2, 4, NAN, np.inf, 7], status=[0, 0, 0, 0, 0, 1])
     one = summarise(data)["quantities"]["force"]
     assert (one["of"], one["assembled"], one["draws"]) == (6, 5, 3)
@@ -104,8 +103,8 @@ def test_quantity_is_described_by_draws_with_finite_values():
 
 
 @pytest.mark.parametrize(("zeros", "mode"), [(50, 7.0), (51, 0.0)])
-def test_mode_is_zero_if_more_than_half_of_the_draws_are_zero(zeros, mode):
-    """The other values are about 7; 1e-19 of the largest is round-off, 1e-17 is not."""
+def test_mode_is_zero_if_most_values_are_zero(zeros, mode):
+    """Values below 1e-18 of the largest value count as zero."""
     energy = np.r_[
         np.zeros(zeros - 2), 9e-19, -7e-18, np.linspace(6.9, 7.1, 100 - zeros)
     ]
@@ -117,8 +116,8 @@ def test_mode_is_zero_if_more_than_half_of_the_draws_are_zero(zeros, mode):
     assert more["zero"]["probability"] == (zeros - 1) / 100
 
 
-def test_margins_include_draws_that_do_not_assemble():
-    """A draw without a margin counts as infinite."""
+def test_margin_quantiles_include_draws_that_cannot_be_assembled():
+    """A margin of NaN is treated as infinite."""
     data = draws(margin=[0.5, 1.0, 2.0, np.inf, NAN], status=[0, 0, 1, 1, 1])
     one = summarise(data)["quantities"]["margin"]
     assert one["draws"] == 2
@@ -134,7 +133,7 @@ def test_margins_include_draws_that_do_not_assemble():
 
 @pytest.mark.parametrize("key", ["force", "stress"])
 def test_limit_on_a_quantity_that_was_not_computed_is_rejected(key):
-    """The quantity is missing, or has no link."""
+    """The quantity is missing or has no values."""
     data = draws(energy=[1.0, 2.0], stress=np.zeros((2, 0)))
     with pytest.raises(
         BadInput, match=f"^limit {key}: found a quantity that was not computed; "

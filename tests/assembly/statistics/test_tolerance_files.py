@@ -1,4 +1,4 @@
-"""Tolerance files, present errors and verification."""
+"""Tolerance files and verification of tolerances."""
 
 from dataclasses import replace
 from functools import cache
@@ -23,7 +23,7 @@ from tests.robots_for_tests import NUMBERS, irsbot2_with
 
 
 class Coin:
-    """Robots of which a known fraction meets the limits, to test verification alone."""
+    """Requirement with a known yield that does not depend on the tolerances."""
 
     asked_yield, postures, cases = 0.9, (None,), (("force", 0),)
 
@@ -41,11 +41,10 @@ class Coin:
         return share, share
 
 
-def test_repeated_verification_does_not_exceed_its_error_probability(monkeypatch):
-    """The last interval misses the truth in at most 5 % of all verifications. The yield
-    is so low that most tests contradict it and another one follows; with the full error
-    probability at every test, 9 % would miss. Tolerances have no effect on these
-    robots.
+def test_repeated_verification_has_the_stated_error_probability(monkeypatch):
+    """The final interval does not contain the true yield in at most 5 % of all cases.
+    The yield is so low that most verifications are repeated. Without correction for
+    repeated verification, the error probability would be 9 %.
     """
     monkeypatch.setattr(verification, "scale_uniformly", lambda *given: given[2])
     monkeypatch.setattr(verification, "bracketed", cache(verification.bracketed))
@@ -57,7 +56,7 @@ def test_repeated_verification_does_not_exceed_its_error_probability(monkeypatch
         missed += not check["yield"]["lower"] <= holds <= check["yield"]["upper"]
         looks += check["look"]
     assert looks > 2 * trials
-    # three deviations of so many trials
+    # Three standard errors are added.
     assert missed / trials <= 0.05 + 3 * np.sqrt(0.05 * 0.95 / trials)
     assert check["confidence"] == 0.95
     assert check["confidence_of_a_look"] == pytest.approx(1 - 0.05 / 4)
@@ -92,10 +91,8 @@ def test_tolerance_file_is_read_with_groups_costs_and_limits(write_file):
 
 
 @pytest.mark.parametrize("cost", ["logarithm", "reciprocal"])
-def test_price_of_tolerances_follows_the_cost_function(cost, write_file):
-    """Tolerances with costs 2 and 1 are multiplied by e or by 2, together and
-    separately.
-    """
+def test_cost_of_tolerances_equals_closed_form(cost, write_file):
+    """Tolerances with cost coefficients 2 and 1 are multiplied by e or by 2."""
     plan = read_plan(write_file(FILE.replace("logarithm", cost)), load_robot("irsbot2"))
     t = np.array([3e-4, 2e-2])
     if cost == "reciprocal":
@@ -108,11 +105,11 @@ def test_price_of_tolerances_follows_the_cost_function(cost, write_file):
 
 
 @pytest.mark.parametrize("name", ["always", "mostly", "forced", "limited"])
-def test_tolerance_files_of_the_example_are_read(name):
+def test_example_tolerance_files_are_valid(name):
     folder = Path(__file__).parents[3] / "examples" / "tolerance_allocation"
     plan = read_plan(folder / f"{name}.toml", load_robot("irsbot2"))
     assert len(plan.names) == 7
-    # the paper's section IV, 12 frames of 6, but for TY and TZ of the four links
+    # Section IV of the paper: 6 errors of 12 frames, without TY and TZ of four links.
     assert len(plan.sources) == 64
     assert plan.asked_yield == (1.0 if name == "always" else 0.99)
 
@@ -187,8 +184,8 @@ def test_invalid_tolerance_file_is_rejected_with_one_message(
     assert str(error.value) == f"{path}: {message}"
 
 
-def test_errors_of_an_open_chain_have_zero_margin_shares():
-    """An open chain closes for any errors, so any factor is admissible."""
+def test_errors_of_an_open_chain_have_zero_margin():
+    """An open chain can be assembled for all errors."""
     arm = load_robot("arm6")
     robot = arm.with_errors(np.full((len(arm.frames), 6), 1e-4))
     found = present_errors([home_posture(robot)])
@@ -198,8 +195,8 @@ def test_errors_of_an_open_chain_have_zero_margin_shares():
     assert {one["share_of_margin"] for one in found["slopes"]} == {0.0}
 
 
-def test_present_errors_scaled_by_their_factor_just_assemble():
-    """The margin is proportional to the errors, so with scaled errors it is 1."""
+def test_errors_scaled_by_the_reported_factor_have_margin_one():
+    """The margin is proportional to the errors, so it is 1 for the scaled errors."""
     robot = irsbot2_with(NUMBERS["cases"][0])
     postures, _ = grid_postures(robot, "tx=-0.1:0.1:0.1,tz=-0.5")
     found = present_errors(postures)
@@ -210,7 +207,9 @@ def test_present_errors_scaled_by_their_factor_just_assemble():
     shares = [one["share_of_margin"] for one in found["slopes"]]
     assert sum(shares) == pytest.approx(1.0, rel=1e-6)
     assert shares == sorted(shares, reverse=True)
-    assert "everywhere with all errors times" in present_text(found)
+    assert "all postures assemble if all errors are multiplied by" in present_text(
+        found
+    )
 
 
 @pytest.mark.parametrize(
@@ -218,11 +217,11 @@ def test_present_errors_scaled_by_their_factor_just_assemble():
     [("truncated", "deviations = 4.0", 1 / 4), ("truncated", "", 0.9866 / 3),
      ("uniform", "", 1 / np.sqrt(3))],
 )  # fmt: skip
-def test_errors_of_a_plan_have_the_requested_range_and_deviation(
+def test_errors_of_a_plan_have_the_requested_distribution(
     write_file, kind, deviations, deviation
 ):
-    """By default normal with a third of the tolerance, truncated at the tolerance; or
-    uniform. Truncation at three deviations leaves a standard deviation of 0.9866.
+    """The default distribution is a normal distribution, truncated at three standard
+    deviations, which reduces its standard deviation by the factor 0.9866.
     """
     text = f"distribution = '{kind}'\n{deviations}\n"
     plan = read_plan(write_file(text + FILE), load_robot("irsbot2"))
@@ -239,7 +238,7 @@ def test_limit_is_read_with_and_without_spaces(name):
 
 
 @pytest.mark.parametrize("number", ["0", "-1e-9", "inf", "nan", "", "2 J", "1=2"])
-def test_limit_that_is_not_a_positive_number_is_rejected_with_its_text(number):
+def test_limit_that_is_not_positive_is_rejected(number):
     with pytest.raises(BadInput) as error:
         parse_limit(f"force={number}")
     expected = f'--limit force: found "{number}", expected a number > 0'

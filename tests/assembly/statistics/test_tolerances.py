@@ -1,4 +1,4 @@
-"""Worst cases and allocations against brute force and closed forms."""
+"""Worst corners and minimum-cost tolerances."""
 
 from dataclasses import replace
 from itertools import product
@@ -40,12 +40,11 @@ ENDS = [("one", 3), ("two", 3)]
     ],
     ids=["roots of costs", "costs", "right angles"],
 )
-def test_tolerances_of_two_lengths_share_the_clearance_by_their_costs(
-    places, costs, cost, expected
-):
-    """Minimise c1/t1 + c2/t2, or -c1 log t1 - c2 log t2, with t1 + t2 = clearance.
+def test_tolerances_of_two_lengths_equal_closed_form(places, costs, cost, expected):
+    """The cost c1/t1 + c2/t2 or -c1 log t1 - c2 log t2 is minimised.
 
-    At right angles with equal costs t1^2 + t2^2 = clearance^2.
+    Parallel errors satisfy t1 + t2 = clearance. Perpendicular errors with equal costs
+    satisfy t1^2 + t2^2 = clearance^2.
     """
     robot = rigid_pair(radial=PLAY)
     plan = plan_for(robot, places, costs, {"margin": 1.0}, cost=cost)
@@ -59,12 +58,12 @@ def test_tolerances_of_two_lengths_share_the_clearance_by_their_costs(
         assert found.worst["margin"][1] == pytest.approx(1.0, rel=1e-3)
         assert found.proven_scale == pytest.approx(1.0, rel=1e-3)
     else:
-        # the bound adds sizes of vectors, not components: t1 + t2 = sqrt(2) clearance
+        # For perpendicular errors, the bound is too large by the factor sqrt(2).
         assert found.proven_scale >= 1 / np.sqrt(2) - 1e-6
 
 
-def test_tolerances_of_springs_in_series_share_the_energy_limit():
-    """1/2 (k/2) (t1 + t2)^2 = E with equal costs: sqrt(E / k) each."""
+def test_tolerances_for_an_energy_limit_equal_closed_form():
+    """The energy is k (t1 + t2)^2 / 4 = E. For equal costs, both are sqrt(E / k)."""
     robot = coaxial_beams(np.zeros(6))
     plan = plan_for(robot, ENDS, [1, 1], {"energy": 1e-3})
     found = allocate([place_robot(robot)], plan, fresh=0)
@@ -75,10 +74,9 @@ def test_tolerances_of_springs_in_series_share_the_energy_limit():
 
 
 @pytest.mark.slow
-def test_single_tolerance_is_the_clearance_over_the_yield():
-    """Uniform within t: the fraction within the clearance, clearance / t, is the yield.
-    Of 20000 training draws, as many may fail as still demonstrate a yield of 0.8 with
-    95 %.
+def test_single_tolerance_equals_clearance_over_yield():
+    """For a uniform error within t, the yield is clearance / t. The tolerance is
+    slightly smaller, because the yield is demonstrated with 95 % confidence.
     """
     robot = rigid_pair(radial=PLAY)
     plan = plan_for(robot, [("one", 3)], [1], {"margin": 1.0}, asked_yield=0.8,
@@ -103,8 +101,8 @@ def paper():
 
 
 @pytest.mark.parametrize("kind", ["free", "rigid", "energy"])
-def test_worst_corner_equals_brute_force_and_is_within_its_bound(paper, kind):
-    """All 256 corners are evaluated; a convex function is largest at a corner."""
+def test_worst_corner_agrees_with_evaluation_of_all_corners(paper, kind):
+    """All 256 corners of the tolerance box are evaluated."""
     posture, sources, t = paper
     energy = kind == "energy"
     ready = linear_response(posture) if energy else prepare_margins(posture, kind)
@@ -122,12 +120,10 @@ def test_worst_corner_equals_brute_force_and_is_within_its_bound(paper, kind):
     ("clearance", "cost"),
     [(None, "reciprocal"), (1e-4, "reciprocal"), (None, "logarithm")],
 )
-def test_tolerances_within_a_force_limit_equal_lagranges_solution(clearance, cost):
-    """Two springs k in series carry (k/2) (t1 + t2 - clearance), which is at most F in
-    each pair. Minimise sum c/t, or -sum c log t, with t1 + t2 = 2F/k + clearance in
-    each pair separately: tolerances divide it in proportion to the square roots of the
-    costs, or to the costs. For the energy the proportions differ: pairs of springs of
-    1e6 and 1e5 N/m would not both reach the limit.
+def test_tolerances_for_a_force_limit_equal_closed_form(clearance, cost):
+    """The force in two springs k in series is (k/2) (t1 + t2 - clearance), so each pair
+    satisfies t1 + t2 = 2F/k + clearance. The tolerances are in the ratio of the square
+    roots of the cost coefficients or, for logarithmic costs, of the cost coefficients.
     """
     k, F, c = np.array([1e6, 1e5]), 50.0, np.array([1.0, 4.0, 1.0, 1.0])
     robot = pairs_of_bars(k, clearance)
@@ -140,7 +136,7 @@ def test_tolerances_within_a_force_limit_equal_lagranges_solution(clearance, cos
     np.testing.assert_allclose(found.tolerances, best, rtol=1e-2)
     least = plan.price(best)
     assert least - 1e-9 * abs(least) <= found.price <= least + 2e-3 * abs(least)
-    # energy's proportions leave the softer pair's sum at a part of what it may have
+    # The uniformly scaled tolerances do not reach the limit of the softer pair.
     assert found.price_uniformly_scaled - found.price > 0.04 * abs(least)
     assert found.worst["force"][0] == pytest.approx(F, rel=1e-3)
     assert np.isnan(found.worst["force"][1])
@@ -149,10 +145,7 @@ def test_tolerances_within_a_force_limit_equal_lagranges_solution(clearance, cos
 
 @pytest.fixture(scope="module")
 def several(paper):
-    """The paper's robot: five limits of every kind at two postures, yield 0.9.
-    Clearances are as solved, because the worst model takes minutes and has its own
-    test.
-    """
+    """Return an allocation for IRSBot-2 with five limits at two postures."""
     posture, sources, _ = paper
     postures = [posture, place_robot(posture.robot, pose={"tx": -0.2, "tz": -0.4})]
     limits = {"translation": 2e-4, "rotation": 5e-3, "stress": 5e6, "force": 300.0,
@@ -163,7 +156,7 @@ def several(paper):
     return postures, plan, allocate(postures, plan, fresh=300)
 
 
-def test_price_for_several_limits_is_at_most_that_of_uniform_scaling(several):
+def test_minimum_cost_is_at_most_that_of_uniform_scaling(several):
     _, _, found = several
     assert np.isnan(found.price_bound)
     assert found.price <= found.price_uniformly_scaled
@@ -171,8 +164,8 @@ def test_price_for_several_limits_is_at_most_that_of_uniform_scaling(several):
 
 
 @pytest.mark.slow
-def test_allocated_tolerances_have_the_yield_in_new_single_solutions(several):
-    """With another seed, each draw is solved by :func:`solve_assembly`."""
+def test_allocated_tolerances_have_the_required_yield(several):
+    """The new draws have another seed and are solved by :func:`solve_assembly`."""
     postures, plan, found = several
     half = plan.spread(found.tolerances)
     rng, fits, largest = np.random.default_rng(12345), 0, 0.0
@@ -201,8 +194,8 @@ def largest_share(posture, limits):
 
 
 @pytest.mark.slow
-def test_allocation_for_the_worst_clearance_has_the_yield_in_new_draws(paper):
-    """Each draw is solved and bounded separately, for a yield of 0.9."""
+def test_allocation_in_the_worst_clearance_model_has_the_required_yield(paper):
+    """The new draws are solved separately. The required yield is 0.9."""
     posture, sources, _ = paper
     limit = 6e-4
     plan = Plan(sources, np.tile([0, 1], 4), ("RX", "TX"), np.array([1.0, 0.01]),
@@ -225,9 +218,7 @@ def test_allocation_for_the_worst_clearance_has_the_yield_in_new_draws(paper):
 
 
 def parallel(k1, k2):
-    """A platform between two bars along x, which follows errors by relative
-    stiffness.
-    """
+    """Return a platform between two bars along x of different stiffness."""
     frames = (
         Frame("one", translation=[0.5, 0, 0], link=MatrixLink(np.eye(6) * k1)),
         Frame("mount", translation=[1.0, 0, 0]),
@@ -236,11 +227,10 @@ def parallel(k1, k2):
     return Robot("parallel", "one", frames, (("one", "two"),))
 
 
-def test_tolerances_within_a_pose_error_limit_equal_lagranges_solution():
-    """Between springs k1, k2 the platform moves w1 t1 + w2 t2, w_i = k_i / (k1 + k2).
+def test_tolerances_for_a_pose_error_limit_equal_closed_form():
+    """The platform moves by w1 t1 + w2 t2 = D with w_i = k_i / (k1 + k2).
 
-    Minimise c1/t1 + c2/t2 with that sum D: t_i = D sqrt(c_i/w_i) / sum sqrt(c w).  The
-    energy depends on t1 + t2 alone, so its proportions are sqrt(c_i).
+    The minimum of c1/t1 + c2/t2 is at t_i = D sqrt(c_i/w_i) / sum sqrt(c w).
     """
     k, c, D = np.array([9e6, 1e6]), np.array([1.0, 4.0]), 1e-4
     robot = parallel(*k)
@@ -256,11 +246,12 @@ def test_tolerances_within_a_pose_error_limit_equal_lagranges_solution():
 
 
 @pytest.mark.slow
-def test_tolerances_for_a_yield_share_the_squared_pose_error():
-    """Normal errors of deviation t/3: the platform's is |w t| / 3, D at 90 % of it.
+def test_tolerances_for_a_yield_equal_closed_form():
+    """The standard deviation of the platform error is |w t| / 3.
 
-    Minimise sum c/t with sum (w t)^2 fixed: t_i ~ (c_i / w_i^2)^(1/3).  Truncation at 3
-    deviations narrows both normal distributions by 0.9866.
+    The minimum of sum c/t for a given sum (w t)^2 is at t_i ~ (c_i / w_i^2)^(1/3).
+    Truncation at 3 standard deviations reduces the standard deviation by the factor
+    0.9866.
     """
     k, c, D = np.array([9e6, 1e6]), np.array([1.0, 4.0]), 1e-4
     robot = parallel(*k)
@@ -273,15 +264,15 @@ def test_tolerances_for_a_yield_share_the_squared_pose_error():
     w = k / k.sum()
     shape = (c / w**2) ** (1 / 3)
     best = shape * 3 * D / (1.6449 * 0.9866 * np.linalg.norm(w * shape))
-    # 10000 draws know the quantile to 1 %, and its slopes' ratio to a few
+    # For 10000 draws, the standard error of the quantile is about 1 %.
     assert found.price == pytest.approx((c / best).sum(), rel=0.03)
     np.testing.assert_allclose(found.tolerances / best, 1.0, atol=0.12)
     assert found.price < 0.97 * found.price_uniformly_scaled
     assert found.verification["verdict"] != "contradicted"
 
 
-def test_worst_clearance_reduces_the_tolerance_within_a_pose_error_limit():
-    """An error e and a clearance disc r of a serial arm reach e + r <= limit."""
+def test_clearance_reduces_the_tolerance_for_a_pose_error_limit():
+    """The largest error of a serial arm is the sum of length error and clearance."""
     robot = arm(radial=PLAY)
     plan = plan_for(robot, [("tip", 3)], [1], {"translation": 3e-4}, draws=50)
     for play, tolerance in (("worst", 3e-4 - PLAY), ("least", 3e-4)):

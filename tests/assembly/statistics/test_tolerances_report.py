@@ -1,4 +1,4 @@
-"""Allocations as plain values and data sets, and the tolerance report."""
+"""Output of tolerance allocations: JSON, data set and HTML report."""
 
 import json
 from dataclasses import replace
@@ -33,7 +33,7 @@ components = ["TX"]
 
 
 def shown(tolerances, costs, most=(0.1, 0.1), cost="reciprocal"):
-    """The page of two classes, an angle and a length."""
+    """Return the report on two classes of errors, an angle and a length."""
     plan = plan_for(
         coaxial_beams(np.zeros(6)), [("two", 1), ("two", 3)], [1, 1], {"energy": 2.0},
     )  # fmt: skip
@@ -55,16 +55,14 @@ def shown(tolerances, costs, most=(0.1, 0.1), cost="reciprocal"):
 
 @pytest.mark.parametrize("loosest", [1e-2, 0.1, 10.0])
 def test_advice_on_tightening_does_not_depend_on_inactive_bounds(loosest):
-    """Costs are 1 / 1e-3 and 1 / 1e-4, so the second, the length, has 10 of 11
-    parts.
-    """
+    """The costs are 1 / 1e-3 and 1 / 1e-4, so the share of the length is 10/11."""
     page = shown([1e-3, 1e-4], [1.0, 1.0], (loosest, 0.1))
     answer, note = tiles(page)["Tolerance to tighten"]
     assert (answer, note[:4]) == ("length", "91\u00a0%")
 
 
-def test_advice_for_a_logarithmic_price_follows_the_costs():
-    """For any tolerances, t dL/dt is the cost over the multiplier."""
+def test_advice_for_logarithmic_costs_depends_on_cost_coefficients():
+    """The saving does not depend on the tolerances."""
     answer, note = tiles(shown([1e-3, 1e-4], [3.0, 1.0], cost="logarithm"))[
         "Tolerance to tighten"
     ]
@@ -75,20 +73,18 @@ def test_advice_for_a_logarithmic_price_follows_the_costs():
     assert answer == "angle, length"
 
 
-def test_advice_omits_tolerances_at_their_loosest():
-    """The angle has the higher cost but is at its upper bound, so the length
-    is named.
-    """
+def test_advice_omits_tolerances_at_their_upper_bound():
+    """The angle has the higher cost, but its tolerance is at the upper bound."""
     both = shown([1e-5, 1e-4], [1.0, 1.0], (1e-5, 0.1))
     assert tiles(both)["Tolerance to tighten"][0] == "length"
     none = shown([1e-5, 1e-4], [1.0, 1.0], (1e-5, 1e-4))
     assert tiles(none)["Tolerance to tighten"][0] == "nothing"
 
 
-def test_report_states_requirements_and_the_share_of_clearances(tmp_path, run):
-    """A pin of radius r, and a length t beyond it: t = limit - r, 1 / t is the price.
+def test_report_contains_limits_and_effect_of_clearances(tmp_path, run):
+    """For a pin with radial clearance r, the tolerance of a length is t = limit - r.
 
-    Without the clearance t would be the limit: 1.5 times looser, at 1 / limit.
+    Without the clearance, t would be the limit, which is larger by the factor 1.5.
     """
     write_robot(arm(radial=RADIAL), tmp_path / "arm.toml")
     (tmp_path / "plan.toml").write_text(PLAN)
@@ -103,7 +99,7 @@ def test_report_states_requirements_and_the_share_of_clearances(tmp_path, run):
     assert taken["reached"] == pytest.approx(RADIAL, rel=1e-3)
     assert taken["looser_without"] == pytest.approx(1.5, rel=1e-3)
     assert taken["price_without"] == pytest.approx(1.0 / LIMIT, rel=2e-3)
-    assert "clearances alone use 0.1 mm of the 0.3 mm of translation" in text
+    assert "clearances alone cause 0.1 mm of the limit of 0.3 mm on translation" in text
     content = page.read_text("utf-8")
     assert tiles(content)["Used by clearances"][0] == "33\u00a0%"
     asked = {row[0].text: row[1] for row in parse(content).table("requirement")[1:]}
@@ -115,8 +111,8 @@ def test_report_states_requirements_and_the_share_of_clearances(tmp_path, run):
     assert asked["yield"].text == "1: every robot within tolerance"
 
 
-def test_no_advice_is_given_for_errors_that_fit_at_every_posture():
-    """A margin of 0.5: the errors could be twice as large."""
+def test_report_contains_no_advice_if_all_postures_assemble():
+    """The largest margin is 0.5."""
     present = {
         "postures": 2, "assemblable_share": 1.0, "factor_on_errors": 2.0,
         "largest_margin": 0.5, "at": {"tx": 0.0}, "slopes": [],
@@ -137,7 +133,7 @@ CHECK = {
 
 
 def allocation(**values):
-    """Two classes: angles of the second bar, and its length with that of the first."""
+    """Return an allocation for two classes: angles of a bar and lengths of two bars."""
     plan = plan_for(
         coaxial_beams(np.zeros(6)), [("two", 1), ("one", 3), ("two", 3)], [1] * 3,
         {"energy": 2.0}, asked_yield=0.9,
@@ -168,7 +164,7 @@ def test_tolerance_class_has_the_unit_of_its_first_error():
         assert allocation_of(some)["tolerances"][1]["at_loosest"] == loosest
 
 
-def test_allocation_states_the_clearance_model_only_for_pose_error_limits():
+def test_clearance_model_is_reported_only_for_pose_error_limits():
     for limits, play in (({"rotation": 1e-3}, "worst"), ({"energy": 1.0}, None)):
         plain = allocation_of(allocation(limits=limits))
         assert plain["clearance"] == play
@@ -195,6 +191,6 @@ def test_allocation_data_set_contains_tolerances_and_provenance():
     assert (attributes["price"], attributes["price_alike"]) == (20.0, 25.0)
     assert attributes["limit.energy"] == 2.0
     assert attributes["verified_yield"] == 0.99
-    assert attributes["said"].startswith("price 20, 25 with those of the convex")
+    assert attributes["said"].startswith("price 20, 25 for the uniformly scaled")
     assert attributes["said"].count("; ") == 1
     assert np.isnan(allocation().to_xarray().attrs["verified_yield"])

@@ -1,4 +1,4 @@
-"""Proofs for springs in series, and verdicts on draws counted by hand."""
+"""Upper bounds for springs in series, and verification by random draws."""
 
 import numpy as np
 import pytest
@@ -12,11 +12,11 @@ from tests.tolerances_for_tests import PLAY, plan_for, silent
 
 ENDS = [("one", 3), ("two", 3)]
 T = np.array([2.0, 3.0]) * PLAY
-REACH = 5 * PLAY  # both errors together
+REACH = 5 * PLAY  # sum of both errors
 
 
 def springs(stiffnesses, limits, clearance=None):
-    """A requirement on two equally stiff bars in series, at each posture."""
+    """Return a requirement on two equal bars in series at several postures."""
     play = None if clearance is None else Clearance(radial=clearance)
     postures = [
         home_posture(coaxial_beams(np.zeros(6), (k, k), clearance=play))
@@ -26,10 +26,8 @@ def springs(stiffnesses, limits, clearance=None):
 
 
 @pytest.mark.parametrize(("limit", "scale"), [(0.01, 0.2), (0.25, 1.0), (1.0, 1.0)])
-def test_certified_energy_of_springs_scales_with_the_square_of_the_tolerances(
-    limit, scale
-):
-    """k (t1 + t2)^2 / 4 at the stiffer of three postures; 0.25 J of 1e6 N/m."""
+def test_energy_bound_of_springs_equals_closed_form(limit, scale):
+    """The energy is k (t1 + t2)^2 / 4 for the largest stiffness of three postures."""
     requirement = springs([4e5, 4e6, 1e6], {"energy": limit})
     k = 4e6
     truth = k * REACH**2 / 4
@@ -40,18 +38,16 @@ def test_certified_energy_of_springs_scales_with_the_square_of_the_tolerances(
 
 
 @pytest.mark.parametrize(("limit", "scale"), [(1.0, 0.2), (4.0, 0.8), (6.0, 1.0)])
-def test_certified_margin_scales_with_the_tolerances(limit, scale):
-    """(t1 + t2) / p = 5, for any springs."""
+def test_margin_bound_of_springs_equals_closed_form(limit, scale):
+    """The margin is (t1 + t2) / p = 5 for any stiffness."""
     requirement = springs([1e6, 1e5], {"margin": limit}, PLAY)
     worst, found = prove_worst(requirement, T, silent)
     np.testing.assert_allclose(worst["margin"], 5.0, rtol=1e-5)
     assert found == pytest.approx(scale, rel=1e-5)
 
 
-def test_scale_is_set_by_the_tightest_limit_and_not_certified_for_a_force():
-    """The search finds half of k (t1 + t2), for which no bound and hence no scale
-    exists.
-    """
+def test_force_limit_has_no_proven_scale():
+    """The largest force found is k (t1 + t2) / 2, without an upper bound."""
     requirement = springs([1e6], {"energy": 0.01, "force": 60.0})
     worst, found = prove_worst(requirement, T, silent)
     assert worst["force"][0] == pytest.approx(1e6 * REACH / 2, rel=1e-6)
@@ -63,9 +59,7 @@ def test_scale_is_set_by_the_tightest_limit_and_not_certified_for_a_force():
 
 
 class Given:
-    """A requirement with two limits at two postures, with given utilisations
-    per draw.
-    """
+    """Requirement with two limits at two postures and given utilisations."""
 
     cases = [("a", 0), ("a", 1), ("b", 0), ("b", 1)]
     postures = (None, None)
@@ -75,7 +69,7 @@ class Given:
         self.bounds = np.array([lower, upper])
 
     def draws_of(self, stream, count):
-        """Return draw numbers; a tolerance of 2 shows that they were multiplied."""
+        """Return the indices of the draws as errors."""
         return np.arange(count)[:, None].astype(float)
 
     def spread(self, tolerances):
@@ -88,12 +82,12 @@ class Given:
 TWO = np.array([2.0])
 
 
-def test_draw_passes_only_if_every_limit_holds_at_every_posture():
-    """Of 600 draws in three batches, 60 fail at the first posture, 30 at the second."""
+def test_draw_passes_if_all_limits_are_satisfied_at_all_postures():
+    """Of 600 draws, 60 fail at the first posture and 30 at the second."""
     share = np.full((4, 600), 0.5)
-    share[0, 240:270] = 1.5  # limit a, first posture, in two batches
+    share[0, 240:270] = 1.5  # first limit, first posture
     share[2, 580:] = 2.5  # limit b
-    share[2, 260:280] = 1.5  # ten of them fail already
+    share[2, 260:280] = 1.5  # ten of these draws fail at the first posture
     share[3, 570:600] = 1.1
     share[1, 0] = 1 + 5e-10  # rounding
     found = verify_yield(Given(share, share, 0.9), TWO, 600, silent, 14, 0.9)
@@ -106,10 +100,10 @@ def test_draw_passes_only_if_every_limit_holds_at_every_posture():
     assert found["verdict"] == "not contradicted"
 
 
-def test_draw_with_a_limit_between_its_bounds_is_undecided():
+def test_draw_is_undecided_if_a_limit_is_between_its_bounds():
     lower, upper = np.full((2, 4, 10), 0.5)
     lower[0, :3] = upper[0, :3] = 1.5  # fail
-    upper[1, 2:5] = 1.5  # the third has failed elsewhere
+    upper[1, 2:5] = 1.5  # one of these draws fails at the first posture
     lower[1, 3] = 1 + 5e-10  # rounding
     found = verify_yield(Given(lower, upper, 0.2), TWO, 10, silent)
     assert found["yield"]["probability"] == 0.5
@@ -122,17 +116,18 @@ def test_draw_with_a_limit_between_its_bounds_is_undecided():
     [
         (0, 1.0, "no draw failed"),
         (1, 1.0, "contradicted"),
-        # 0 of 100: at least 1 - 0.025^(1/100) = 0.9638 with 95 %
+        # For 0 failures of 100, the lower bound on the yield is 1 - 0.025^(1/100) =
+        # 0.9638.
         (0, 0.96, "shown"),
         (0, 0.97, "not contradicted"),
-        # 10 of 100: between 0.824 and 0.951
+        # For 10 failures of 100, the interval is 0.824 to 0.951.
         (10, 0.82, "shown"),
         (10, 0.83, "not contradicted"),
         (10, 0.95, "not contradicted"),
         (10, 0.96, "contradicted"),
     ],
 )
-def test_verdict_follows_from_the_confidence_interval(failing, asked, verdict):
+def test_verdict_agrees_with_the_confidence_interval(failing, asked, verdict):
     share = np.zeros((4, 100))
     share[2, :failing] = 2.0
     found = verify_yield(Given(share, share, asked), TWO, 100, silent)

@@ -1,4 +1,4 @@
-"""Worst cases of errors within tolerances against hand calculation."""
+"""Bounds on margin and energy over all errors within tolerances."""
 
 import numpy as np
 import pytest
@@ -21,18 +21,16 @@ PLACES = [("one", 3), ("two", 3), ("one", 4), ("two", 4)]
 
 
 def bars(clearance=None):
-    """Bars in series, isotropic springs, with or without clearance."""
+    """Return two bars in series with isotropic springs."""
     robot = coaxial_beams(np.zeros(6), (K, K), clearance=clearance)
     return home_posture(robot), plan_for(robot, PLACES, [1] * 4, {}).sources
 
 
 @pytest.mark.parametrize("directions", [1, 2])
 @pytest.mark.parametrize("radial", [0.0, PLAY])
-def test_worst_energy_subtracts_the_clearance_from_the_sum_of_errors(
-    directions, radial
-):
-    """k (hypot(t1 + t2, t3 + t4) - p)^2 / 4; the bound uses the sum of all t,
-    less p.
+def test_worst_energy_and_its_bound_equal_closed_forms(directions, radial):
+    """The energy is k (hypot(t1 + t2, t3 + t4) - p)^2 / 4. The bound replaces the root
+    by the sum of all tolerances.
     """
     posture, sources = bars(Clearance(radial=radial) if radial else None)
     prepared = linear_response(posture)
@@ -48,8 +46,8 @@ def test_worst_energy_subtracts_the_clearance_from_the_sum_of_errors(
     assert bound >= corner.value * (1 - 1e-9)
 
 
-def test_worst_margin_and_its_bound_equal_sums_along_each_axis():
-    """hypot(t1 + t2, t3 + t4) / p; the bound is (t1 + t2 + t3 + t4) / p."""
+def test_worst_margin_and_its_bound_equal_closed_forms():
+    """The margin is hypot(t1 + t2, t3 + t4) / p; the bound is the sum of all t / p."""
     posture, sources = bars(Clearance(radial=PLAY))
     zone, t = prepare_margins(posture, "rigid"), np.array([3.0, 2, 1, 4]) * PLAY
     corner = worst_corner(zone, sources, t, random_corners(4, 4))
@@ -59,8 +57,8 @@ def test_worst_margin_and_its_bound_equal_sums_along_each_axis():
 
 
 def test_worst_energy_and_margin_of_a_ball_are_within_their_bounds():
-    """For gaps of 3, 2 and 4 balls along x, y and z, the worst case is their distance
-    and the bound their sum.
+    """The errors along x, y and z are 3, 2 and 4 ball clearances. The worst case is the
+    root of their sum of squares, and the bound is their sum.
     """
     robot = coaxial_beams(np.zeros(6), (K, K), clearance=Clearance(ball=PLAY))
     posture, t = home_posture(robot), np.array([3.0, 2.0, 4.0]) * PLAY
@@ -79,8 +77,8 @@ def test_worst_energy_and_margin_of_a_ball_are_within_their_bounds():
 
 
 def test_margin_bound_distributes_errors_over_several_clearances():
-    """Two pins in series have 1 and 3 clearances, so an error x takes x / 4 of each.
-    Across and along their axis are separate cones.
+    """Two pins in series have clearances in the ratio 1 : 3, so each is used by the
+    same fraction.
     """
     frames = (
         Frame("one", translation=[0.5, 0, 0]),
@@ -101,10 +99,8 @@ def test_margin_bound_distributes_errors_over_several_clearances():
         assert found == pytest.approx(expected, rel=1e-6)
 
 
-def test_error_that_no_clearance_can_close_has_an_infinite_bound():
-    """The error is along z of a pin; a tolerance of zero has no effect, and 1e-14 m is
-    round-off.
-    """
+def test_margin_bound_is_infinite_if_no_clearance_compensates_an_error():
+    """The error is along the axis of a pin. A tolerance of 1e-14 m counts as zero."""
     robot = rigid_pair(radial=PLAY)
     posture = home_posture(robot)
     sources = plan_for(robot, [("one", 3), ("one", 5)], [1, 1], {}).sources
@@ -115,9 +111,9 @@ def test_error_that_no_clearance_can_close_has_an_infinite_bound():
     assert bound_energy(linear_response(posture), sources, t) == np.inf
 
 
-def test_energy_bound_of_a_spring_is_finite_along_its_axis_only():
-    """k t^2 / 2 along the axis; the pair is rigid across it, where 1e-14 m is round-off
-    and 1e-9 m is not.
+def test_energy_bound_is_infinite_in_rigid_directions():
+    """The energy is k t^2 / 2 along the axis. The bodies are rigid across the axis,
+    where a tolerance of 1e-14 m is treated as zero.
     """
     spring = np.diag([np.inf] * 6)
     spring[3, 3] = K
@@ -136,11 +132,10 @@ def test_energy_bound_of_a_spring_is_finite_along_its_axis_only():
             assert found == pytest.approx(bound, rel=1e-6)
 
 
-def test_energy_bound_uses_the_clearance_of_each_pair_separately():
-    """Two parallel pairs of bars: gaps of 1.5 and 10 clearances exceed them by 0.5, 9.
+def test_energy_bound_subtracts_the_clearance_of_each_pair():
+    """The gaps of two pairs of bars exceed their clearance p by 0.5 p and 9 p.
 
-    Each pair uses its own clearance; the bound sums the remaining gaps: k (0.5 + 9)^2
-    p^2 / 4.
+    The bound is k (0.5 + 9)^2 p^2 / 4.
     """
     robot = pairs_of_bars([K, K], PLAY)
     prepared = linear_response(home_posture(robot))

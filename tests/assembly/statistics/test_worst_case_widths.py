@@ -1,4 +1,4 @@
-"""Widths of callouts for a yield of 1, against closed forms and finite geometry."""
+"""Minimum-cost widths of callouts for a yield of 1."""
 
 import itertools
 import json
@@ -39,7 +39,7 @@ OF_ARM = PLAN.format(limit=f"translation = {LIMIT}", first="arm", second="hand")
 
 
 def arm(bend=0.8, **elbow):
-    """An arm of 0.4 and 0.3 m, bent at the elbow, which may have a fit."""
+    """Return an arm with links of 0.4 and 0.3 m."""
     return Robot(
         "arm",
         "tip",
@@ -65,8 +65,8 @@ def allotted(tmp_path, robots, text, fresh=0):
 
 
 def cheapest(bend, limit):
-    """Minimise 1/a + 4/b with |a u + b v| <= limit for u, v at the bend, for
-    any signs.
+    """Return the minimum of 1/a + 4/b subject to |a u + b v| <= limit, where u and v
+    are the directions of the links.
     """
     c = abs(np.cos(bend))
 
@@ -85,14 +85,14 @@ def test_minimum_cost_of_arm_lengths_equals_closed_form(tmp_path):
     assert found.price == pytest.approx(1 / best[0] + 4 / best[1], rel=2e-3)
     assert found.price_bound <= found.price
     assert found.price_bound == pytest.approx(found.price, rel=2e-3)
-    assert found.tolerances == pytest.approx(best, rel=0.05)  # the price is flat there
+    assert found.tolerances == pytest.approx(best, rel=0.05)  # the minimum is flat
     assert found.verification["yield"]["probability"] == 1.0
     low, high = found.worst["translation"]
     assert 0.998 * LIMIT < low <= high <= LIMIT * (1 + 1e-12)
     assert "no tolerances cost less than" in allocation_text(allocation_of(found))
 
 
-def test_all_corners_of_the_tolerances_meet_the_limit_in_finite_geometry(tmp_path):
+def test_all_corners_satisfy_the_limit_in_nonlinear_geometry(tmp_path):
     a, b = allotted(tmp_path, [arm()], OF_ARM).tolerances
 
     def tip(first, second):
@@ -104,8 +104,8 @@ def test_all_corners_of_the_tolerances_meet_the_limit_in_finite_geometry(tmp_pat
     assert 0.998 * LIMIT < largest <= LIMIT * (1 + 1e-9)
 
 
-def test_largest_clearance_of_a_fit_follows_from_its_limits(tmp_path):
-    """A disc of 17.5 um adds to every direction in the plane."""
+def test_allocation_includes_the_largest_clearance_of_a_fit(tmp_path):
+    """The fit adds a radial clearance of 17.5 um."""
     clearance = {"clearance": Clearance(radial=10.25e-6)}
     robot = replace(arm(**clearance), fits={"elbow": "12 H7/g6"})
     found = allotted(tmp_path, [robot], OF_ARM)
@@ -113,18 +113,20 @@ def test_largest_clearance_of_a_fit_follows_from_its_limits(tmp_path):
     assert found.price == pytest.approx(1 / best[0] + 4 / best[1], rel=2e-3)
 
 
-def test_posture_of_the_larger_error_determines_the_tolerances(tmp_path):
-    """The errors add up most where the arm is straightest."""
+def test_posture_with_the_largest_error_determines_the_tolerances(tmp_path):
+    """The error is largest at the posture with the most extended arm."""
     found = allotted(tmp_path, [arm(1.2), arm(0.8)], OF_ARM)
     alone = allotted(tmp_path, [arm(0.8)], OF_ARM)
     assert found.price == pytest.approx(alone.price, rel=1e-6)
 
 
-def test_shares_of_the_lengths_in_the_rotation_of_a_four_bar_equal_hand_calculation(
+def test_length_tolerances_of_a_four_bar_equal_hand_calculation(
     tmp_path,
     write_file,
 ):
-    """Minimise 1/a + 4/b with (ca a + cb b)/lever <= limit: a, b go as sqrt(cost/c)."""
+    """The minimum of 1/a + 4/b subject to (ca a + cb b)/lever <= limit is at a, b ~
+    sqrt(cost/c).
+    """
     robot = read_robot(write_file(four_bar_file()))
     text = PLAN.format(
         limit="rotation = 1e-4", first="B on crank", second="C on rocker"
@@ -144,8 +146,8 @@ def test_limit_below_the_clearance_of_a_fit_is_rejected(tmp_path):
         allotted(tmp_path, [robot], text)
 
 
-def test_over_constrained_parts_with_clearance_are_rejected(tmp_path):
-    """A planar four-bar with rigid pins: their tilts do not close without force."""
+def test_over_constrained_robot_with_clearance_is_rejected(tmp_path):
+    """A planar four-bar linkage with rigid bodies is over-constrained."""
     path = tmp_path / "four_bar.toml"
     text = four_bar_file("radial = 1e-5")
     path.write_text(text.replace("length =", 'extent = 0.02\nposition = "0.1 mm" #'))
@@ -153,11 +155,11 @@ def test_over_constrained_parts_with_clearance_are_rejected(tmp_path):
     plan = PLAN.format(
         limit="rotation = 1e-2", first="B on crank", second="C on rocker"
     )
-    with pytest.raises(BadInput, match="over-constrained and rigid"):
+    with pytest.raises(BadInput, match="over-constrained robot that is rigid"):
         allotted(tmp_path, [robot], plan)
 
 
-def test_command_allocates_callouts_for_the_worst_case(tmp_path):
+def test_tolerances_command_allocates_widths_for_the_worst_case(tmp_path):
     write_robot(arm(), tmp_path / "arm.toml")
     (tmp_path / "plan.toml").write_text(OF_ARM)
     words = ["assembly", "tolerances", str(tmp_path / "arm.toml"), "--plan",

@@ -1,4 +1,4 @@
-"""Worst clearance model and limited joint motion against hand calculation."""
+"""Clearance models, and joints with motion limits."""
 
 import numpy as np
 import pytest
@@ -32,16 +32,17 @@ def tip_errors(robot, size):
 
 
 def papers(share, **options):
-    """The paper's robot with link errors, scaled from a few mrad."""
+    """Return IRSBot-2 with errors of its links."""
     robot = load_robot("irsbot2")
     sources = tolerance_sources(robot, [share * 4e-3] * 3 + [share * 2e-4] * 3)
     return Experiment(place_robot(robot, pose=POSE), sources, margins=False, **options)
 
 
-def test_screws_of_the_worst_clearance_attain_its_bounds(rng):
-    """A disc of radius p and a tilt b on an arm L: rotation b, and hypot(e + p, L b).
+def test_screws_of_the_worst_model_attain_its_bounds(rng):
+    """For radial clearance p, tilt clearance b and error e, the bounds are b and
+    hypot(e + p, L b).
 
-    This is in addition to errors e along x; a draw without a solution has no bounds.
+    A draw without a solution has no bounds.
     """
     posture = home_posture(arm(radial=RADIAL, tilt=TILT))
     prepared = linear_response(posture)
@@ -64,8 +65,8 @@ def test_screws_of_the_worst_clearance_attain_its_bounds(rng):
     "share", [0.02, pytest.param(0.3, marks=pytest.mark.slow), 1.0]
 )
 @pytest.mark.parametrize("play", ["least", "uniform", "contact"])
-def test_no_clearance_model_exceeds_the_certified_worst_case_in_any_draw(share, play):
-    """Inside the zone, at its edge and outside; 1e-9 covers two solutions of (22)."""
+def test_pose_errors_of_irsbot2_are_within_the_worst_model_bounds(share, play):
+    """The draws are inside the assembly zone, at its boundary and outside."""
     worst, other = papers(share), papers(share, clearance=play)
     values = worst.sources.draw(0, 60, seed=1)
     bound, found = (e.evaluate(values, range(60)) for e in (worst, other))
@@ -76,8 +77,10 @@ def test_no_clearance_model_exceeds_the_certified_worst_case_in_any_draw(share, 
         assert np.median(bound["translation"] / found["translation"]) > 2
 
 
-def test_yield_falls_to_zero_with_the_worst_clearance():
-    """Clearance alone suffices to assemble; 0.1 mm is met only in the least model."""
+def test_yield_is_zero_in_the_worst_clearance_model():
+    """All draws assemble by clearances. The limit of 0.1 mm is satisfied only in the
+    model "least".
+    """
     limits, share = {"translation": 1e-4}, {}
     for play in CLEARANCE_MODELS:
         data = run_draws(
@@ -96,10 +99,8 @@ def test_yield_falls_to_zero_with_the_worst_clearance():
     assert share["worst"] < share["contact"] < share["uniform"] < share["least"]
 
 
-def test_worst_clearance_adds_no_error_if_a_load_closes_all_clearances():
-    """A load presses the pin against one side of its disc, so it cannot move
-    sideways.
-    """
+def test_worst_model_adds_no_error_if_all_joints_are_in_contact():
+    """The pin is in contact under the load."""
     robot = arm(radial=RADIAL)
     sources, load = tip_errors(robot, 1e-4), (0, 0, 0, 10.0, 0, 0)
     values = sources.draw(0, 10, seed=1)
@@ -115,7 +116,7 @@ SPIN, PIN = 1e-4, 1e-6
 
 
 def positions(robot, clearance, errors, count=200, **options):
-    """Platform screws of draws that all have the same errors."""
+    """Return platform screws of many draws with the same errors."""
     prepared = linear_response(home_posture(robot), **options)
     draws = prepared.solve(np.repeat(np.asarray(errors, dtype=float)[None], count, 0))
     rngs = [draw_generator(3, i, 9) for i in range(count)]
@@ -124,8 +125,10 @@ def positions(robot, clearance, errors, count=200, **options):
     return screws
 
 
-def test_contact_model_turns_a_hinge_to_its_motion_limit():
-    """The tip moves by arm times angle along y, and by the radius along the force."""
+def test_contact_model_rotates_a_hinge_to_its_motion_limit():
+    """The tip moves by the product of arm length and limit along y, and by the radial
+    clearance along the force.
+    """
     hinge = arm(passive=True, radial=PIN, spin=SPIN)
     screws = positions(hinge, "contact", np.zeros((2, 6)))
     np.testing.assert_allclose(np.abs(screws[:, 2]), SPIN, rtol=1e-6)
@@ -137,7 +140,7 @@ def test_contact_model_turns_a_hinge_to_its_motion_limit():
 @pytest.mark.parametrize(
     ("joint", "key", "component"), [("revolute", "spin", 2), ("prismatic", "axial", 5)]
 )
-def test_uniform_model_is_uniform_over_the_limited_motion(joint, key, component):
+def test_uniform_model_is_uniform_within_motion_limits(joint, key, component):
     robot = arm(passive=True, joint=joint, **{key: SPIN})
     screws = positions(robot, "uniform", np.zeros((2, 6)))
     part = (screws[:, component] / SPIN + 1) / 2
@@ -146,10 +149,8 @@ def test_uniform_model_is_uniform_over_the_limited_motion(joint, key, component)
 
 @pytest.mark.parametrize("error", [0.0, 2.4e-4])
 @pytest.mark.parametrize("steel", [0.0, 1e9])
-def test_two_hinges_on_one_axis_turn_within_both_motion_limits(error, steel):
-    """|angle| <= a and |angle - error| <= b define an interval whose ends are the
-    contacts.
-    """
+def test_two_coaxial_hinges_rotate_within_both_motion_limits(error, steel):
+    """The limits |angle| <= a and |angle - error| <= b define an interval."""
     a, b = 1e-4, 1.5e-4
     link = MatrixLink(np.eye(6) * steel) if steel else None
     frames = (
@@ -172,8 +173,8 @@ def test_two_hinges_on_one_axis_turn_within_both_motion_limits(error, steel):
 
 
 @pytest.mark.parametrize("clearance", ["uniform", "contact", "least"])
-def test_moment_turns_a_hinge_to_its_limit_in_every_clearance_model(clearance):
-    """Under 5 N m about its axis it stops at +spin."""
+def test_moment_rotates_a_hinge_to_its_limit_in_every_clearance_model(clearance):
+    """A moment of 5 N m about its axis rotates the hinge."""
     robot = arm(passive=True, spin=SPIN)
     load = [0, 0, 5.0, 0, 0, 0]
     screws = positions(robot, clearance, np.zeros((2, 6)), 5, load=load)
@@ -181,8 +182,8 @@ def test_moment_turns_a_hinge_to_its_limit_in_every_clearance_model(clearance):
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_no_clearance_model_exceeds_the_certified_worst_in_any_draw(seed):
-    """Random robots with motion limits of passive joints of the size of the errors."""
+def test_pose_errors_of_random_robots_are_within_the_worst_model_bounds(seed):
+    """The robots are random and have motion limits of passive joints."""
     rng = np.random.default_rng(seed)
     robot = with_bounded_motion(random_robot(rng, joints=4), rng)
     sources = tolerance_sources(robot, [1e-5] * 6, [f.name for f in robot.frames])

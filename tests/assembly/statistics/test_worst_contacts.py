@@ -1,4 +1,4 @@
-"""Worst case of an over-constrained stage with clearances in guides and pad."""
+"""Worst pose error of an over-constrained stage with clearances in guides."""
 
 import pytest
 
@@ -12,9 +12,9 @@ from forcefit.assembly.statistics.linear_response import linear_response
 from forcefit.assembly.statistics.perfect_parts import perfect_parts
 from tests.guided_stage_for_tests import STAGE
 
-# [rad, m] largest value; part of each joint: its derivative with respect to the
-# logarithm of the size.  By cvxpy, slabs and octahedra, 12 starts and differences of
-# 1e-4; gaps of the fits 25 and 37 um, of the pad 13 um with half of the flatness.
+# [rad, m] Largest value and contribution of each joint, computed independently with
+# cvxpy. A contribution is the derivative with respect to the logarithm of the
+# clearance.
 WORST = {
     "rotation": (1.34029e-3, {
         "clearance of x": 0.92274e-3, "clearance of y": 0.24606e-3,
@@ -46,12 +46,12 @@ def test_contributions_to_a_rigid_worst_case_are_listed_by_joint(stage, quantity
     assert sum(dict(found.shares).values()) == pytest.approx(value, rel=1e-3)
 
 
-def test_every_contact_belongs_to_a_joint_of_the_drawing(stage):
+def test_every_contact_belongs_to_a_joint(stage):
     owners = {joint_of(stage, row) for row, f in enumerate(stage.frames) if f.clearance}
     assert owners == {"x", "y", "foot"}
 
 
-def test_perfect_part_clearances_are_listed_by_joint(stage):
+def test_clearance_contributions_are_listed_by_joint(stage):
     reached = perfect_parts(Experiment(home_posture(stage), sources_of(stage)))
     parts = reached["rotation"]["clearances"]
     assert set(parts) <= {"x.clearance", "y.clearance", "foot.clearance"}

@@ -1,4 +1,4 @@
-"""Worst pose error against hand calculation, corners in finite geometry, and draws."""
+"""Worst pose errors of serial arms, four-bar linkages and platforms on legs."""
 
 import itertools
 from dataclasses import replace
@@ -19,7 +19,7 @@ from tests.drawn_four_bar_for_tests import four_bar_file
 
 FIRST, SECOND = np.radians(30.0), np.radians(45.0)
 PIN = Clearance(radial=10e-6)
-# 0.4 m at 30 deg and 0.3 m at 75 deg
+# arm with links of 0.4 m at 30 deg and 0.3 m at 75 deg
 SERIAL = Robot(
     "serial",
     "tip",
@@ -42,8 +42,10 @@ def of_serial(robot=SERIAL):
     return linear_response(home_posture(robot)), sources_of(robot, angles)
 
 
-def test_worst_case_of_a_serial_arm_equals_the_worst_corner_in_finite_geometry():
-    """156.18 um along 9.8 deg, with lengths + and angles -; discs add 10 um each."""
+def test_worst_case_of_a_serial_arm_agrees_with_nonlinear_geometry():
+    """The largest error of 156.18 um occurs for positive length errors and negative
+    angle errors. The clearances add 10 um each.
+    """
     found = worst_pose(*of_serial(), "translation")
     assert found.reading == "linear"
     corners = []
@@ -66,7 +68,7 @@ def test_worst_case_of_a_serial_arm_equals_the_worst_corner_in_finite_geometry()
 
 
 def test_worst_case_of_two_ball_clearances_is_the_sum_of_their_radii():
-    """Every direction is a worst one; values and bounds are 20 and 15 um."""
+    """The error is the same in all directions."""
     balls = tuple(
         Callout(name, feature, (Datum(datum, "point"),), shape="point",
                 widths={"position": width})
@@ -83,21 +85,19 @@ def test_worst_case_of_two_ball_clearances_is_the_sum_of_their_radii():
     assert found.bound == pytest.approx(35e-6, rel=1e-9)
 
 
-def test_uniform_draws_of_a_serial_arm_have_the_radius_computed_by_hand():
-    """The rms of 58.9 um follows from the summed variances of uniform errors
-    and discs.
+def test_rms_error_of_a_serial_arm_equals_hand_calculation():
+    """The root mean square of 58.9 um is computed from the variances of errors and
+    clearances.
     """
     prepared, sources = of_serial()
     draws = prepared.solve(sources.errors(sources.draw(0, 50_000, 1)))
     square = (draws.platform_screw[:, 3:] ** 2).sum(axis=1).mean()
-    # each disc of 10 um adds R^2/2
+    # A uniform clearance of radius R adds R^2/2.
     assert np.sqrt(square + 2 * 10e-6**2 / 2) == pytest.approx(58.9e-6, rel=0.01)
 
 
 def with_half_of_the_coupler(sources):
-    """Return sources for a platform half way along the coupler, with half of
-    its error.
-    """
+    """Return error sources for a platform in the middle of the coupler."""
     robot, placed = sources.robot, []
     for one in sources.placed:
         errors = one.errors.copy()
@@ -121,7 +121,7 @@ def four_bar(tmp_path, clearance):
 def test_largest_rotation_of_a_four_bar_coupler_equals_hand_calculation(
     tmp_path, clearance, mrad
 ):
-    """0.1903 mrad by errors and 0.1692 by clearances."""
+    """Errors contribute 0.1903 mrad and clearances 0.1692 mrad."""
     found = worst_pose(*four_bar(tmp_path, clearance), "rotation")
     assert found.attained * 1e3 == pytest.approx(mrad, abs=5e-5)
     assert found.attained <= found.bound <= found.attained * 1.001
@@ -131,21 +131,23 @@ def test_largest_rotation_of_a_four_bar_coupler_equals_hand_calculation(
 def test_largest_displacement_of_a_four_bar_point_equals_hand_calculation(
     tmp_path, clearance, um
 ):
-    """The point is half way between the coupler's bores, so half of the coupler's
-    length error moves it."""
+    """The point is in the middle of the coupler and moves by half of the length
+    error.
+    """
     prepared, sources = four_bar(tmp_path, clearance)
     sources = with_half_of_the_coupler(sources)
     found = worst_pose(prepared, sources, "translation")
     assert found.attained * 1e6 == pytest.approx(um, abs=0.03)
-    # clearances alone: 29.2 um
+    # The contribution of clearances is 29.2 um.
     none = [replace(one, errors=0 * one.errors) for one in sources.placed]
     alone = worst_pose(prepared, replace(sources, placed=tuple(none)), "translation")
     assert alone.attained * 1e6 == pytest.approx(29.24 if clearance else 0, abs=0.005)
 
 
 def test_random_draws_of_the_four_bar_stay_below_its_worst_case(tmp_path):
-    """10^6 uniform machines with uniform pins: 99.73 % are below 42.9 um and the
-    largest is 60 um, far below the worst case of 67.35 um."""
+    """Of 10^6 random draws, 99.73 % are below 42.9 um and the largest is 60 um. The
+    worst case is 67.35 um.
+    """
     prepared, sources = four_bar(tmp_path, "radial = 10e-6")
     sources = with_half_of_the_coupler(sources)
     count, discs = 1_000_000, int(prepared.starts[-1])
@@ -173,7 +175,7 @@ HEAD = rotation_matrix([0, np.pi / 2, 0]) @ rotation_matrix([np.pi / 2, 0, 0])
 
 
 def on_springs(positions, clearance, stiffness=STIFF):
-    """A platform that lifts along z and turns about y, on legs along z."""
+    """Return a platform on legs that translates along z and rotates about y."""
     frames = [
         Frame("lift", joint="prismatic"),
         Frame("turn", "lift", rotation=np.array([-np.pi / 2, 0, 0]), joint="revolute"),
@@ -184,7 +186,7 @@ def on_springs(positions, clearance, stiffness=STIFF):
         leg = f"leg{k}"
         K = None if stiffness is None else np.diag(stiffness)
         frames += [
-            # the error and the spring along z, then free along x and about y
+            # The foot has an error and a spring along z.
             Frame(f"{leg}.foot", translation=np.array([s, 0, 0]), joint_stiffness=K,
                   clearance=Clearance(axial=clearance) if clearance else None),
             Frame(f"{leg}.slide", f"{leg}.foot", rotation=np.array([0, np.pi / 2, 0]),
@@ -200,9 +202,10 @@ def on_springs(positions, clearance, stiffness=STIFF):
     return robot, tolerance_sources(robot, np.eye(6)[5] * 50e-6, feet)
 
 
-def test_worst_cases_of_four_springs_differ_between_the_three_definitions():
-    """At s = -0.3, -0.1, 0.1, 0.3 m, errors +-50 um, clearances +-20 um: rigid 233,
-    equilibrium 240 (errors -,-,+,+), clearances as errors 280 urad."""
+def test_worst_cases_of_four_springs_equal_hand_calculation():
+    """For legs at -0.3, -0.1, 0.1 and 0.3 m, errors of 50 um and clearances of 20 um,
+    the rotation is 233 urad (rigid), 240 urad (equilibrium) and 280 urad (bound).
+    """
     robot, sources = on_springs((-0.3, -0.1, 0.1, 0.3), 20e-6)
     found = worst_pose(linear_response(home_posture(robot)), sources, "rotation")
     assert found.reading == "equilibrium"
@@ -211,8 +214,8 @@ def test_worst_cases_of_four_springs_differ_between_the_three_definitions():
     assert found.bound * 1e6 == pytest.approx(280, abs=0.5)
 
 
-def test_worst_equilibrium_is_at_least_that_of_corners_and_inner_points():
-    """All 16 corners and 500 inner points; each pose error is known to 1e-9 rad."""
+def test_worst_equilibrium_is_not_exceeded_at_corners_or_inside():
+    """All 16 corners and 500 points inside the tolerance box are evaluated."""
     robot, sources = on_springs((-0.3, -0.1, 0.1, 0.3), 20e-6)
     prepared = linear_response(home_posture(robot))
     found = worst_pose(prepared, sources, "rotation")
@@ -225,7 +228,7 @@ def test_worst_equilibrium_is_at_least_that_of_corners_and_inner_points():
 
 
 def test_response_of_springs_without_clearance_is_linear():
-    """Rotation sum s d / sum s^2: 50 um * 0.8 / 0.2 m = 200 urad."""
+    """The rotation is sum(s d) / sum(s^2) = 50 um * 0.8 m / 0.2 m^2 = 200 urad."""
     robot, sources = on_springs((-0.3, -0.1, 0.1, 0.3), 0.0)
     found = worst_pose(linear_response(home_posture(robot)), sources, "rotation")
     assert found.reading == "elastic"
@@ -233,9 +236,9 @@ def test_response_of_springs_without_clearance_is_linear():
     assert found.bound == pytest.approx(200e-6, rel=1e-3)
 
 
-def test_rigid_legs_accept_only_errors_for_which_the_loop_closes():
-    """Two rigid legs are not over-constrained: 2 * 70 um / 0.6 m = 233.3 urad. A third
-    leg in the middle with 20 um of clearance does not limit it; all definitions agree.
+def test_worst_case_of_rigid_legs_equals_hand_calculation():
+    """Two rigid legs are not over-constrained and allow 2 * 70 um / 0.6 m = 233.3 urad.
+    A third leg in the middle does not reduce the rotation.
     """
     for positions, reading in [((-0.3, 0.3), "linear"), ((-0.3, 0.0, 0.3), "rigid")]:
         robot, sources = on_springs(positions, 20e-6, None)

@@ -1,4 +1,4 @@
-"""Yields of callouts against draws in finite geometry, by independent code."""
+"""Yields of callouts compared with an independent nonlinear simulation."""
 
 from dataclasses import replace
 
@@ -19,12 +19,12 @@ FINITE, LINEAR = 1_000_000, 20_000
 
 
 def disc(rng, radius):
-    """Sample uniform points in a disc, by rejection from the square."""
+    """Return uniform random points in a disc."""
     points = rng.uniform(-1, 1, (int(1.4 * FINITE) + 1000, 2))
     return radius * points[np.hypot(*points.T) <= 1][:FINITE]
 
 
-# a bore across the arm, at a point off the first axis, with a hand on it
+# arm with a bore perpendicular to its first axis
 TURN = np.array([0.0, np.pi / 2, 0.0])
 ARM = Robot(
     "arm",
@@ -39,10 +39,10 @@ ARM = Robot(
 
 
 def moved_arm(rng, width, length):
-    """(k, 3) [m] finite motion of the tip: both ends of the bore in their discs."""
+    """Return displacements of the tip for random ends of the bore, (k, 3) [m]."""
     ends = disc(rng, width / 2), disc(rng, width / 2)
     shift, slope = (ends[0] + ends[1]) / 2, (ends[0] - ends[1]) / length
-    # the axis leans by the slope: it turns about its own normal
+    # rotation from z to the tilted axis
     axis = np.column_stack([slope, np.ones(len(slope))])
     axis /= np.linalg.norm(axis, axis=1, keepdims=True)
     normal = np.cross([0.0, 0.0, 1.0], axis)
@@ -50,11 +50,11 @@ def moved_arm(rng, width, length):
     turn = Rotation.from_rotvec(normal / np.maximum(size, 1e-300) * np.arcsin(size))
     hand = Rotation.from_rotvec([0, 0, -0.8]).apply([0.2, -0.1, 0.15])
     own = np.column_stack([shift, np.zeros(len(shift))]) + turn.apply(hand) - hand
-    return own  # in the bore's axes; its size is that in the base's
+    return own  # in the axes of the bore
 
 
 def moved_four_bar(rng, tolerances):
-    """(k, 2) [m] finite motion of the coupler's point fixed to the pin B."""
+    """Return displacements of a coupler point for random lengths, (k, 2) [m]."""
     a, b, c, d = (
         nominal + t * rng.uniform(-1, 1, FINITE)
         for nominal, t in zip((0.1, 0.25, 0.2, 0.3), tolerances, strict=True)
@@ -63,7 +63,7 @@ def moved_four_bar(rng, tolerances):
 
 
 def _point(a, b, c, d):
-    """(k, 2) the point 125 mm along and 50 mm across the coupler."""
+    """Return the position of a coupler point for given link lengths, (k, 2)."""
     B = np.column_stack([a * np.cos(np.pi / 3), a * np.sin(np.pi / 3)])
     D = np.column_stack([d + 0 * a, 0 * a])
     along = D - B
@@ -77,7 +77,7 @@ def _point(a, b, c, d):
 
 
 def linear_sizes(robot, seed):
-    """(k,) [m] translations of the platform in the program's draws."""
+    """Return platform translations in the linear model, (k,) [m]."""
     sources = sources_of(robot)
     draws = linear_response(home_posture(robot)).solve(
         sources.errors(sources.draw(0, LINEAR, seed))
@@ -86,9 +86,9 @@ def linear_sizes(robot, seed):
 
 
 @pytest.mark.slow
-def test_yields_of_callouts_equal_those_of_finite_geometry(write_file):
-    """With 20 cases and 95 % intervals, one miss is expected; four have a probability
-    of 1.6 %.
+def test_yields_of_callouts_agree_with_nonlinear_simulation(write_file):
+    """For 20 confidence intervals of 95 %, one is expected to fail. Four or more fail
+    with a probability of 1.6 %.
     """
     four_bar = read_robot(write_file(four_bar_file()))
     inside = []

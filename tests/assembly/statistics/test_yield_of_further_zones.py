@@ -1,6 +1,5 @@
-"""Yields of round faces, forms, envelopes, shifting datums and coupled holes. Each
-yield is compared with that of 10^6 parts in finite geometry, by independent code:
-planes between two planes, axes in cylinders, and pins at the ends of their clearance.
+"""Yields of callouts on faces, forms, envelopes, datums and holes. They are compared
+with an independent nonlinear simulation of 10^6 parts.
 """
 
 import numpy as np
@@ -17,16 +16,16 @@ from forcefit.assembly.statistics.experiment import Experiment
 from tests.assembly.statistics.test_yield_of_callouts import disc
 
 FINITE = 1_000_000
-DRAWS, DRAWS_OF_FITS = 20_000, 2_000  # the linear response differs between fits
+DRAWS, DRAWS_OF_FITS = 20_000, 2_000  # fits need one response per draw
 HAND = np.array([0.2, -0.1, 0.15])
 TURNED = Rotation.from_rotvec([0, 0, -0.8]).apply(HAND)
-HEIGHTS = 0.005, 0.1  # [m] of a point on the pin, within the bore and beyond it
-# hole 12 H7 and shaft 12 g6, above and below 12 mm
+HEIGHTS = 0.005, 0.1  # [m] of points on the pin, inside and outside the bore
+# limit deviations of hole 12 H7 and shaft 12 g6 [m]
 HOLE, SHAFT = (0.0, 18e-6), (-17e-6, -6e-6)
 
 
 def arm(callout, at=(0.4, 0.1, 0.05), turn=(0.0, np.pi / 2, 0.0)):
-    """A feature across an arm, off the arm's axis, with a hand on it."""
+    """Return an arm with a callout on a feature perpendicular to its axis."""
     frames = (
         Frame("first", joint="revolute", actuated=True, position=0.3),
         Frame("second", "first", np.array([0.15, 0.05, 0.0])),
@@ -38,7 +37,7 @@ def arm(callout, at=(0.4, 0.1, 0.05), turn=(0.0, np.pi / 2, 0.0)):
 
 
 def cube(rng, inside):
-    """(10^6, 3) uniform points of a set within the cube of half size 1."""
+    """Return uniform random points in a subset of a cube, (10^6, 3)."""
     kept = []
     while sum(map(len, kept)) < FINITE:
         points = rng.uniform(-1, 1, (1_000_000, 3))
@@ -47,7 +46,7 @@ def cube(rng, inside):
 
 
 def turned_to(axes):
-    """Return the smallest rotations from z to the directions (k, 3)."""
+    """Return the smallest rotations from z to directions, (k, 3)."""
     axes = axes / np.linalg.norm(axes, axis=1, keepdims=True)
     across = np.cross([0.0, 0.0, 1.0], axes)
     sine = np.linalg.norm(across, axis=1, keepdims=True)
@@ -55,7 +54,7 @@ def turned_to(axes):
 
 
 def moved_by_planes(heights, slopes):
-    """(k,) [m] shift of the hand on the planes z = height + slope . (x, y)."""
+    """Return tip displacements for planes z = height + slope . (x, y), (k,) [m]."""
     normals = np.column_stack([-slopes, np.ones(len(slopes))])
     shift = turned_to(normals).apply(TURNED) - TURNED
     shift[:, 2] += heights
@@ -63,9 +62,9 @@ def moved_by_planes(heights, slopes):
 
 
 def round_face(rng, variant):
-    """A round face within a profile zone; in one variant its slope is limited too."""
+    """Round face with a profile tolerance, and in one variant with an angularity."""
     width, diameter = rng.uniform(5e-5, 3e-4), rng.uniform(0.03, 0.08)
-    share = (1.0, 0.4)[variant]  # of the orientation in the profile
+    share = (1.0, 0.4)[variant]  # ratio of angularity and profile
 
     def inside(points):
         leaning = np.hypot(points[:, 1], points[:, 2])
@@ -83,10 +82,10 @@ def round_face(rng, variant):
 
 
 def envelope(rng, variant):
-    """A rectangular face whose four corners are within the limits of its length."""
+    """Rectangular face whose corners are within a length tolerance."""
     tolerance, x = rng.uniform(2e-5, 2e-4), rng.uniform(0.03, 0.08)
     y = (0.5, 1.0)[variant] * x
-    # height, and how much the slopes along x and y raise the corners
+    # height, and changes of height at the corners due to slopes
     points = cube(rng, lambda p: abs(p).sum(axis=1) <= 1)
     callout = Callout(
         "face", "feature", (Datum("first"),), shape="plane", extent=(x, y),
@@ -97,7 +96,7 @@ def envelope(rng, variant):
 
 
 def moved_axes(rng, radius, length, hand):
-    """(k, 3) [m] shift of a point fixed to an axis whose ends are in discs."""
+    """Return displacements of a point on an axis with random ends, (k, 3) [m]."""
     ends = [disc(rng, 1.0) * np.reshape(radius, (-1, 1)) for _ in range(2)]
     slope = (ends[0] - ends[1]) / length
     turn = turned_to(np.column_stack([slope, np.ones(FINITE)]))
@@ -107,7 +106,7 @@ def moved_axes(rng, radius, length, hand):
 
 
 def shifting_datum(rng, variant):
-    """A bore with datum A, a bore or a face, and B, a hole at maximum material."""
+    """Bore whose datum B is a hole at maximum material."""
     width, length = rng.uniform(1e-5, 4e-5), rng.uniform(0.02, 0.05)
     shape = ("axis", "plane")[variant]
     datums = (Datum("first", shape), Datum("second", hole="12 H7"))
@@ -120,7 +119,7 @@ def shifting_datum(rng, variant):
     if shape == "plane":
         moved[:, :2] += shift
     else:
-        # the frame turns about A until it points to the shifted B
+        # The frame rotates about A in the direction of the shifted datum B.
         x, y = 0.15 + shift[:, 0], 0.05 + shift[:, 1]
         angle = np.arctan2(y, x) - np.arctan2(0.05, 0.15)
         about = Rotation.from_rotvec(np.outer(angle, [0.0, 0.0, 1.0]))
@@ -130,7 +129,7 @@ def shifting_datum(rng, variant):
 
 
 def tilting_datum(rng, variant):
-    """A bore whose datum A is a hole 12 H7 at maximum material, which tilts too."""
+    """Bore whose datum A is a hole 12 H7 at maximum material."""
     width, length = rng.uniform(1e-5, 4e-5), rng.uniform(0.02, 0.05)
     extent = (0.02, 0.04)[variant]
     callout = Callout(
@@ -178,9 +177,9 @@ clearance = {{ {clearance}, length = {length} }}
 
 
 def farthest(shift, turn, gap, length, height):
-    """(k,) [m] largest shift of a point on a pin whose ends are in discs of a gap."""
+    """Return the largest displacements of a point on a pin with a gap, (k,) [m]."""
     reach = gap * max(1.0, 2 * height / length)
-    lean = 2 * gap / length if 2 * height > length else 0.0  # of the pin in the hole
+    lean = 2 * gap / length if 2 * height > length else 0.0  # tilt of the pin
     axes = turn.apply([0.0, 0.0, 1.0])
     shift = shift - axes * np.reshape(height * (1 - np.cos(lean)), (-1, 1))
     along = (shift * axes).sum(axis=1)
@@ -189,7 +188,7 @@ def farthest(shift, turn, gap, length, height):
 
 
 def form(rng, variant, folder):
-    """A pin with a stated gap in a bore that is not cylindrical."""
+    """Pin in a bore with a cylindricity tolerance."""
     width, length = rng.uniform(3e-5, 1e-4), rng.uniform(0.02, 0.04)
     gap, cylindricity = rng.uniform(5e-6, 2e-5), 0.3 * width
     height = HEIGHTS[variant]
@@ -202,7 +201,7 @@ def form(rng, variant, folder):
 
 
 def coupled_hole(rng, variant, folder):
-    """A hole 12 H7 whose size determines its zone and the clearance of its pin."""
+    """Hole 12 H7 whose size determines its position zone and its clearance."""
     width, length = rng.uniform(1e-5, 4e-5), rng.uniform(0.02, 0.04)
     height = HEIGHTS[variant]
     robot = _pin(
@@ -224,9 +223,9 @@ CASES = [round_face, envelope, shifting_datum, tilting_datum, form, coupled_hole
 
 
 @pytest.mark.slow
-def test_yields_of_additional_zones_equal_those_of_finite_geometry(tmp_path):
-    """With 24 cases and 95 % intervals, one miss is expected; four have a probability
-    of 3 %.
+def test_yields_of_further_zones_agree_with_nonlinear_simulation(tmp_path):
+    """For 24 confidence intervals of 95 %, one is expected to fail. Four or more fail
+    with a probability of 3 %.
     """
     inside = []
     for number in range(24):

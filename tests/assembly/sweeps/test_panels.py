@@ -1,4 +1,4 @@
-"""Figures of quantities selected by name show the numbers in the file."""
+"""Figures of quantities that are selected by name."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ def data():
 
 
 def shown(panel):
-    """(y, x) numbers of a map."""
+    """Return the values of a map, (y, x)."""
     return np.asarray(panel.collections[0].get_array()).reshape(2, 3)
 
 
@@ -42,7 +42,7 @@ def test_map_shows_the_named_component(data, name, at, scale, title):
     assert panel.get_title().startswith(title)
 
 
-def test_variable_without_a_component_plots_all_its_components(data):
+def test_name_of_a_variable_selects_all_components(data):
     figure = ff.show(data.isel(ty=[0]), quantities=["stiffness", "energy"])
     lines = [panel for panel in figure.axes if panel.lines]
     titles = [panel.get_title() for panel in lines]
@@ -54,7 +54,7 @@ def test_variable_without_a_component_plots_all_its_components(data):
 
 
 def test_single_natural_frequency_is_plotted(data):
-    """The mode axis has one value and is not dropped."""
+    """The axis of the modes has a single value."""
     one = data.assign(
         frequency=(("tx", "ty", "mode"), np.ones((3, 2, 1)))
     ).assign_coords(mode=["1"])
@@ -79,21 +79,19 @@ def test_unknown_or_too_many_quantities_are_rejected_in_one_line(run, data, tmp_
     assert not (tmp_path / "p.png").exists()
 
 
-def test_histogram_of_a_signed_component_marks_its_negative_mode(arm_draws):
+def test_histogram_shows_the_negative_mode_of_a_component(arm_draws):
     figure = figure_of_draws(arm_draws, None, ["platform_screw.TX"])
     panel = figure.axes[0]
     assert panel.get_xlabel() == "platform_screw.TX [mm]"
     (mode,) = [line for line in panel.lines if "most probable" in line.get_label()]
     assert mode.get_xdata()[0] == pytest.approx(-1.0, abs=0.05)
-    with pytest.raises(ff.BadInput, match="expected with a histogram"):
+    with pytest.raises(ff.BadInput, match="expected a histogram"):
         figure_of_draws(arm_draws, "tornado", ["energy"])
 
 
 @pytest.fixture
 def arm_draws(rng):
-    """Draws whose platform is off by -1 mm along x, with a normal deviation of
-    0.05 mm.
-    """
+    """Return random draws with a mean platform error of -1 mm along x."""
     screw = np.zeros((4000, 6))
     screw[:, 3] = rng.normal(-1e-3, 5e-5, 4000)
     return xarray.Dataset(
