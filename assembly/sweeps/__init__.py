@@ -1,4 +1,4 @@
-"""Sweeps: quantities of a robot at many postures, designs and draws of errors.
+"""Sweeps: results for many postures, design parameters and random errors.
 
-Start with ``request.py`` for the options and ``sweep.py`` for the computation.
+Start with ``request.py`` for the options and with ``sweep.py`` for the computation.
 """

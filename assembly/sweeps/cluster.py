@@ -1,11 +1,9 @@
 """Parallel computation of a sweep with Dask, on this machine or on a cluster.
 
-The client submits only a few tasks per worker at a time and writes their results to the
-journal, so neither the client nor a worker holds more than a few blocks in memory.  A
-task contains as many blocks as can be solved in about half a second. The last tasks are
-smaller, so that workers finish at nearly the same time.  Dask reassigns the tasks of a
-lost worker.  How blocks are distributed does not affect any result, because each
-process computes on one thread and points do not depend on neighbouring points.
+To limit memory use, the client submits only a few tasks per worker at a time. A task
+consists of the blocks of points that can be solved in about half a second. The last
+tasks are smaller, so that all workers finish at nearly the same time. The results do
+not depend on the number of workers.
 """
 
 import logging
@@ -32,13 +30,13 @@ from forcefit.inputs.table import BadInput
 if TYPE_CHECKING:
     import distributed
 
-_TASK = 0.5  # [s] target duration of a task; Dask recommends at least 0.1
-_IN_FLIGHT = 3  # number of submitted tasks per thread of the cluster
+_TASK = 0.5  # [s] target duration of a task
+_IN_FLIGHT = 3  # number of simultaneously submitted tasks per thread
 _LARGEST = 256  # largest number of blocks per task
-_LAST = 2  # number of tasks per thread into which the last blocks are divided
-# Dask's profiler samples every 10 ms, which makes workers about 3 % slower
+_LAST = 2  # minimum number of tasks per thread for the remaining blocks
+# The profiler of Dask makes workers about 3 % slower.
 _QUIET = {"distributed.worker.profile.enabled": False}
-_PATIENCE = 60.0  # [s] longest wait for the first worker
+_PATIENCE = 60.0  # [s] time limit for the connection of the first worker
 
 Task = tuple[int, Points]
 
@@ -48,17 +46,18 @@ def cluster_solver(
     scheduler: str | None = None,
     report: Callable[[str], None] = lambda text: None,
 ) -> Solver:
-    """Return a solver for :func:`.sweep.run_sweep` on a cluster.
+    """Return a function that solves blocks of a sweep on a cluster.
 
     Args:
         workers: number of processes of a local cluster to start; None if
             ``scheduler`` is given.
-        scheduler: address of a running cluster, such as ``tcp://10.0.0.1:8786``.
-        report: callback that receives a final line of text with the number of tasks and
-            their median duration.
+        scheduler: address of the scheduler of a running cluster, such as
+            ``tcp://10.0.0.1:8786``.
+        report: function called at the end with a line of text on the number and the
+            duration of tasks.
 
     Returns:
-        The solver, which connects to the cluster, or starts it, when first used.
+        The argument ``solve`` of :func:`.sweep.run_sweep`.
     """
 
     def solve(
@@ -67,7 +66,7 @@ def cluster_solver(
         import dask
         from distributed import Client, LocalCluster
 
-        # the sweep itself reports failures, in one message
+        # Suppress log messages, because failures are reported by exceptions.
         logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
         if scheduler is not None:
             with _connected(scheduler) as client:
@@ -86,7 +85,7 @@ def cluster_solver(
 
 @contextmanager
 def _without_interrupts() -> Generator[None, None, None]:
-    """Make processes started in the block ignore Ctrl-C; the sweep terminates them."""
+    """Ignore Ctrl-C in processes that are started in this context."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -116,15 +115,15 @@ def _distribute_connected(
     blocks: list[int],
     report: Callable[[str], None],
 ) -> Iterator[tuple[int, SolvedPoints]]:
-    """Distribute blocks; if the scheduler is lost, report this in a single error."""
+    """Distribute blocks, and raise an error if the scheduler is lost."""
     from distributed.comm import CommClosedError
 
     try:
         yield from _distribute(client, sweep, blocks, report)
     except (CommClosedError, CancelledError):
         raise BadInput(
-            "sweep: the connection to the scheduler was lost; finished points "
-            "are in the journal: run the same command again to continue"
+            "sweep: the connection to the scheduler was lost; the journal contains "
+            "the finished points; run the same command again to continue"
         ) from None
 
 
@@ -134,7 +133,7 @@ def _distribute(
     blocks: list[int],
     report: Callable[[str], None],
 ) -> Iterator[tuple[int, SolvedPoints]]:
-    """Submit blocks as workers become free, and yield results in any order."""
+    """Submit blocks to workers, and yield results in any order."""
     from distributed import KilledWorker, as_completed
 
     _check_workers(client)
@@ -159,9 +158,9 @@ def _distribute(
             seconds, solved = future.result()
         except KilledWorker:
             raise BadInput(
-                "sweep: some points ended every worker that computed them, for "
-                "example because memory ran out; the journal keeps all other "
-                "points"
+                "sweep: all workers that computed some of the points were "
+                "terminated, for example because of insufficient memory; the "
+                "journal contains all other points"
             ) from None
         future.release()
         flying -= 1
@@ -176,17 +175,17 @@ def _distribute(
 
 
 def _threads(client: "distributed.Client") -> int:
-    """Return the total number of threads of the current workers, which may change."""
+    """Return the present number of threads of all workers."""
     from distributed.comm import CommClosedError
 
     try:
         return max(1, sum(client.nthreads().values()))
-    except OSError as error:  # a lost scheduler does not answer this query either
+    except OSError as error:  # no answer from the scheduler
         raise CommClosedError(str(error)) from error
 
 
 def _check_workers(client: "distributed.Client") -> None:
-    """Reject a cluster without workers or with workers of another program version."""
+    """Raise an error if there is no worker or if the program versions differ."""
     try:
         client.wait_for_workers(1, timeout=_PATIENCE)
     except TimeoutError:
@@ -204,7 +203,7 @@ def _check_workers(client: "distributed.Client") -> None:
 
 
 def _program() -> dict[str, str]:
-    """Return the program version and the digest of its sources and libraries."""
+    """Return the version of the program and a digest of its sources."""
     return {
         "program": f"forcefit {version('forcefit')}",
         "program_sha256": program_hash(),
@@ -214,19 +213,18 @@ def _program() -> dict[str, str]:
 def solve_task(
     question: bytes, digest: str, tasks: list[Task]
 ) -> tuple[float, list[tuple[int, SolvedPoints]]]:
-    """Solve the blocks of a task on one thread of a worker.
+    """Solve blocks of points on one thread of a worker.
 
     Args:
-        question: pickled quantities of the sweep.
-        digest: digest of these quantities on the client.
-        tasks: number and points of each block.
+        question: pickled :class:`Question` of the sweep.
+        digest: digest of the question on the client.
+        tasks: index and points of each block.
 
     Returns:
-        Computation time [s], and the number of each block with its results.
+        Computation time [s], and index and results of each block.
 
     Raises:
-        BadInput: the digest on this worker differs, because a mesh or a stiffness
-            library differs.
+        BadInput: the digest differs on this worker, for example because a mesh differs.
     """
     from threadpoolctl import threadpool_limits
 
@@ -239,12 +237,12 @@ def solve_task(
 
 @lru_cache(maxsize=4)
 def _question(content: bytes, digest: str) -> Question:
-    """Return the unpickled quantities, cached so that each worker has one robot."""
+    """Return the question of a sweep, cached for all tasks of a worker."""
     asked: Question = pickle.loads(content)
     question = replace(asked, robot=solve_links(asked.robot))
     if question_hash(question) != digest:
         raise BadInput(
-            "sweep: found another robot on a worker; expected the same meshes "
-            "and stiffness libraries there, at the same paths"
+            "sweep: found different meshes or stiffness libraries on a worker; "
+            "expected the same files at the same paths"
         )
     return question

@@ -1,7 +1,7 @@
 """Results of a sweep as an xarray data set, in memory or in a NetCDF file.
 
-A file is written from the journal block by block to limit memory use. Equal sweeps give
-identical files, byte for byte.
+To limit memory use, a file is written block by block from the journal. Files of equal
+sweeps are byte-identical.
 """
 
 import os
@@ -29,34 +29,34 @@ if TYPE_CHECKING:
     from forcefit.assembly.sweeps.plan import Sweep
 
 Texts = dict[str, dict[int, str]]
-# kinds of files written by commands, and the attribute that identifies each kind
+# kinds of NetCDF files, and an attribute that only this kind has
 KINDS = {
     "a sweep": "near", "draws": "sources_and_posture_sha256", "tolerances": "cost_law",
     "a path": "path_law",
 }  # fmt: skip
 _TEXT = {name: QUANTITIES[name].meaning for name in ("status", *TEXTS)}
 _TEXT["status"] += ": " + ", ".join(OF_POINTS[1:])
-# variable names in files of older releases, and their current names
+# variable names of older releases, and current names
 _OLD_NAMES = {
     "rotation_error_play": "rotation_error_clearance",
     "translation_error_play": "translation_error_clearance",
     "play_mixed": "clearance_mixed",
 }
 _OLD_ATTRIBUTES = {"play": "clearance", "reading": "assumption"}
-# number of blocks per write; one write takes as long as solving a hundred points
+# number of blocks that are written together, because each write takes some time
 _TOGETHER = 256
 
 
 def sweep_dataset(sweep: "Sweep", records: NDArray, texts: Texts) -> "xarray.Dataset":
-    """Build the data set of a whole sweep in memory.
+    """Return the data set of a sweep in memory.
 
     Args:
         sweep: sweep to which the results belong.
         records: (points,) records of all points.
-        texts: for each text variable, the texts of the points that have one.
+        texts: for each text variable, its nonempty texts by point index.
 
     Returns:
-        The data set; units are in the attribute ``units``.
+        The data set. The unit of each variable is its attribute ``units``.
     """
     import xarray
 
@@ -77,12 +77,13 @@ def sweep_dataset(sweep: "Sweep", records: NDArray, texts: Texts) -> "xarray.Dat
 def write_sweep(
     sweep: "Sweep", read: Callable[[int], tuple[NDArray, Texts]], path: Path
 ) -> None:
-    """Write the data set of a sweep as a NetCDF file, either completely or not at all.
+    """Write the data set of a sweep as a NetCDF file.
 
     Args:
         sweep: sweep to which the results belong.
-        read: function from a block number to the records and texts of the block.
-        path: path of the file, which replaces an existing file only once complete.
+        read: function that returns the records and texts of a block.
+        path: path of the file. An existing file is replaced after the complete file
+            has been written.
 
     Raises:
         BadInput: the file cannot be written.
@@ -94,7 +95,7 @@ def write_sweep(
 def _write(
     sweep: "Sweep", read: Callable[[int], tuple[NDArray, Texts]], file: Any
 ) -> None:
-    """Write the NetCDF file: coordinates first, then block by block."""
+    """Write coordinates and variables to an open NetCDF file."""
     import h5py
 
     text = h5py.string_dtype()
@@ -141,15 +142,15 @@ def _put(variable: Any, shape: tuple[int, ...], first: int, values: NDArray) -> 
 
 
 def slabs(shape: tuple[int, ...], first: int, last: int) -> Iterator[tuple[slice, ...]]:
-    """Yield boxes of an array that together contain points ``first`` to ``last - 1``.
+    """Yield index ranges that cover the points ``first`` to ``last - 1`` of an array.
 
     Args:
         shape: shape of the array.
-        first: number of the first point, counted in C order.
-        last: number after the last point.
+        first: index of the first point in C order.
+        last: index after the last point.
 
     Yields:
-        A slice for each axis; the boxes are in the order of the points.
+        One slice per axis, in the order of the points.
     """
     if len(shape) == 1:
         yield (slice(first, last),)
@@ -183,7 +184,7 @@ def _joined(blocks: list[tuple[NDArray, Texts]]) -> tuple[NDArray, Texts]:
 
 
 def _text_column(name: str, records: NDArray, texts: Texts) -> NDArray:
-    """Return a text variable's values (k,) as an object array."""
+    """Return the values of a text variable, (k,), as an object array."""
     if name == "status":
         return np.array(OF_POINTS, dtype=object)[records["status"]]
     column = np.full(len(records), "", dtype=object)
@@ -193,7 +194,7 @@ def _text_column(name: str, records: NDArray, texts: Texts) -> NDArray:
 
 
 def _coordinates(sweep: "Sweep") -> dict[str, tuple[tuple[str, ...], NDArray, dict]]:
-    """Return axes, values and attributes of every coordinate, by name."""
+    """Return axes, values and attributes of all coordinates by name."""
     table: dict[str, tuple[tuple[str, ...], NDArray, dict]] = {}
     units = sweep.units
     for path, values in zip(sweep.question.varied, sweep.values, strict=True):
@@ -214,11 +215,12 @@ def _coordinates(sweep: "Sweep") -> dict[str, tuple[tuple[str, ...], NDArray, di
 
 
 def save_dataset(data: "xarray.Dataset", path: Path | str) -> None:
-    """Write a data set as NetCDF, either completely or not at all.
+    """Write a data set as a NetCDF file.
 
     Args:
         data: data set to write.
-        path: path of the file, which replaces an existing file only once complete.
+        path: path of the file. An existing file is replaced after the complete file
+            has been written.
 
     Raises:
         BadInput: the file cannot be written.
@@ -230,28 +232,26 @@ def save_dataset(data: "xarray.Dataset", path: Path | str) -> None:
 
 
 def check_dataset(path: Path | str, what: str) -> None:
-    """Check before a computation that its NetCDF file can be written.
+    """Check before a computation that a NetCDF file can be written.
 
     Args:
-        path: path of the file that will be written.
-        what: one of :data:`KINDS`; an existing file must be of this kind.
+        path: path of the file.
+        what: required kind of an existing file, one of :data:`KINDS`.
 
     Raises:
-        BadInput: an existing file is of another kind, or for the reasons in
-            :func:`forcefit.inputs.writing.check_writable`.
+        BadInput: an existing file is of another kind, or the file cannot be written.
     """
     check_writable(path, NETCDF)
     path = Path(path)
     if path.is_file() and path.stat().st_size and not _is(path, what):
         raise BadInput(
-            f"{path}: found a NetCDF file that is not one of {what} by "
-            "forcefit; expected such a file or none: it is not overwritten, "
-            "write to another file"
+            f"{path}: found a NetCDF file that does not contain {what} of forcefit, "
+            "so it is not overwritten; write to another file"
         )
 
 
 def _is(path: Path, what: str) -> bool:
-    """Return whether a file's attributes mark it as a file of the given kind."""
+    """Return whether a file is of the given kind according to its attributes."""
     import h5py
 
     try:
@@ -264,13 +264,13 @@ def _is(path: Path, what: str) -> bool:
 
 
 def open_dataset(path: Path | str) -> "xarray.Dataset":
-    """Load the data set in a NetCDF file.
+    """Load a data set from a NetCDF file.
 
     Args:
         path: path of a NetCDF file.
 
     Returns:
-        The data set, loaded into memory.
+        The data set.
 
     Raises:
         BadInput: the file does not exist or is not a NetCDF file.
@@ -284,14 +284,14 @@ def open_dataset(path: Path | str) -> "xarray.Dataset":
     check_heaps(path)
     try:
         data = xarray.load_dataset(path, engine="h5netcdf")
-    except Exception as error:  # HDF5 raises various exceptions for damaged files
+    except Exception as error:  # damaged files cause various exceptions
         reason = str(error).partition("\n")[0][:200]
         raise BadInput(f"{path}: cannot be read as NetCDF: {reason}") from None
     return _with_new_names(data)
 
 
 def _with_new_names(data: "xarray.Dataset") -> "xarray.Dataset":
-    """Rename the variables of a data set written by an older release."""
+    """Return a data set of an older release with current variable names."""
     old = {name: new for name, new in _OLD_NAMES.items() if name in data.data_vars}
     data.attrs = {_OLD_ATTRIBUTES.get(str(k), k): v for k, v in data.attrs.items()}
     return data.rename_vars(old)

@@ -1,6 +1,6 @@
-"""Digests of the program, the robot and the computed quantities, to identify results.
+"""Digests (SHA-256) that identify program, robot and inputs of a computation.
 
-Each digest is a SHA-256, which journals and the workers of a cluster compare.
+They are compared before a journal is resumed and by the workers of a cluster.
 """
 
 import hashlib
@@ -25,23 +25,22 @@ from forcefit.assembly.model.robot import LibraryLink, MeshLink, Robot
 from forcefit.assembly.sweeps.parameters import Design
 from forcefit.inputs.program import sources_hash
 
-# libraries that affect the results, because another version may round differently
+# libraries whose version may affect the results
 _LIBRARIES = ("numpy", "scipy", "clarabel")
 
 
 @cache
 def program_hash() -> str:
-    """Return the SHA-256 of the program's sources and the versions of its libraries."""
+    """Return the digest of the program's sources and library versions."""
     packages = forcefit.inputs, forcefit.stiffness, forcefit.assembly
     own = sources_hash(packages, _LIBRARIES)
     return hashlib.sha256((own + kernels.sources).encode()).hexdigest()
 
 
 def robot_hash(robot: Robot) -> str:
-    """Return the SHA-256 of a robot file and of everything it refers to.
+    """Return the digest of a robot, including meshes and stiffness libraries.
 
-    A robot file may refer to meshes, stiffness libraries, and effects from other
-    packages, whose version enters the hash.
+    If the robot has effects from other packages, the digest depends on their versions.
 
     Args:
         robot: the robot.
@@ -50,7 +49,7 @@ def robot_hash(robot: Robot) -> str:
         The digest.
 
     Raises:
-        BadInput: a mesh or a stiffness library was not read when the robot was loaded.
+        BadInput: a mesh or a stiffness library has not been read.
     """
     table = robot_table(robot)
     table.pop("description", None)
@@ -61,16 +60,15 @@ def robot_hash(robot: Robot) -> str:
         if isinstance(frame.link, LibraryLink):
             digest.update(link_compliance(frame).tobytes())
     for name in (*robot.effects, *chain(*robot.session_effects.values())):
-        digest.update(LIBRARY.version(name).encode())  # empty for forcefit's effects
+        digest.update(LIBRARY.version(name).encode())  # empty for effects of forcefit
     return digest.hexdigest()
 
 
 def question_hash(question: Any) -> str:
-    """Return the SHA-256 of an object's attribute names and values.
+    """Return the digest of an object's attributes.
 
     Args:
-        question: plain values, arrays, robots, designs, or dataclasses composed of
-            these.
+        question: a dataclass or dictionary of plain values, arrays, robots and designs.
 
     Returns:
         The digest.
@@ -79,10 +77,10 @@ def question_hash(question: Any) -> str:
 
 
 def _as_json(value: Any) -> Any:
-    """Return a value as JSON-serializable data, different for different values."""
+    """Return a unique JSON-serializable representation of a value."""
     if isinstance(value, Robot):
         return ["robot", robot_hash(value)]
-    if isinstance(value, Design):  # the path of the design's file is irrelevant
+    if isinstance(value, Design):  # the path of the file is omitted
         return ["design", _as_json(value.content)]
     if isinstance(value, np.ndarray):
         content = np.ascontiguousarray(value)

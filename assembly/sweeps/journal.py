@@ -1,11 +1,10 @@
-"""Journal of a sweep: finished blocks in a file that survives an interruption.
+"""Journal of a sweep: file of finished blocks, from which a sweep resumes.
 
-The file begins with one line of JSON, which identifies the sweep, and the checksum of
-this line. Records follow, each appended by a single write: block number, length of the
-content, checksum, and the block's rows and texts. Each checksum continues that of the
-first line, so every record is tied to its sweep. A record with a wrong checksum is
-damaged, or was cut short by an interruption, and is ignored. Records may be in any
-order and may occur twice.  Only one program at a time can lock the file.
+The first line is a JSON object that identifies the sweep, followed by a checksum. Each
+record consists of block index, length of the content, checksum and content. The
+checksum of a record depends on the first line. Records with a wrong checksum are
+ignored. Records may be in any order and may occur twice. The file is locked while it is
+open.
 """
 
 import json
@@ -27,19 +26,19 @@ from forcefit.inputs.table import BadInput
 from forcefit.inputs.writing import check_writable, unwritable
 
 _MAGIC = b"FFB2"
-_HEAD = struct.Struct("<4sQQI")  # magic, block, length of the content, checksum
+_HEAD = struct.Struct("<4sQQI")  # signature, block, length of the content, checksum
 _KIND = "forcefit sweep journal 2"
 
 
 @dataclass(frozen=True, eq=False)
 class Journal:
-    """An open journal of finished blocks.
+    """An open journal.
 
     Attributes:
         path: path of the file.
-        record_type: type of the rows.
-        owner: checksum of the first line, which the records' checksums continue.
-        places: file offset and length [bytes] of each finished block's content.
+        record_type: type of the records.
+        owner: checksum of the first line.
+        places: file offset and length of each finished block [bytes].
     """
 
     path: Path
@@ -50,12 +49,13 @@ class Journal:
     def add(
         self, block: int, records: NDArray, texts: dict[str, dict[int, str]]
     ) -> None:
-        """Append a finished block, which is in the file when this function returns.
+        """Append a finished block to the file.
 
         Args:
-            block: number of the block.
+            block: index of the block.
             records: records of its points.
-            texts: for each text variable, the texts by row, for rows that have one.
+            texts: for each text variable, its nonempty texts by point index within the
+                block.
 
         Raises:
             BadInput: the file cannot be written, for example because the disk is full.
@@ -75,7 +75,7 @@ class Journal:
         self.places[block] = start + len(head), len(content)
 
     def remove_after(self, held: ExitStack) -> None:
-        """Remove the file when a block of code ends without an error."""
+        """Remove the file when ``held`` is closed without an exception."""
 
         def remove(kind: object, *_: object) -> None:
             if kind is None:
@@ -87,13 +87,13 @@ class Journal:
         """Return the records and texts of a finished block.
 
         Args:
-            block: number of the block.
+            block: index of the block.
 
         Returns:
-            The records and texts as they were passed to :meth:`add`.
+            The records and texts, as in :meth:`add`.
 
         Raises:
-            BadInput: the file has been changed since it was opened, or cannot be read.
+            BadInput: the file cannot be read or has been changed.
         """
         start, length = self.places[block]
         try:
@@ -105,8 +105,8 @@ class Journal:
         check = _check(self.owner, block, content)
         if head != _HEAD.pack(_MAGIC, block, length, check):
             raise BadInput(
-                f"{self.path}: block {block} was changed while the sweep ran; the same "
-                "command solves it again"
+                f"{self.path}: block {block} was changed during the sweep; run the "
+                "same command again to compute it"
             )
         (count,) = struct.unpack_from("<Q", content)
         end = 8 + count * self.record_type.itemsize
@@ -122,21 +122,20 @@ class Journal:
 def open_journal(
     path: Path, whose: dict[str, Any], record_type: np.dtype
 ) -> Generator[Journal, None, None]:
-    """Open a new journal, or the journal of an interrupted sweep, as a context.
+    """Open a new or an existing journal as a context manager.
 
     Args:
         path: path of the file.
-        whose: plain values that identify the sweep. All of them must be equal to resume
-            it, except ``program``, whose version differs between commits of equal
-            sources.
+        whose: values that identify the sweep. To resume a sweep, all values except
+            ``program`` must be equal.
         record_type: type of the records.
 
     Yields:
         The journal with the finished blocks.
 
     Raises:
-        BadInput: another program has locked the file, or the file belongs to another
-            sweep, is not a journal, or cannot be written.
+        BadInput: another process uses the file, or the file belongs to another sweep,
+            is not a journal, or cannot be written.
     """
     check_writable(path)
     equal = {name: value for name, value in whose.items() if name != "program"}
@@ -147,8 +146,8 @@ def open_journal(
             held.enter_context(locked_file(path, wait=False))
         except BlockingIOError:
             raise BadInput(
-                f"{path}: another run holds this journal; expected no other run "
-                "that writes the same file (wait for its end, or write to another file)"
+                f"{path}: another process uses this journal; wait until it has "
+                "finished, or write to another file"
             ) from None
         except OSError as error:
             raise BadInput(unwritable(path, error)) from None
@@ -157,7 +156,7 @@ def open_journal(
 
 
 def _recover(path: Path, header: bytes, owner: int) -> dict[int, tuple[int, int]]:
-    """Locate the finished blocks in the file; repair its first line and its end."""
+    """Return the places of finished blocks in a journal, and repair the file."""
     try:
         with path.open("r+b") as file:
             size = os.fstat(file.fileno()).st_size
@@ -168,7 +167,8 @@ def _recover(path: Path, header: bytes, owner: int) -> dict[int, tuple[int, int]
                 with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
                     places, end = _scan(content, len(header), owner)
             if first_line != header:
-                # valid records identify the sweep, so only the first line was damaged
+                # If there are valid records, the sweep is the same and only the line is
+                # damaged.
                 if not places and not header.startswith(first_line):
                     file.seek(0)
                     raise BadInput(f"{path}: {_difference(file.readline(), header)}")
@@ -183,7 +183,7 @@ def _recover(path: Path, header: bytes, owner: int) -> dict[int, tuple[int, int]
 def _scan(
     content: mmap.mmap, start: int, owner: int
 ) -> tuple[dict[int, tuple[int, int]], int]:
-    """Locate all valid records in the file, and the end of the last one."""
+    """Return the places of all valid records, and the end of the last one."""
     places: dict[int, tuple[int, int]] = {}
     end = start
     place = content.find(_MAGIC, start)
@@ -203,13 +203,13 @@ def _scan(
 
 
 def _check(owner: int, block: int, content: bytes) -> int:
-    """Return the checksum of a record over sweep, block number, length and content."""
+    """Return the checksum of a record."""
     head = struct.pack("<QQ", block, len(content))
     return zlib.crc32(content, zlib.crc32(head, owner))
 
 
 def _difference(first_line: bytes, header: bytes) -> str:
-    """Describe how a journal differs from the expected journal."""
+    """Return a description of how a journal differs from the expected one."""
     expected = json.loads(header.rpartition(b" ")[0])
     line, _, check = first_line.rstrip(b"\n").rpartition(b" ")
     if not first_line.startswith(b'{"kind": "forcefit sweep journal'):
@@ -219,13 +219,12 @@ def _difference(first_line: bytes, header: bytes) -> str:
         )
     if check != b"%08x" % zlib.crc32(line):
         return (
-            "the check sum of the first line is wrong: the journal is damaged "
-            "or of another version; expected this sweep's journal (delete the "
-            "file to start again)"
+            "the checksum of the first line is wrong, because the journal is damaged "
+            "or of another version; delete the file to start again"
         )
     other = json.loads(line)
     keys = [k for k in expected if other.get(k) != expected[k]]
-    # omit the hash of the whole input if a more specific key differs
+    # If a more specific key differs, omit the digest of the whole input.
     keys = [k for k in keys if k != "question_sha256"] or keys
     theirs = ", ".join(f"{k} {str(other.get(k))[:60]!r}" for k in keys)
     wanted = ", ".join(f"{k} {str(expected[k])[:60]!r}" for k in keys)

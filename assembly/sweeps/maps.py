@@ -1,6 +1,6 @@
-"""Figures of a sweep from its data set: maps over two axes, or lines along one axis.
+"""Figures of a sweep: maps over two axes, or lines along one axis.
 
-Each of these functions takes a data set and returns a figure.
+Start with :func:`figure_of`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -30,18 +30,18 @@ def figure_of(
 
     Args:
         data: data set of a sweep.
-        at: values on the remaining axes by name; the nearest points are shown. If no
-            draw is selected, the median over all draws is shown.
-        quantities: quantities to show, by the names in
-            :mod:`forcefit.assembly.sweeps.panels`; by default those in figure 5 of the
-            paper.
+        at: values of the axes that are not drawn, by name. The nearest points are used.
+            Without a value for ``draw``, medians over all draws are drawn.
+        quantities: names of quantities, see :mod:`forcefit.assembly.sweeps.panels`; by
+            default those in figure 5 of the paper.
 
     Returns:
-        A figure with one panel per quantity, by default six. A notebook shows it as the
-        result of a cell; otherwise it is not shown.
+        A figure with one panel per quantity, which a notebook displays as the result of
+        a cell.
 
     Raises:
-        BadInput: an axis or a quantity is unknown, or more than two axes remain.
+        BadInput: an axis or a quantity is unknown, or more than two axes have no value
+            in ``at``.
     """
     if "status" not in data:
         raise BadInput(
@@ -59,14 +59,14 @@ def figure_of(
 
 
 def check_axes(sizes: Mapping[str, int]) -> None:
-    """Reject a sweep whose axes allow neither a map nor a line.
+    """Raise an error unless a sweep has one or two axes with several values.
 
     Args:
-        sizes: number of values on each axis.
+        sizes: number of values of each axis.
 
     Raises:
-        BadInput: the number of axes with several values, not counting draws, is not 1
-            or 2.
+        BadInput: apart from draws, the number of axes with several values is not 1 or
+            2.
     """
     long = {name: n for name, n in sizes.items() if n > 1 and name != "draw"}
     if len(long) > 2:
@@ -84,14 +84,14 @@ def check_axes(sizes: Mapping[str, int]) -> None:
 def part_of_sweep(
     data: "xarray.Dataset", at: Mapping[str, float | str]
 ) -> tuple["xarray.Dataset", str]:
-    """Select part of a sweep by fixing values on axes, and take the median over draws.
+    """Select points of a sweep by axis values, and compute medians over draws.
 
     Args:
         data: data set of a sweep.
-        at: value for each axis to be fixed.
+        at: values of axes by name.
 
     Returns:
-        The selected part without axes of length one, and a note on the selection.
+        The selected data without axes of length one, and a text on the selection.
 
     Raises:
         BadInput: an axis or a value is unknown.
@@ -120,7 +120,7 @@ def part_of_sweep(
 
 
 def _number(name: str, value: float | str) -> float:
-    """Return the value at which an axis is fixed."""
+    """Convert the value of an axis to a number."""
     try:
         return float(value)
     except ValueError:
@@ -130,7 +130,7 @@ def _number(name: str, value: float | str) -> float:
 
 
 def _median(data: "xarray.Dataset") -> "xarray.Dataset":
-    """Return each point's median over the draws, and its first status other than ok."""
+    """Return medians over the draws, and the first status other than ok."""
     numbers = [k for k, v in data.data_vars.items() if v.dtype.kind == "f"]
     middle = data[numbers].median("draw", skipna=True)
     first = data.isel(draw=0, drop=True)
@@ -147,7 +147,7 @@ def _median(data: "xarray.Dataset") -> "xarray.Dataset":
 
 
 def _squeezed(data: "xarray.Dataset") -> "xarray.Dataset":
-    """Remove the axes that have only one value from a data set."""
+    """Return a data set without axes that have a single value."""
     single = [d for d in data["status"].dims if data.sizes[d] == 1]
     return data.squeeze(single, drop=True)
 
@@ -155,23 +155,24 @@ def _squeezed(data: "xarray.Dataset") -> "xarray.Dataset":
 def map_figure(
     data: "xarray.Dataset", panels: Sequence[Panel] | None = None
 ) -> "Figure":
-    """Plot margins, energy and platform error as maps over a two-dimensional grid.
+    """Plot quantities as maps over a two-dimensional grid.
 
     Args:
-        data: data set of a sweep over two axes with more than one value each.
-        panels: panels to show; by default the usual ones and the status.
+        data: data set of a sweep over two axes with several values each.
+        panels: panels to draw; by default those of figure 5 of the paper and the
+            status.
 
     Returns:
-        A figure with one panel per quantity.  The contour of margin 1 is the boundary
-        of the assembly zone; crosses mark points near a singularity.
+        A figure with one panel per quantity. The contour of margin 1 is the boundary of
+        the assembly zone. Crosses mark points near a singularity.
 
     Raises:
-        ValueError: the grid does not have two axes with several values.
+        ValueError: the sweep does not have two axes with several values.
     """
     data = _along_numbers(_squeezed(data))
     names = [str(d) for d in data["status"].dims]
     if len(names) != 2:
-        raise ValueError(f"maps need a grid with two axes, this one has {len(names)}")
+        raise ValueError(f"a map requires two axes, this sweep has {len(names)}")
     x, y = names
     shown = panels or usual_panels(data)
     figure, axes = _figure_for(len(shown), 3.7)
@@ -182,7 +183,7 @@ def map_figure(
         low, high = float(finite.min()), float(finite.max())
         if low < high:
             figure.colorbar(image, ax=panel)
-        elif low == high:  # any colour scale would make round-off visible
+        elif low == high:  # a colour scale would show only round-off errors
             title = f"{title}: {low:.4g} everywhere"
         inside = bool((finite < 1).any()) and bool((finite > 1).any())
         if key.startswith("margin") and inside and min(finite.shape) > 1:
@@ -196,7 +197,7 @@ def map_figure(
 
 
 def _figure_for(count: int, height: float) -> tuple["Figure", "list[Axes]"]:
-    """Create a figure with a grid of at least the given number of panels."""
+    """Create a figure with at least the given number of panels."""
     from matplotlib.figure import Figure
 
     rows, columns = -(-count // 2), min(count, 2)
@@ -208,14 +209,15 @@ def _figure_for(count: int, height: float) -> tuple["Figure", "list[Axes]"]:
 def path_figure(
     data: "xarray.Dataset", panels: Sequence[Panel] | None = None
 ) -> "Figure":
-    """Plot the quantities along one axis, or over a list of postures.
+    """Plot quantities as lines along one axis.
 
     Args:
         data: data set of a sweep over one axis.
-        panels: panels to show; by default the usual ones and the condition number.
+        panels: panels to draw; by default those of figure 5 of the paper and the
+            condition number.
 
     Returns:
-        A figure with one panel per quantity; crosses mark points near a singularity.
+        A figure with one panel per quantity. Crosses mark points near a singularity.
     """
     data = _along_numbers(_squeezed(data))
     (x,) = (str(d) for d in data["status"].dims)
@@ -245,7 +247,7 @@ def path_figure(
 
 
 def _along_numbers(data: "xarray.Dataset") -> "xarray.Dataset":
-    """Sort a data set by axis values; text labels become 1, 2, .."""
+    """Sort a data set by axis values, after replacing text labels by 1, 2, .."""
     for name in map(str, data["status"].dims):
         if data[name].dtype.kind not in "fiu":
             data = data.assign_coords({name: np.arange(data.sizes[name]) + 1})
@@ -254,7 +256,7 @@ def _along_numbers(data: "xarray.Dataset") -> "xarray.Dataset":
 
 
 def _near(data: "xarray.Dataset") -> NDArray:
-    """Return a bool array, True at points near a singularity."""
+    """Return which points are near a singularity, as a bool array."""
     if "near_singularity" not in data:
         return np.zeros(data["status"].shape, dtype=bool)
     texts = data["near_singularity"].transpose(*data["status"].dims)
@@ -271,7 +273,7 @@ def _mark(panel: "Axes", data: "xarray.Dataset", x: str, y: str) -> None:
 
 
 def _states(panel: "Axes", data: "xarray.Dataset", x: str, y: str) -> None:
-    """Draw the status of the points as text and colour."""
+    """Draw the status of the points in colour."""
     texts = data["status"].transpose(y, x).values.astype(str)
     _, codes = np.unique(texts, return_inverse=True)
     codes = codes.reshape(texts.shape)
@@ -281,7 +283,7 @@ def _states(panel: "Axes", data: "xarray.Dataset", x: str, y: str) -> None:
 
 
 def _label(panel: "Axes", data: "xarray.Dataset", x: str, y: str, title: str) -> None:
-    """Set the title and axis labels, with equal scales if both axes are lengths."""
+    """Set title and axis labels, and equal scales for axes of the same unit."""
     same = data[x].attrs.get("units") == data[y].attrs.get("units")
     spans = [float(np.ptp(data[k].values)) for k in (x, y)]
     fits = same and 0.2 < spans[0] / spans[1] < 5
@@ -290,7 +292,7 @@ def _label(panel: "Axes", data: "xarray.Dataset", x: str, y: str, title: str) ->
 
 
 def _axis_name(data: "xarray.Dataset", name: str) -> str:
-    """Return the name and unit of an axis."""
+    """Return the name and the unit of an axis."""
     unit = data[name].attrs.get("units")
     return plot_label(f"{name} [{unit}]" if unit else name)
 
@@ -302,7 +304,7 @@ def _counts(data: "xarray.Dataset") -> str:
 
 
 def _caption(data: "xarray.Dataset") -> str:
-    """Format a caption with the robot, the statuses and the nearby singularities."""
+    """Return a caption with robot, statuses and nearby singularities."""
     caption = f"{data.attrs.get('robot', '')}; {_counts(data)}"
     if _near(data).any():
         texts = np.unique(data["near_singularity"].values.astype(str))

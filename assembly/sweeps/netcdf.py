@@ -1,4 +1,4 @@
-"""NetCDF files, written either completely or not at all, even if the disk is full."""
+"""NetCDF files that are replaced only by complete files."""
 
 import struct
 from collections.abc import Generator
@@ -14,15 +14,15 @@ from numpy.typing import NDArray
 from forcefit.inputs.table import BadInput
 from forcefit.inputs.writing import unwritable, whole_file
 
-_HEAP = b"GCOL\x01\x00\x00\x00"  # signature and version of a global heap in HDF5
+_HEAP = b"GCOL\x01\x00\x00\x00"  # first bytes of a global heap in HDF5
 
 
 @contextmanager
 def netcdf_file(path: Path | str) -> Generator[Any, None, None]:
-    """Open a new NetCDF file for writing, as a context.
+    """Open a new NetCDF file for writing, as a context manager.
 
     Args:
-        path: path of the file, which appears only if the block ends without an error.
+        path: path of the file. It is created or replaced if no exception is raised.
 
     Yields:
         The open ``h5netcdf.File``.
@@ -43,7 +43,7 @@ def netcdf_file(path: Path | str) -> Generator[Any, None, None]:
 
 
 class Stored(NamedTuple):
-    """A variable in a file, with the same attribute names as in xarray.
+    """A variable in a NetCDF file.
 
     Attributes:
         dims: names of the axes.
@@ -57,11 +57,11 @@ class Stored(NamedTuple):
 
 
 class StoredDataset(NamedTuple):
-    """A data set read without xarray, because importing xarray takes a second.
+    """A data set that is read without xarray, whose import takes a second.
 
     Attributes:
-        data_vars: variables by name, without coordinates.
-        attrs: attributes of the whole data set.
+        data_vars: variables by name, except the coordinates.
+        attrs: attributes of the data set.
     """
 
     data_vars: dict[str, Stored]
@@ -69,13 +69,13 @@ class StoredDataset(NamedTuple):
 
 
 def stored_dataset(path: Path | str) -> StoredDataset:
-    """Read a newly written data set, in order to compute its summary.
+    """Read a data set for a summary.
 
     Args:
         path: path of a NetCDF file written by forcefit.
 
     Returns:
-        All variables except the coordinates.
+        The data set without coordinates.
     """
     import h5netcdf
 
@@ -93,7 +93,7 @@ def stored_dataset(path: Path | str) -> StoredDataset:
 
 
 def _decoded(values: NDArray) -> NDArray:
-    """Decode bytes in the values, because HDF5 returns text as bytes."""
+    """Return values in which bytes are decoded to text."""
     if values.dtype != object:
         return values
     texts = [text.decode() for text in values.ravel()]
@@ -101,20 +101,20 @@ def _decoded(values: NDArray) -> NDArray:
 
 
 def forgive_damaged_files() -> None:
-    """Prevent h5netcdf from writing to stderr when it closes a damaged file."""
+    """Prevent messages of h5netcdf on stderr when it closes a damaged file."""
     import h5netcdf
 
-    h5netcdf.File._writable = False  # default, which an opened file overrides
+    h5netcdf.File._writable = False  # default value for files that cannot be opened
 
 
 def check_heaps(path: Path) -> None:
-    """Reject a file with damaged text heaps, on which HDF5 would loop forever.
+    """Reject a file with damaged text heaps, which cause an endless loop in HDF5.
 
     Args:
-        path: path of an HDF5 file; other files are accepted.
+        path: path of the file. Files of other formats are not checked.
 
     Raises:
-        BadInput: a heap entry points outside the heap.
+        BadInput: an entry extends beyond its heap.
     """
     size = path.stat().st_size
     if not size:
@@ -126,7 +126,7 @@ def check_heaps(path: Path) -> None:
             end, place = start + min(length, size - start), start + 16
             while place + 16 <= end:
                 number, _, own = struct.unpack_from("<HH4xQ", data, place)
-                # a text, or free space, whose size includes its own header
+                # An entry is a text or, with number 0, free space including its header.
                 step = 16 + -(-own // 8) * 8 if number else own
                 if step < 16:
                     raise BadInput(f"{path}: cannot be read as NetCDF: damaged heap")
@@ -135,10 +135,9 @@ def check_heaps(path: Path) -> None:
 
 
 class _Target:
-    """File to which HDF5 writes; after a failure it continues as a copy in memory.
+    """File object for HDF5 that continues in memory after a failed write.
 
-    HDF5 crashes the whole process if a file cannot be closed, or if data read back
-    differ from the data written.
+    This prevents crashes of HDF5 if a file cannot be written to the end.
     """
 
     def __init__(self, file: FileIO) -> None:
@@ -146,7 +145,7 @@ class _Target:
         self.failure: OSError | None = None
 
     def write(self, content: Any) -> int:
-        """Write the content; if this fails, record the failure and return success."""
+        """Write content, and record a failure without raising an error."""
         left = memoryview(content).cast("B")
         size = len(left)
         while left:
@@ -159,11 +158,11 @@ class _Target:
         return size
 
     def readinto(self, content: Any) -> int:
-        """Read bytes that were written before."""
+        """Read bytes into a buffer."""
         return self.file.readinto(content) or 0
 
     def read(self, size: int = -1) -> bytes:
-        """Return bytes written before."""
+        """Read bytes."""
         return self.file.read(size) or b""
 
     def seek(self, offset: int, whence: int = SEEK_SET) -> int:
@@ -171,11 +170,11 @@ class _Target:
         return self.file.seek(offset, whence)
 
     def tell(self) -> int:
-        """Return the current position in the file [bytes]."""
+        """Return the position in the file [bytes]."""
         return self.file.tell()
 
     def truncate(self, size: int | None = None) -> int:
-        """Set the size of the file; if this fails, record the failure."""
+        """Set the size of the file, and record a failure."""
         try:
             return self.file.truncate(size)
         except OSError as error:
@@ -186,7 +185,7 @@ class _Target:
         """Do nothing, because no data are buffered."""
 
     def _go_on_in_memory(self, failure: OSError) -> None:
-        """Record the failure, and copy the data written so far into memory."""
+        """Record a failure, and copy the file into memory."""
         self.failure = failure
         position = self.file.tell()
         self.file.seek(0)

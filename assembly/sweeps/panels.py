@@ -1,10 +1,9 @@
-"""Figure panels for a sweep or for draws: quantities, units and titles.
+"""Panels of figures: names, units and titles of quantities.
 
-A quantity is a variable of the data set, followed by a component if the variable has
-several: ``energy``, ``stiffness.FX``, ``wrench.leg1.link_a.FZ``.  The names are the
-column names of :func:`forcefit.assembly.sweeps.point_table.point_table`.  The
-quantities ``rotation`` and ``translation`` are the magnitudes of the platform's pose
-error.
+The name of a quantity is a variable of the data set, followed by a component if there
+are several: ``energy``, ``stiffness.FX``, ``wrench.leg1.link_a.FZ``. These are the
+column names of :func:`forcefit.assembly.sweeps.point_table.point_table`. The quantities
+``rotation`` and ``translation`` are the magnitudes of the pose error.
 """
 
 from collections.abc import Sequence
@@ -20,9 +19,9 @@ from forcefit.inputs.table import BadInput, nearest, quoted
 if TYPE_CHECKING:
     import xarray
 
-_MOST = 12  # largest number of panels in a readable figure
+_MOST = 12  # largest number of panels in a figure
 _HALVES = {"rotation": slice(0, 3), "translation": slice(3, 6)}
-# for each unit in the file: the unit in the figure and the conversion factor
+# conversion factor and displayed unit for each SI unit
 _SHOWN = {
     "rad": (1e3, "mrad"), "m": (1e3, "mm"), "N/m": (1e-6, "N/um"), "Pa": (1e-6, "MPa"),
     "1": (1.0, "-"),
@@ -35,7 +34,7 @@ class Panel(NamedTuple):
     Attributes:
         key: name of the quantity.
         scale: factor by which the values are multiplied.
-        title: title with the unit of the scaled values.
+        title: title with the unit.
         colours: colour map.
     """
 
@@ -45,8 +44,8 @@ class Panel(NamedTuple):
     colours: str
 
 
-# the six panels of figure 5 in the paper; the panels below replace the last two if
-# those were not computed
+# the six panels of figure 5 in the paper; further panels replace the last two if these
+# were not computed
 _PAPER = (
     Panel("margin_free", 1.0, "zone margin, compliant joints free [-]", "magma_r"),
     Panel("energy", 1.0, "minimum assembly energy [J]", "inferno"),
@@ -67,29 +66,29 @@ _FREQUENCY = Panel("frequency.1", 1.0, "lowest natural frequency [Hz]", "viridis
 
 
 def usual_panels(data: "xarray.Dataset") -> tuple[Panel, ...]:
-    """Return the default panels of a sweep's figure.
+    """Return the default panels for a sweep.
 
     Args:
         data: data set of a sweep.
 
     Returns:
-        The default panels whose quantities are stored.
+        The panels.
 
     Raises:
-        BadInput: the sweep has stored none of these quantities.
+        BadInput: the data set contains none of their quantities.
     """
     usual = _usual_panels(data)
     panels = tuple(panel for panel in usual if _is_stored(data, panel.key))
     if not panels:
         raise BadInput(
-            "figure: found none of the usual quantities, such as energy; name one of "
-            "the file with assembly plot --quantities"
+            "figure: found none of the default quantities, such as energy; select "
+            "quantities in the file with assembly plot --quantities"
         )
     return panels
 
 
 def _is_stored(data: "xarray.Dataset", key: str) -> bool:
-    """Return whether a quantity can be computed from the stored data."""
+    """Return whether a data set contains a quantity."""
     try:
         quantity(data, key)
     except KeyError:
@@ -98,7 +97,7 @@ def _is_stored(data: "xarray.Dataset", key: str) -> bool:
 
 
 def _usual_panels(data: "xarray.Dataset") -> tuple[Panel, ...]:
-    """Return the panels of the paper's figure whose quantities are stored."""
+    """Return the panels of figure 5 in the paper that the data set contains."""
     if "rotation_error_clearance" in data:
         return _PAPER
     middle = _STIFFNESS if "eigen_stiffness" in data else _PAPER[2:4]
@@ -108,17 +107,17 @@ def _usual_panels(data: "xarray.Dataset") -> tuple[Panel, ...]:
 
 
 def named_panels(data: "xarray.Dataset", names: Sequence[str]) -> tuple[Panel, ...]:
-    """Return panels by quantity name; a variable's name selects all its components.
+    """Return the panels for the given quantities.
 
     Args:
         data: data set of a sweep or of draws.
         names: names of the quantities.
 
     Returns:
-        One panel per component.
+        One panel per component. The name of a variable selects all its components.
 
     Raises:
-        BadInput: there is no such quantity, or the figure would have too many panels.
+        BadInput: a quantity is unknown, or there are too many panels.
     """
     known = _quantities(data)
     panels: list[Panel] = []
@@ -150,14 +149,15 @@ def quantity(data: "xarray.Dataset", key: str) -> Any:
 
     Args:
         data: data set of a sweep or of draws.
-        key: name of the quantity. The magnitude of a pose error is the certified upper
-            bound or, if bounds are not stored, the norm of half the platform screw.
+        key: name of the quantity. The magnitude of a pose error is its upper bound or,
+            without bounds, the norm of the rotation or translation in the platform
+            screw.
 
     Returns:
-        Data array over the axes of the points.
+        Data array with the axes of the points.
 
     Raises:
-        KeyError: no quantity has that name.
+        KeyError: the name is unknown.
     """
     if key in _HALVES and key not in data:
         if f"{key}_error" in data:
@@ -175,7 +175,7 @@ def quantity(data: "xarray.Dataset", key: str) -> Any:
 
 
 def _quantities(data: "xarray.Dataset") -> dict[str, str]:
-    """Return the name and unit of every numeric quantity at the points."""
+    """Return the units of all numeric quantities by name."""
     units: dict[str, str] = {}
     points = set(data["status"].dims)
     for name in map(str, data.data_vars):
@@ -192,5 +192,5 @@ def _quantities(data: "xarray.Dataset") -> dict[str, str]:
 
 
 def _further(data: "xarray.Dataset", name: str) -> list[str]:
-    """Return the axes of a variable other than the axes of the points."""
+    """Return the axes of a variable that are not axes of the points."""
     return [str(d) for d in data[name].dims if d not in data["status"].dims]

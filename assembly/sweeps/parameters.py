@@ -1,12 +1,13 @@
-"""Design parameters: numbers in a robot file, addressed by their paths.
+"""Design parameters: numbers in a robot file, selected by paths.
 
-A path consists of a frame's name and the keys of the number, such as
-``leg1.link_a.link.beam.radius`` or ``leg1.elbow.clearance.radial``.  A frame name
-without the leg name addresses that frame in every leg. A path may also begin with a
-joint that consists of several frames, such as ``ball.clearance.ball``. The entries of
-an array are called x, y, z if it has three numbers, and rx .. tz if it has six, as are
-the rows and columns of a 6 x 6 matrix (``stiffness.rx.ty`` sets both entries of a
-symmetric matrix). Six moments of inertia are called xx, yy, zz, xy, xz, yz.
+A path consists of a frame name and keys, such as ``leg1.link_a.link.beam.radius`` or
+``leg1.elbow.clearance.radial``. Without the leg name, it selects the frame in every
+leg. A path may also begin with the name of a joint that consists of several frames,
+such as ``ball.clearance.ball``.
+
+Entries of arrays have the names x, y, z (three numbers), rx .. tz (six numbers) or xx,
+yy, zz, xy, xz, yz (moments of inertia). An entry of a 6 x 6 matrix has two names:
+``stiffness.rx.ty`` sets this entry and its symmetric counterpart.
 """
 
 import copy
@@ -26,7 +27,7 @@ from forcefit.inputs.table import BadInput, Table, nearest, quoted, read_toml
 
 _AXES = {3: ("x", "y", "z"), 6: ("rx", "ry", "rz", "tx", "ty", "tz")}
 _MOMENTS = ("xx", "yy", "zz", "xy", "xz", "yz")
-_ABSENT: dict[str, Any] = {  # defaults of keys that a frame may omit
+_ABSENT: dict[str, Any] = {  # default values of optional keys of a frame
     "geometric_error": [0.0] * 6, "mass": 0.0, "centre_of_mass": [0.0] * 3
 }  # fmt: skip
 _PLACED: dict[str, Any] = {"translation": [0.0] * 3, "rotation": [0.0] * 3}
@@ -46,13 +47,12 @@ Setter = Callable[[float], None]
 
 @dataclass(frozen=True, eq=False)
 class Design:
-    """Content of a robot file whose numbers can be changed.
+    """Content of a robot file, whose numbers can be changed.
 
     Attributes:
-        content: root table of the file as plain values.
-        file: name of the file for messages; paths in the table are relative to its
-            folder.
-        name: name of the robot if the table contains none.
+        content: content of the file as a dictionary of plain values.
+        file: name of the file. File paths in the content are relative to its folder.
+        name: name of the robot if the content contains none.
         joints: joints that consist of several frames, by name.
     """
 
@@ -63,7 +63,7 @@ class Design:
 
     @cached_property
     def paths(self) -> list[str]:
-        """Full paths of all numbers of the design."""
+        """Full paths of all numbers."""
         return list(self.values)
 
     @cached_property
@@ -73,17 +73,17 @@ class Design:
         return {path: float(value) for path, value, _ in numbers}
 
     def find(self, path: str) -> list[str]:
-        """Return the full paths of the numbers that a path addresses.
+        """Return the full paths of the numbers that a path selects.
 
         Args:
-            path: full path, or a path without the leg's name.
+            path: full path, or a path without the leg name.
 
         Returns:
-            One full path; or one for each leg, and for each bearing of a universal
-            joint.
+            The full paths. There may be one for each leg, or one for each axis of a
+            universal joint.
 
         Raises:
-            BadInput: no number has this path; the message suggests a similar one.
+            BadInput: no number has this path.
         """
         known = self.paths
         matches = [p for p in known if p == path] or [
@@ -98,16 +98,16 @@ class Design:
         return matches
 
     def changed(self, values: Mapping[str, float]) -> dict[str, Any]:
-        """Replace some numbers in the root table.
+        """Return the content of the robot file with some numbers replaced.
 
         Args:
             values: mapping from path to new value.
 
         Returns:
-            A new table.
+            The new content.
 
         Raises:
-            BadInput: a path does not lead to a number.
+            BadInput: no number has a given path.
         """
         content = copy.deepcopy(self.content)
         setters = {path: setter for path, _, setter in _numbers(content)}
@@ -123,12 +123,11 @@ class Design:
             values: mapping from path to new value.
 
         Returns:
-            The robot, checked as if it had been read from a file.
+            The robot, checked in the same way as a robot file.
 
         Raises:
-            BadInput: a path does not lead to a number, a value violates the format, the
-                loops no longer close, or a link's mesh or stiffness library is not
-                usable.
+            BadInput: no number has a given path, a value is invalid, loops do not
+                close, or the mesh or the stiffness library of a link is invalid.
         """
         robot = robot_of(Table(self.changed(values), self.file, ""), self.name)
         try:
@@ -137,13 +136,13 @@ class Design:
             raise BadInput(f"{self.file}: {error}") from None
 
     def check(self, values: Mapping[str, float]) -> None:
-        """Reject numbers that violate the format.
+        """Raise an error if numbers are invalid.
 
         Args:
             values: mapping from path to new value.
 
         Raises:
-            BadInput: a number violates the format. Loop closure is not checked.
+            BadInput: a number is invalid. Loop closure is not checked.
         """
         declared_robot(Table(self.changed(values), self.file, ""), self.name)
 
@@ -154,7 +153,7 @@ def design_of(robot: Robot) -> Design:
 
 
 def load_design(name: str | Path) -> Design:
-    """Load a built-in robot, or a robot file, as a design.
+    """Load a built-in robot or a robot file as a design.
 
     Args:
         name: name such as ``"irsbot2"``, or the path of a robot file.
@@ -168,20 +167,20 @@ def load_design(name: str | Path) -> Design:
     from forcefit.assembly.exchange.robot_files import is_robot_file, load_robot
     from forcefit.assembly.robots import BUILT_IN
 
-    # reject an invalid file before any number is changed
+    # An invalid file raises an error here.
     robot = load_robot(name, links=False)
     if str(name) in BUILT_IN or not is_robot_file(Path(name)):
         return design_of(robot)
     table = read_toml(Path(name))
     if is_drawing(
         table
-    ):  # a body may be a copy of another body, so its numbers are read from the frames
+    ):  # bodies may be copies of other bodies, so the numbers of the frames are used
         return Design(robot_table(robot), str(name), robot.name, robot.joints)
     return Design(table.content, str(name), robot.name, robot.joints)
 
 
 def unit_of(path: str) -> str:
-    """Return the unit of the number at a path; ``"SI"`` if it depends on other keys."""
+    """Return the unit of a number; ``"SI"`` if it depends on other keys."""
     *_, above, key = path.split(".")
     if above == "dh":
         return _DH_UNITS[key]
@@ -191,7 +190,7 @@ def unit_of(path: str) -> str:
 
 
 def _numbers(content: dict[str, Any]) -> Iterator[tuple[str, float, Setter]]:
-    """Yield path, value and setter function of every number, omitted zeros included."""
+    """Yield path, value and setter function of all numbers, including omitted zeros."""
     for frame in content.get("frame", ()):
         given = dict(_ABSENT) if "dh" in frame else _ABSENT | _PLACED
         if frame.get("joint", "fixed") != "fixed":
@@ -202,7 +201,7 @@ def _numbers(content: dict[str, Any]) -> Iterator[tuple[str, float, Setter]]:
 
 
 def _inside(path: str, table: dict[str, Any]) -> Iterator[tuple[str, float, Setter]]:
-    """Yield path, value and setter function of each number in a table."""
+    """Yield path, value and setter function of all numbers in a TOML table."""
     for key, value in table.items():
         path_of_key = f"{path}.{key}"
         if _is_number(value):
@@ -221,7 +220,7 @@ def _inside(path: str, table: dict[str, Any]) -> Iterator[tuple[str, float, Sett
 
 
 def _is_number(value: object) -> bool:
-    """Return whether a plain value is a number other than a boolean."""
+    """Return whether a value is a number, but not a boolean."""
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 

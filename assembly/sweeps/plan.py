@@ -1,4 +1,4 @@
-"""Sweep definition: requested quantities and the points at which to compute them."""
+"""Definition of a sweep: quantities to compute, and points."""
 
 import hashlib
 import json
@@ -20,15 +20,15 @@ from forcefit.results.display import html_table, short_repr
 
 @dataclass(frozen=True, eq=False)
 class Sweep:
-    """The requested quantities, and the points at which to compute them.
+    """Quantities to compute, and the points at which to compute them.
 
     Attributes:
-        question: the requested quantities.
+        question: the quantities.
         targets: the postures.
         values: values of each varied parameter, in the order of ``question.varied``.
-        draws: number of draws of errors; 0 to use the errors in the robot file.
-        command: command line, for the provenance; empty if there is none.
-        block_size: number of points that are solved and stored together.
+        draws: number of random draws of errors; 0 to use the errors in the robot file.
+        command: command line of the sweep; empty if there is none.
+        block_size: number of points per block.
     """
 
     question: Question
@@ -48,7 +48,7 @@ class Sweep:
 
     @property
     def dims(self) -> tuple[str, ...]:
-        """Names of the axes of the points."""
+        """Names of the axes."""
         draw = ("draw",) if self.draws else ()
         return (*self.question.varied, *self.targets.dims, *draw)
 
@@ -69,7 +69,7 @@ class Sweep:
         return -(-self.size // self.block_size)
 
     def points(self, block: int) -> Points:
-        """Return the points of a block, given its number."""
+        """Return the points of a block."""
         first = block * self.block_size
         numbers = np.arange(first, min(first + self.block_size, self.size))
         numbers, draws = np.divmod(numbers, max(1, self.draws))
@@ -84,14 +84,14 @@ class Sweep:
 
     @property
     def units(self) -> dict[str, str]:
-        """Unit of each varied parameter and of each posture component."""
+        """Units of varied parameters and posture components, by name."""
         robot = self.question.robot
         of_postures = {n: unit_of_target(n, robot) for n in self.targets.names}
         return {path: unit_of(path) for path in self.question.varied} | of_postures
 
     @cached_property
     def provenance(self) -> dict[str, str | int]:
-        """Provenance of the results, as attributes of the data set."""
+        """Provenance of the results: attributes of the data set."""
         question = self.question
         provenance: dict[str, str | int] = {
             "robot": question.robot.name,
@@ -110,7 +110,7 @@ class Sweep:
 
     @property
     def identity(self) -> dict[str, str]:
-        """Values that must be equal for two sweeps to share a journal."""
+        """Values that identify the sweep in its journal."""
         question = self.question
         identity = {k: str(v) for k, v in self.provenance.items() if k != "command"}
         values = [*self.values, *self.targets.values]
@@ -127,6 +127,6 @@ class Sweep:
             "strength": str(question.strength),
             "conditions": str((question.load, question.gravity, dict(question.under))),
             "block": str(self.block_size),
-            # all attributes of the question except those named above
+            # digest of all attributes of the question
             "question_sha256": question_hash(question),
         }

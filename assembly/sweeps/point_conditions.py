@@ -1,8 +1,7 @@
-"""Conditions at the points of a sweep: load, gravity and the robot file's effects.
+"""Conditions at the points of a sweep: loads, gravity and effects.
 
-Compiled functions solve many points at once, even under loads and with effects that
-change errors, springs or clearances. Points with nonlinear compliances are solved one
-by one and take a few milliseconds each.
+All points are solved together by compiled functions, except points with nonlinear
+compliances, which are solved separately.
 """
 
 from dataclasses import replace
@@ -30,13 +29,13 @@ from forcefit.assembly.sweeps.quantities import Question
 def point_conditions(
     question: Question, robot: Robot, postures: list[Posture], errors: NDArray | None
 ) -> Conditions:
-    """Apply the effects, and return the conditions at the points of one design.
+    """Return the conditions at points of one design after applying effects.
 
     Args:
-        question: quantities of the sweep, with load, gravity and covariates.
+        question: load, gravity and covariates of the sweep.
         robot: robot of the design.
         postures: k postures.
-        errors: (k, n, 6) [rad, m] drawn errors; None for the errors of the robot file.
+        errors: (k, n, 6) [rad, m] random errors; None for the errors in the robot file.
 
     Returns:
         Conditions with k rows.
@@ -61,22 +60,22 @@ def point_conditions(
 
 
 def is_loaded(conditions: Conditions) -> bool:
-    """Return whether any loads, weights, elastic effects or contacts are present."""
+    """Return whether there are loads, weights, elastic effects or contacts."""
     loaded = conditions.load.any() or conditions.gravity.any()
     compliant = conditions.laws or conditions.yields
     return bool(loaded or driven(conditions.robot) or compliant)
 
 
 def assemble_rows(conditions: Conditions) -> tuple[Assembly, NDArray, NDArray]:
-    """Solve problem (22), the minimum energy, for all rows under load.
+    """Solve problem (22), the minimum energy, for all rows of conditions.
 
     Args:
         conditions: conditions with k rows, for a robot of n frames.
 
     Returns:
-        Assemblies, with screws and certificates in the order of the rows; the (k, n, 6)
-        [N m, N] wrenches of the links' springs; and the (k, n, 6) part of these
-        wrenches due to the links' own weight.
+        Assemblies in the order of the rows, wrenches of the links' springs, (k, n, 6)
+        [N m, N], and the part of these wrenches due to distributed weight, (k, n, 6) [N
+        m, N].
     """
     c = conditions
     if not (c.laws or c.yields):
@@ -93,7 +92,7 @@ def assemble_rows(conditions: Conditions) -> tuple[Assembly, NDArray, NDArray]:
 
 
 def _assembled(conditions: Conditions, i: int) -> Assembly | Exception:
-    """Return the solution of one point, or the exception raised by the solver."""
+    """Return the solution at one point, or the exception raised by the solver."""
     try:
         assembly = assemble_row(conditions, i)
     except (CannotAssemble, FreeMotion, SolverFailed) as error:

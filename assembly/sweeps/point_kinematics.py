@@ -1,8 +1,8 @@
-"""Properties of sweep points that depend only on the nominal geometry.
+"""Results at the points of a sweep that depend only on the nominal geometry.
 
-These are the joint coordinates, the distances to singularities, and whether the posture
-is usable. A usable posture is regular and within the joint limits, and no singularity
-separates it from the home posture.
+These are joint coordinates, distances to singularities, and a status. The status
+reports singular postures, postures outside joint limits, and postures that are
+separated from the home posture by a singularity.
 """
 
 from collections.abc import Sequence
@@ -18,7 +18,7 @@ from forcefit.assembly.model.robot import Robot
 from forcefit.assembly.sweeps.quantities import Question
 from forcefit.assembly.sweeps.targets import of_joints
 
-# distance from a singularity below which a posture is examined more closely
+# distance to a singularity below which more tests are performed
 _NEAR = 1e-4
 
 
@@ -26,19 +26,19 @@ def note_geometry(
     question: Question, robot: Robot, goals: NDArray, postures: Sequence[Posture],
     rows: Sequence[range], records: NDArray, near_singularity: dict[int, str],
 ) -> list[tuple[str, str]]:  # fmt: skip
-    """Record the geometry of postures, and return their status.
+    """Store joint coordinates and distances to singularities, and return the status.
 
     Args:
         question: quantities of the sweep.
         robot: robot of the design.
         goals: poses (k, 6) or joint coordinates (k, n) of the k postures.
         postures: the reachable postures.
-        rows: indices of the records of each posture.
-        records: records of the points, which are filled in.
-        near_singularity: names of nearby singularities by row, which are filled in.
+        rows: for each posture, the indices of its records.
+        records: records of the points, which are modified.
+        near_singularity: names of nearby singularities by row, which are modified.
 
     Returns:
-        Status and reason of each posture, as in
+        Status and reason for each posture, as in
         :func:`forcefit.assembly.kinematics.verdict.verdicts`.
     """
     if not postures:

@@ -1,9 +1,8 @@
 """Platform stiffness K_C at the points of a sweep.
 
-Errors, loads and clearances do not affect the nominal K_C, so all draws at a posture
-share one matrix. A tangent stiffness, in contrast, is computed for each point. It is
-the tangent of either problem (22), with clearances free or in contact, or the exact
-equilibrium with its internal forces.
+The nominal K_C depends only on the posture, so it is computed once for all draws. A
+tangent stiffness is computed for each point, either for problem (22) with the present
+contacts, or for the exact equilibrium with internal forces.
 """
 
 from dataclasses import replace
@@ -32,29 +31,29 @@ from forcefit.assembly.platform_stiffness.tables import (
 from forcefit.assembly.solvers.conic import SolverFailed
 
 STATES = {
-    "nominal": "clearances held at zero",
-    "contact": "tangent of (22), clearances free or pressed as they are",
-    "exact": "tangent of the exact equilibrium, with its internal forces",
+    "nominal": "without clearances",
+    "contact": "tangent stiffness of problem (22) with the present contacts",
+    "exact": "tangent stiffness of the exact equilibrium, including internal forces",
 }
 _FORCES = Part("", "forces")
 
 
 def stiffness_parts(robot: Robot, state: str) -> tuple[str, ...]:
-    """Return the names of the compliant parts, such as ``"leg1.distal link"``.
+    """Return the names of the contributions to the compliance.
 
     Args:
         robot: robot of the sweep.
         state: one of :data:`STATES`.
 
     Returns:
-        Links and joints; for a tangent stiffness also clearances in contact and
-        internal forces.
+        Names such as ``"leg1.distal link"``. For a tangent stiffness, they include
+        clearances in contact and internal forces.
     """
     return tuple(part.words for part in _parts(robot, state))
 
 
 def _parts(robot: Robot, state: str) -> list[Part]:
-    """Return the compliant parts."""
+    """Return the names of contributions to the compliance."""
     joints = virtual_joints(robot)
     parts = list(dict.fromkeys(owners(joints)))
     if state == "contact":
@@ -66,30 +65,30 @@ def _parts(robot: Robot, state: str) -> list[Part]:
 def nominal_stiffnesses(
     posture: Posture,
 ) -> tuple[dict[str, NDArray], dict[int, str]]:
-    """Compute the nominal K_C of k postures, without errors and loads.
+    """Compute the nominal K_C of k postures.
 
     Args:
-        posture: k postures.
+        posture: the k postures.
 
     Returns:
-        Quantities by name, each with k rows; and the free motions by row.
+        Quantities by name, each with k rows; and texts on free motions by row.
     """
-    many: Any = platform_stiffness(posture)  # Stiffnesses, because k postures are given
+    many: Any = platform_stiffness(posture)  # Stiffnesses
     return many_quantities(many), {i: one.free_text for i, one in many.apart.items()}
 
 
 def tangent_stiffnesses(
     conditions: Conditions, state: str
 ) -> tuple[dict[str, NDArray], dict[int, str]]:
-    """Compute the tangent stiffnesses of k points under errors, loads and effects.
+    """Compute the tangent stiffness at k points with errors, loads and effects.
 
     Args:
         conditions: conditions with k rows.
         state: ``"contact"`` or ``"exact"``.
 
     Returns:
-        The quantities of :func:`nominal_stiffnesses`, NaN without an equilibrium and 0
-        along free motions; and a reason for each row without a tangent.
+        The quantities of :func:`nominal_stiffnesses`, which are NaN without an
+        equilibrium; and reasons by row.
     """
     parts = _parts(conditions.robot, state)
     rows, reasons = [], {}
@@ -110,12 +109,11 @@ def tangent_stiffnesses(
 
 
 def _tangent(conditions: Conditions, i: int, state: str) -> PlatformStiffness:
-    """Compute the tangent stiffness at a point, the smaller one at a contact change."""
+    """Compute the tangent stiffness at a point, for unloading at a contact change."""
     if conditions.laws or any(not place.linear for place in conditions.yields):
         raise SolverFailed(
             "tangent",
-            "the law of an effect is nonlinear, so that no tangent stiffness "
-            "is computed",
+            "an effect is nonlinear, so the tangent stiffness is not computed",
         )
     assembly = assemble_row(replace(conditions, exact=state == "exact"), i)
     if isinstance(assembly, ExactAssembly):
@@ -124,7 +122,7 @@ def _tangent(conditions: Conditions, i: int, state: str) -> PlatformStiffness:
 
 
 def _unknown(parts: int) -> dict[str, NDArray]:
-    """Return NaN for all stored quantities of a point without a tangent stiffness."""
+    """Return NaN for all quantities of a point without a tangent stiffness."""
     sizes = {
         "compliance": (6, 6), "stiffness": (6,), "eigen_stiffness": (6,),
         "stiffness_condition": (), "share": (parts, 6),

@@ -1,7 +1,7 @@
-"""Data sets as tables with one row per point or draw and one column per component.
+"""Conversion of data sets to tables with one row per point or draw.
 
-``xarray.Dataset.to_dataframe`` forms the product of all axes of all variables, which
-would turn a sweep of a few megabytes into tens of millions of rows.
+In contrast, ``xarray.Dataset.to_dataframe`` returns one row for each combination of all
+axes, including components.
 """
 
 from collections.abc import Sequence
@@ -17,29 +17,31 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-# variables whose axes become table rows, for sweeps and draws, or for tolerances
+# variables whose axes are the axes of the table rows: of sweeps and draws, of
+# tolerances
 _OF_POINTS = ("status", "tolerance")
 
 
 def point_table(
     data: "xarray.Dataset | Path | str", rows: Sequence[str] = ()
 ) -> "pandas.DataFrame":
-    """Convert a data set to a table with one row for each point, draw or tolerance.
+    """Convert a data set to a table with one row per point, draw or tolerance.
 
     Args:
-        data: data set of a sweep, of draws or of tolerances; or the path of a file.
-        rows: axes whose points become rows, for example ``["quantity", "group"]`` for
-            the importance of errors; by default the axes of the sweep's points, the
-            draws or the tolerance classes.
+        data: data set of a sweep, of random draws or of tolerances; or the path of a
+            NetCDF file.
+        rows: axes of the table rows, for example ``["quantity", "group"]`` for the
+            importance of errors; by default the axes of points, draws or tolerance
+            classes.
 
     Returns:
-        Table whose columns are pairs (variable, component); the component is empty for
-        scalars. For example, ``table["platform_screw", "TX"]`` is a column. The index
-        holds the axes.  ``attrs["units"]`` maps variables and axes to units.
+        Table with columns (variable, component), such as ``table["platform_screw",
+        "TX"]``. The component is empty for scalars. The index contains the axes, and
+        ``attrs["units"]`` contains the units of variables and axes.
 
     Raises:
-        BadInput: the file cannot be read, an axis is unknown, or ``rows`` is empty for
-            another kind of data set.
+        BadInput: the file cannot be read, an axis is unknown, or ``rows`` is missing
+            for another kind of data set.
     """
     whose = "table"
     if isinstance(data, str | Path):
@@ -62,10 +64,10 @@ def point_table(
 def write_point_table(
     data: "xarray.Dataset | Path | str", path: Path | str, rows: Sequence[str] = ()
 ) -> None:
-    """Write the table of :func:`point_table` as CSV, either completely or not at all.
+    """Write the table of :func:`point_table` as a CSV file.
 
-    The first column is ``id``, the row number from 0.  The axes follow, then the
-    columns ``variable.component [unit]``.  A missing number becomes an empty cell.
+    The columns are ``id`` (row index from 0), the axes, and ``variable.component
+    [unit]``. Cells of NaN are empty.
 
     Args:
         data: see :func:`point_table`.
@@ -73,8 +75,7 @@ def write_point_table(
         rows: see :func:`point_table`.
 
     Raises:
-        BadInput: for the same reasons as in :func:`point_table`, or if the file cannot
-            be written.
+        BadInput: as for :func:`point_table`, or the file cannot be written.
     """
     check_writable(path, TABLE)
     table = point_table(data, rows)
@@ -92,5 +93,5 @@ def write_point_table(
 
 
 def _head(name: str, unit: str) -> str:
-    """Return the heading of a column."""
+    """Return the header of a column."""
     return f"{name} [{unit}]" if unit else name

@@ -1,8 +1,8 @@
-"""Computation of all quantities at the points of a sweep.
+"""Computation of the quantities at the points of a sweep.
 
-Points are solved in blocks. If a point has no solution, ``status`` and ``reason`` state
-why, and the remaining points are still solved. The result at a point does not depend on
-the other points of its block.
+Points are solved in blocks. If a point has no solution, the variables ``status`` and
+``reason`` contain the reason. The result at a point does not depend on the other points
+of its block.
 """
 
 from collections.abc import Iterator, Mapping
@@ -55,17 +55,17 @@ from forcefit.assembly.sweeps.quantities import (
 from forcefit.assembly.sweeps.targets import goals_of, of_joints
 from forcefit.inputs.table import BadInput
 
-_PAGE = 256  # number of draws generated at a time
+_PAGE = 256  # number of draws that are generated together
 
 
 @dataclass(frozen=True, eq=False)
 class Points:
-    """A subset of the points of a sweep.
+    """Points of a sweep.
 
     Attributes:
         values: (k, p) values of the varied parameters.
         rows: (k, components) components of the postures.
-        draws: (k,) number of the error draw; not used without error sources.
+        draws: (k,) index of the random draw; not used without random errors.
     """
 
     values: NDArray
@@ -82,8 +82,8 @@ class SolvedPoints:
     """Results at k points.
 
     Attributes:
-        records: (k,) records of :func:`record_type`; NaN for points without a solution.
-        texts: for each name in :data:`TEXTS`, the texts of the points that have one.
+        records: (k,) records of type :func:`record_type`; NaN without a solution.
+        texts: for each name in :data:`TEXTS`, nonempty texts by point index.
     """
 
     records: NDArray
@@ -91,14 +91,14 @@ class SolvedPoints:
 
 
 def solve_points(question: Question, points: Points) -> SolvedPoints:
-    """Solve a subset of the points of a sweep.
+    """Solve points of a sweep.
 
     Args:
         question: quantities of the sweep.
-        points: points in sweep order, in which the points of one posture are adjacent.
+        points: points in the order of the sweep.
 
     Returns:
-        Records in the order of the points.
+        The results in the same order.
     """
     count = len(points.rows)
     whole = record_of(computed(question))
@@ -118,7 +118,7 @@ def solve_points(question: Question, points: Points) -> SolvedPoints:
 
 
 def _runs(rows: NDArray) -> Iterator[slice]:
-    """Yield the ranges of consecutive equal rows."""
+    """Yield the index ranges of consecutive equal rows."""
     steps = np.flatnonzero(np.any(rows[1:] != rows[:-1], axis=1)) + 1
     edges = [0, *steps.tolist(), len(rows)]
     for first, last in zip(edges, edges[1:], strict=False):
@@ -127,7 +127,7 @@ def _runs(rows: NDArray) -> Iterator[slice]:
 
 @lru_cache(maxsize=4)
 def _robots(question: Question, values: tuple[float, ...]) -> tuple[Robot, Robot]:
-    """Return the robot of a design, with and without its errors."""
+    """Return the robot of a design with errors and without errors."""
     robot = question.robot
     if question.design is not None:
         robot = question.design.robot(dict(zip(question.varied, values, strict=True)))
@@ -137,7 +137,7 @@ def _robots(question: Question, values: tuple[float, ...]) -> tuple[Robot, Robot
 def _solve_variant(
     question: Question, points: Points, solved: SolvedPoints, first: int
 ) -> None:
-    """Solve points of one design and store them from record ``first`` on."""
+    """Solve points of one design, and store the results from record ``first``."""
     count = len(points.rows)
     runs = list(_runs(points.rows))
     starts = [run.start for run in runs]
@@ -164,7 +164,7 @@ def _solve_variant(
             _fail(solved, rows[i], status, reason)
             continue
         reachable += [(row, posture) for row in rows[i]]
-        # the results are valid, although the robot may be unable to reach the pose
+        # A posture beyond a singularity is solved, but its status is reported.
         if status:
             far += [(row, reason) for row in rows[i]]
     if not reachable:
@@ -186,7 +186,7 @@ def _solve_or_split(
     question: Question, robot: Robot, perfect: Robot, postures: list[Posture],
     errors: NDArray | None, solved: SolvedPoints, rows: NDArray,
 ) -> None:  # fmt: skip
-    """Solve reachable points together, or one by one if a solver fails."""
+    """Solve reachable points together or, if a solver fails, separately."""
     try:
         _solve_reached(question, robot, perfect, postures, errors, solved, rows)
     except (np.linalg.LinAlgError, SolverFailed) as error:
@@ -203,13 +203,13 @@ def _solve_or_split(
 
 
 def _fail(solved: SolvedPoints, rows: range, status: str, reason: str) -> None:
-    """Record the status and the reason of points without a solution."""
+    """Store the status and the reason of points without a solution."""
     solved.records["status"][rows.start : rows.stop] = OF_POINTS.index(status)
     solved.texts["reason"].update(dict.fromkeys(rows, reason))
 
 
 def _errors(question: Question, robot: Robot, draws: NDArray) -> NDArray:
-    """Draw errors (k, n, 6) [rad, m], with locked-in clearances of bolted joints."""
+    """Return random errors, (k, n, 6) [rad, m], including those of bolted joints."""
     pages = {page: _page(question, page) for page in np.unique(draws // _PAGE).tolist()}
     own, which = np.unique(draws, return_inverse=True)
     errors = np.array([pages[d // _PAGE][d % _PAGE] for d in own.tolist()])
@@ -220,7 +220,7 @@ def _errors(question: Question, robot: Robot, draws: NDArray) -> NDArray:
 
 @lru_cache(maxsize=8)
 def _page(question: Question, page: int) -> NDArray:
-    """Draw the errors (256, n, 6) [rad, m] of draws 256 page to 256 page + 255."""
+    """Return the errors of 256 consecutive draws, (256, n, 6) [rad, m]."""
     sources = question.sources
     assert sources is not None
     return sources.errors(sources.draw(page * _PAGE, _PAGE, question.seed))
@@ -230,7 +230,7 @@ def _solve_reached(
     question: Question, robot: Robot, perfect: Robot, postures: list[Posture],
     errors: NDArray | None, solved: SolvedPoints, rows: NDArray,
 ) -> None:  # fmt: skip
-    """Solve reachable points; most failures are recorded as a status."""
+    """Solve reachable points, and store results and status."""
     out = solved.records
     conditions = point_conditions(question, robot, postures, errors)
     if robot.has_effects:
@@ -281,7 +281,7 @@ def _solve_reached(
 def _solved_rows(
     energies: Assembly, failed: Mapping[int, str], solved: SolvedPoints, rows: NDArray
 ) -> list[int]:
-    """Return the points with a solution; record status and reason of all others."""
+    """Return the points with a solution, and store the status of the others."""
     ok = []
     for i, row in enumerate(rows.tolist()):
         status, reason = energies.status[i], energies.reason[i]
@@ -298,7 +298,7 @@ def _record_wrenches(
     question: Question, robot: Robot, wrenches: NDArray, at_tips: NDArray,
     solved: SolvedPoints, rows: NDArray,
 ) -> None:  # fmt: skip
-    """Record the wrenches at the requested frames and the stress of the links."""
+    """Store wrenches at the requested frames and the stress of links."""
     out = solved.records
     if question.wrenches:
         chosen = [row_of(robot, name) for name in question.wrenches]
@@ -315,7 +315,7 @@ def _record_wrenches(
 def _record_stiffness(
     state: str, conditions: Conditions, solved: SolvedPoints, rows: NDArray
 ) -> None:
-    """Record K_C, once per posture for the nominal state, per point for a tangent."""
+    """Store the platform stiffness."""
     T = conditions.transforms
     runs = list(_runs(T.reshape(len(T), -1)))
     if state == "nominal":
@@ -336,7 +336,7 @@ def _record_frequencies(
     count: int, robot: Robot, conditions: Conditions, solved: SolvedPoints,
     rows: NDArray,
 ) -> None:  # fmt: skip
-    """Record natural frequencies for each posture; NaN if there are fewer modes."""
+    """Store the natural frequencies of each posture."""
     T = conditions.transforms
     for run in _runs(T.reshape(len(T), -1)):
         i = run.start
@@ -346,12 +346,12 @@ def _record_frequencies(
         try:
             frequencies = natural_modes(there, count).frequencies
         except BadInput:
-            continue  # no part with mass moves at this posture
+            continue  # no body with mass can move
         solved.records["frequency"][rows[run], : len(frequencies)] = frequencies
 
 
 def _record_bounds(bounds: PoseError, solved: SolvedPoints, rows: NDArray) -> None:
-    """Record pose error bounds where a solution exists, and failures elsewhere."""
+    """Store pose error bounds, or the status if they cannot be computed."""
     out = solved.records
     for i in np.flatnonzero(out["status"][rows] == 0).tolist():
         row = int(rows[i])
@@ -365,7 +365,7 @@ def _record_bounds(bounds: PoseError, solved: SolvedPoints, rows: NDArray) -> No
 def _bound_clearance_only(
     perfect: Posture, solved: SolvedPoints, rows: NDArray
 ) -> None:
-    """Record pose error bounds, problem (27), of each posture at zero errors."""
+    """Store pose error bounds, problem (27), without geometric errors."""
     T = perfect.transforms
     runs = list(_runs(T.reshape(len(T), -1)))
     starts = [run.start for run in runs]
@@ -384,14 +384,14 @@ def _bound_clearance_only(
 def _compare_finite(
     conditions: Conditions, i: int, solved: SolvedPoints, row: int
 ) -> None:
-    """Record the difference between the linear and the finite solution at a point."""
+    """Store the difference between the linear and the exact solution at a point."""
     out = solved.records
     try:
         exact = assemble_row(replace(conditions, exact=True), i)
         assert isinstance(exact, ExactAssembly)
         difference = exact.linearisation_error
     except (SolverFailed, CannotAssemble) as error:
-        # the linear solution remains valid; only its linearisation error is unknown
+        # The linear solution is valid without its linearisation error.
         solved.texts["reason"][row] = f"linearisation error unknown: {error}"
         return
     if abs(difference.relative_energy) > MOST_ENERGY:

@@ -1,4 +1,4 @@
-"""Quantities that a sweep can compute, with units and meanings."""
+"""Quantities of sweeps, with units and descriptions."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -23,37 +23,35 @@ BY_CLEARANCE = ("rotation_error_clearance", "translation_error_clearance")
 FINITE = ("linearisation_rotation", "linearisation_translation", "linearisation_energy")
 STRESS = ("stress", "stress_error", "safety")
 
-# effects that change the readings but not the platform screw
+# effects that change the measured pose, but not the platform screw
 _READING = ("registration", "drift")
 
 
 @dataclass(frozen=True, eq=False)
 class Question:
-    """The quantities requested at every point, sent once to each worker.
+    """The quantities to compute at every point of a sweep.
 
     Attributes:
-        robot: robot with the errors in its file, which are used if none are drawn.
-        design: content of the robot file if parameters are varied; otherwise None.
+        robot: robot. Its errors are used if ``sources`` is None.
+        design: content of the robot file; None if no parameters are varied.
         varied: paths of the varied parameters.
         components: components of the postures, see
             :mod:`forcefit.assembly.sweeps.targets`.
-        sources: sources of drawn errors; None to use the errors in the robot file.
-        seed: seed of the draws.
-        assumption: assumption of problem (27); None if its bounds are not computed.
-        clearance_only: whether the pose error is also bounded at zero errors.
-        wrenches: frames whose wrenches are recorded.
-        linearisation: whether each point is also solved with finite motions.
-        near: distance below which a singularity is reported.
-        strength: [Pa] yield strength of the links, from which stress and safety are
-            computed.
-        load: (6,) [N m, N] load on the platform at its origin, base axes.
+        sources: distributions of random errors, or None.
+        seed: seed of the random errors.
+        assumption: assumption of problem (27); None to omit pose error bounds.
+        clearance_only: whether pose error bounds without geometric errors are computed.
+        wrenches: frames whose wrenches are stored.
+        linearisation: whether the exact solution is computed for comparison.
+        near: distance below which a nearby singularity is reported.
+        strength: [Pa] yield strength of the links; None to omit stress and safety.
+        load: (6,) [N m, N] load on the platform at its origin in base axes.
         gravity: (3,) [m/s^2] gravity in base axes.
-        under: covariates on which the robot's effects depend.
-        stiffness: state for which K_C and the shares of its parts are computed, one of
-            :data:`forcefit.assembly.sweeps.point_stiffness.STATES`; empty to omit them.
-        frequencies: number of natural frequencies, computed from the same K_C and the
-            masses in the robot file.
-        kept: names of the variables that are stored; by default all computed ones.
+        under: covariates of the robot's effects.
+        stiffness: state in which K_C is computed, one of
+            :data:`forcefit.assembly.sweeps.point_stiffness.STATES`; empty to omit it.
+        frequencies: number of natural frequencies.
+        kept: names of the variables to store; empty to store all.
     """
 
     robot: Robot
@@ -79,7 +77,7 @@ class Question:
 
     @property
     def reads_otherwise(self) -> bool:
-        """Whether an effect makes the measured pose differ from the platform screw."""
+        """Whether an effect changes the measured pose, but not the platform screw."""
         robot = self.robot
         effects = [robot.effects, *robot.session_effects.values()]
         return any(name in every for every in effects for name in _READING) or any(
@@ -92,9 +90,9 @@ class Variable:
     """A variable of a sweep's data set.
 
     Attributes:
-        dims: axes in addition to the axes of the points, with their labels.
-        quantity: entry in the quantity table.
-        condition: computation condition, appended to the meaning.
+        dims: labels of each additional axis, by name of the axis.
+        quantity: unit and description of the quantity.
+        condition: text on the conditions of the computation.
     """
 
     dims: Mapping[str, tuple[str, ...]]
@@ -103,13 +101,13 @@ class Variable:
 
     @property
     def attributes(self) -> dict[str, str]:
-        """Unit and meaning as attributes of a NetCDF variable."""
+        """Attributes of the NetCDF variable."""
         known = self.quantity.attributes
         return known | {"long_name": known["long_name"] + self.condition}
 
 
 def _variable(name: str, condition: str = "", **labels: tuple[str, ...]) -> Variable:
-    """Return a variable from the quantity table, with labels for its axes."""
+    """Return a variable with the given labels of its axes."""
     known = QUANTITIES[name]
     every = {**LABELS, **labels}
     dims = {dim: every[dim] for dim in (*labels, *known.dims)}
@@ -117,7 +115,7 @@ def _variable(name: str, condition: str = "", **labels: tuple[str, ...]) -> Vari
 
 
 def variables(question: Question) -> dict[str, Variable]:
-    """Return the numeric variables that a sweep stores, by name.
+    """Return the numeric variables that are stored, by name.
 
     Args:
         question: quantities of a sweep.
@@ -130,7 +128,7 @@ def variables(question: Question) -> dict[str, Variable]:
 
 
 def computed(question: Question) -> dict[str, Variable]:
-    """Return all numeric variables that are computed, stored or not.
+    """Return the numeric variables that are computed, by name.
 
     Args:
         question: quantities of a sweep.
@@ -171,12 +169,12 @@ def computed(question: Question) -> dict[str, Variable]:
 
 
 def _moving(robot: Robot) -> tuple[str, ...]:
-    """Return the names of the joints that are not fixed."""
+    """Return the names of all joints that are not fixed."""
     return tuple(f.name for f in robot.frames if f.joint != "fixed")
 
 
 def _stiffness_variables(robot: Robot, state: str) -> dict[str, Variable]:
-    """Return the variables of the stiffness K_C and of its parts' shares."""
+    """Return the variables for the platform stiffness."""
     eigen, parts = tuple("123456"), stiffness_parts(robot, state)
     return {
         "compliance": _variable("compliance", f", at its origin, {STATES[state]}"),
@@ -188,12 +186,12 @@ def _stiffness_variables(robot: Robot, state: str) -> dict[str, Variable]:
 
 
 def record_type(question: Question) -> np.dtype:
-    """Return the record type of a point: stored variables, and ``status`` as a code."""
+    """Return the type of a record with the stored variables and the status."""
     return record_of(variables(question))
 
 
 def record_of(table: Mapping[str, Variable]) -> np.dtype:
-    """Return the type of a record of given variables, with ``status`` as a code."""
+    """Return the type of a record with given variables and the status."""
     fields = [
         (name, "<f8", tuple(len(labels) for labels in v.dims.values()))
         for name, v in table.items()

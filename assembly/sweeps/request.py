@@ -1,4 +1,4 @@
-"""Creation of a sweep from checked options, and summary of its results."""
+"""Definition of a sweep from options, and summary of its results."""
 
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
@@ -47,7 +47,7 @@ _MODES = 100  # largest accepted number of natural frequencies
 
 @dataclass(frozen=True)
 class SweepOptions:
-    """The options of :func:`.robot_sweep.sweep`, with the same names."""
+    """Options of :func:`.robot_sweep.sweep`."""
 
     grid: str | None = None
     poses: Path | str | None = None
@@ -70,17 +70,17 @@ class SweepOptions:
 
 
 def ask_sweep(robot: Robot | str | Path, options: SweepOptions) -> Sweep:
-    """Return the sweep that ``forcefit assembly sweep`` runs with these options.
+    """Return the sweep for given options.
 
     Args:
-        robot: a robot, a robot file, or a built-in name.
-        options: options of the command.
+        robot: a robot, the path of a robot file, or the name of a built-in robot.
+        options: options of the sweep.
 
     Returns:
-        The sweep, with all options checked.
+        The sweep.
 
     Raises:
-        BadInput: an option, a file named by an option, or the robot violates a rule.
+        BadInput: an option, an input file or the robot is invalid.
     """
     close = closing_of(options.rest, options.mismatch, own_errors=not options.errors)
     if close is not None and options.vary:
@@ -92,8 +92,8 @@ def ask_sweep(robot: Robot | str | Path, options: SweepOptions) -> Sweep:
     if isinstance(robot, Robot):
         if options.vary:
             raise BadInput(
-                "--vary: found a robot in memory; expected a robot file or a built-in "
-                "name, whose numbers have paths"
+                "--vary: found a robot in memory; expected a robot file or the name "
+                "of a built-in robot"
             )
         machine = robot if close is None else close(robot)
     else:
@@ -139,7 +139,7 @@ def ask_sweep(robot: Robot | str | Path, options: SweepOptions) -> Sweep:
 
 
 def _check(options: SweepOptions, machine: Robot) -> None:
-    """Reject options that contradict each other or the robot."""
+    """Raise an error if an option is invalid."""
     if (options.grid is None) == (options.poses is None):
         raise BadInput("sweep: expected exactly one of --grid and --poses")
     assumption, near = options.assumption, options.near
@@ -171,7 +171,7 @@ def _check(options: SweepOptions, machine: Robot) -> None:
 def _sources(
     options: SweepOptions, machine: Robot, varied: Mapping[str, NDArray]
 ) -> "ErrorSources | None":
-    """Return the distributions of the drawn errors; None if no errors are drawn."""
+    """Return the distributions of random errors, or None."""
     if (options.errors is None) != (options.draws is None):
         raise BadInput(
             "sweep: found only one of --errors and --draws, expected both or neither"
@@ -193,32 +193,32 @@ def _sources(
 
 
 def _short(value: float | str) -> str:
-    """Format a covariate's value as text for the command line."""
+    """Format the value of a covariate as on the command line."""
     return value if isinstance(value, str) else f"{value:g}"
 
 
 def _check_assumption(question: Question) -> None:
-    """Reject pose error bounds under load, because problem (27) has no load."""
+    """Raise an error if pose error bounds are requested under load."""
     home = point_conditions(
         question, question.robot, [home_posture(question.robot)], None
     )
     if is_loaded(home) and (question.assumption or question.clearance_only):
         raise BadInput(
             "--assumption: found a loaded robot (--load, --gravity, drive_force or an "
-            "effect), but the bounds of the pose error hold for an unloaded "
-            "one; expected --assumption none, and no bounds by clearances alone"
+            "effect), but pose error bounds are defined without loads; expected "
+            "--assumption none, and no bounds by clearances alone"
         )
 
 
 def _targets(robot: Robot, grid: str | None, poses: Path | str | None) -> Targets:
-    """Read the postures from a grid or from a table."""
+    """Return the postures of a grid or of a CSV file."""
     if poses is not None:
         return read_targets(poses, robot)
     return grid_targets(parse_grid(grid or "", robot))
 
 
 def _vary(design: Design, texts: Sequence[str]) -> dict[str, NDArray]:
-    """Return the varied values by path; check the extreme ones as in a robot file."""
+    """Return the valid values of each varied parameter by path."""
     values_by_path: dict[str, NDArray] = {}
     owner: dict[str, str] = {}
     for text in texts:
@@ -245,7 +245,7 @@ def _vary(design: Design, texts: Sequence[str]) -> dict[str, NDArray]:
 
 
 def _command(robot: str | Path, options: SweepOptions) -> str:
-    """Return the command line of this sweep, without options at their defaults."""
+    """Return the command line, without options that have their default value."""
     default = {option.name: option.default for option in fields(options)}
     given = {name: getattr(options, name) for name in default} | {
         "load": _assigned((name.lower() for name in WRENCH), options.load),
@@ -261,25 +261,25 @@ def _command(robot: str | Path, options: SweepOptions) -> str:
             words += [word for one in value for word in (name, str(one))]
         elif value not in (None, False) and value != default[key]:
             words += [name, str(value)]
-    # file names may contain bytes that are not UTF-8
+    # A file name may not be valid UTF-8.
     return shlex.join(words).encode(errors="backslashreplace").decode()
 
 
 def _assigned(names: Iterable[str], values: Iterable[float]) -> str | None:
-    """Format nonzero values as on the command line."""
+    """Format nonzero components as on the command line."""
     given = zip(names, values, strict=True)
     return ",".join(f"{name}={value:g}" for name, value in given if value) or None
 
 
 def summary_of(data: "xarray.Dataset | StoredDataset") -> dict[str, Any]:
-    """Summarise a sweep as a dictionary of plain values.
+    """Summarise a sweep as a dictionary.
 
     Args:
         data: data set of a sweep.
 
     Returns:
-        The axes; the number of points with each status; and for each quantity the
-        smallest, median and largest finite value with its unit, or None.
+        Axes, number of points with each status, and for each quantity the minimum, the
+        median and the maximum of the finite values.
     """
     status = data.data_vars["status"]
     names, counts = np.unique(status.values.astype(str), return_counts=True)
@@ -299,7 +299,7 @@ def summary_of(data: "xarray.Dataset | StoredDataset") -> dict[str, Any]:
 
 
 def _spread(variable: "xarray.DataArray | Stored") -> dict[str, Any] | None:
-    """Return smallest, median and largest finite value; None if there is none."""
+    """Return minimum, median and maximum of the finite values, or None."""
     values = variable.values[np.isfinite(variable.values)]
     if not values.size:
         return None
@@ -310,7 +310,7 @@ def _spread(variable: "xarray.DataArray | Stored") -> dict[str, Any] | None:
 
 
 def summary_text(summary: Mapping[str, Any], data: "StoredDataset") -> str:
-    """List all statuses, with the first reason for each of them except ok."""
+    """Format the number of points with each status, and a reason for each."""
     lines = [", ".join(f"{name}: {n}" for name, n in summary["status"].items())]
     status = data.data_vars["status"].values.astype(str).ravel()
     for name in summary["status"]:
@@ -318,6 +318,8 @@ def summary_text(summary: Mapping[str, Any], data: "StoredDataset") -> str:
             first = int(np.flatnonzero(status == name)[0])
             reasons = data.data_vars["reason"]
             reason = str(reasons.values.ravel()[first])
-            own = reason if reason.startswith(name) else f"{name}, for one: {reason}"
+            own = (
+                reason if reason.startswith(name) else f"{name}, for example: {reason}"
+            )
             lines.append(own)
     return "\n".join(lines)

@@ -1,6 +1,7 @@
-"""Sweeps in one call, from a robot and varied quantities to a data set.
+"""Sweep of a robot in one call.
 
-Start with :func:`sweep`; the command ``forcefit assembly sweep`` has the same options.
+The arguments of :func:`sweep` correspond to the options of the command ``forcefit
+assembly sweep``.
 """
 
 from collections.abc import Mapping, Sequence
@@ -49,51 +50,54 @@ def sweep(
     progress: Progress = lambda done, total: None,
     solve: Solver = solve_here,
 ) -> "xarray.Dataset":
-    """Solve a robot at every posture, design and draw of errors.
+    """Solve a robot for all postures, design parameters and random errors.
 
     Args:
-        robot: a robot, a robot file, or a built-in name.
-        grid: grid such as ``tx=-0.2:0.2:0.025,tz=-0.5``; None if ``poses`` is given.
-        poses: table of postures; None if ``grid`` is given.
-        vary: design parameters, such as ``link_a.link.beam.radius=0.03,0.04``, of a
-            robot file or a built-in robot.
-        errors: file with the distributions of the errors, see docs/statistics.md.
-        draws: number of draws.
-        seed: seed of the draws.
+        robot: a robot, the path of a robot file, or the name of a built-in robot.
+        grid: grid of postures such as ``tx=-0.2:0.2:0.025,tz=-0.5``; None if ``poses``
+            is given.
+        poses: path of a CSV file with postures; None if ``grid`` is given.
+        vary: design parameters with their values, such as
+            ``link_a.link.beam.radius=0.03,0.04``.
+        errors: path of a file with error distributions, see docs/statistics.md.
+        draws: number of random draws of errors.
+        seed: seed of the random errors.
         assumption: assumption of problem (27): ``"frozen"``, ``"free"``, ``"budget"``,
-            or ``"none"`` if its bounds are not computed.
-        quantities: names of the data variables to compute and store; ``"default"``
-            stands for those stored if none are named. Some variables are computed only
-            if named explicitly: the bounds by clearances without errors
+            or ``"none"`` to omit pose error bounds.
+        quantities: names of the variables to compute and store. ``"default"`` selects
+            the variables that are stored without this argument. Further variables are
+            the pose error bounds without geometric errors
             (``"rotation_error_clearance"``, ``"translation_error_clearance"``) and the
-            differences to finite motions (``"linearisation_rotation"``, ..).
-        wrench_of: frames whose wrenches are recorded.
-        near: distance below which a singularity is reported.
-        yield_strength: [Pa] yield strength of the links, for their stress and safety.
-        load: load on the platform at its origin in base axes, (6,) [N m, N] or by
-            component, ``{"fz": -50}``.
+            differences between the linear and the exact solution
+            (``"linearisation_rotation"``, ..).
+        wrench_of: frames whose wrenches are stored.
+        near: distance below which a nearby singularity is reported.
+        yield_strength: [Pa] yield strength of the links, for stress and safety.
+        load: load on the platform at its origin in base axes, (6,) [N m, N] or a
+            dictionary such as ``{"fz": -50}``.
         gravity: (3,) [m/s^2] gravity in base axes.
-        under: covariates on which the effects in the robot file depend.
-        state: ``"nominal"``, ``"contact"`` or ``"exact"``: state for which K_C and the
-            compliance shares of links and joints are computed; None to omit them.
+        under: covariates of the effects in the robot file.
+        state: state in which the platform stiffness K_C is computed: ``"nominal"``,
+            ``"contact"`` or ``"exact"``; None to omit it.
         frequencies: number of natural frequencies.
-        rest: frame to which the closures' mismatch at home is added as geometric error.
-        mismatch: ``"spring"`` to preload redundant drives that do not fit at home.
-        output: NetCDF file to write.  Finished points are stored in
-            ``<output>.journal``. After an interruption, the same call resumes from the
-            journal and writes the same file, byte for byte.
-        progress: callback that receives the numbers of finished points and of all
-            points.
-        solve: function that solves blocks of points, here or in other processes, see
+        rest: frame whose geometric error compensates the closure error in the home
+            pose.
+        mismatch: ``"spring"`` to preload redundant drives by the closure error in the
+            home pose.
+        output: NetCDF file to write. An interrupted sweep resumes from the points in
+            ``<output>.journal``, and the file is the same.
+        progress: function called with the number of finished points and the number of
+            all points.
+        solve: function that solves blocks of points, for example on a cluster, see
             :mod:`forcefit.assembly.sweeps.cluster`.
 
     Returns:
-        The data set over the axes, with units. It is in memory even if a file is
-        written.
+        The data set, in memory.
 
     Raises:
-        BadInput: an option, a file named by an option, or the robot violates a rule;
-            the journal belongs to another sweep or run; or a file cannot be written.
+        BadInput: an argument, an input file or the robot is invalid; the journal
+            belongs to another sweep or is used by another process; or a file cannot be
+            written.
     """
     if isinstance(quantities, str):
         quantities = (quantities,)
@@ -114,11 +118,11 @@ def sweep(
 
 
 def options_by_old_names(**options: Any) -> SweepOptions:
-    """Convert the keywords of the last release to options of a sweep.
+    """Convert keywords of an older release to options of a sweep.
 
     Args:
         options: ``reading``, ``play_alone``, ``wrench``, ``linearisation``,
-            ``stiffness`` and ``tangent``, and those of :class:`SweepOptions`.
+            ``stiffness`` and ``tangent``, and all options of :class:`SweepOptions`.
 
     Returns:
         The options.

@@ -1,4 +1,4 @@
-"""Selection by name of the variables that a sweep computes and stores."""
+"""Selection of the variables that a sweep computes."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -14,7 +14,7 @@ from forcefit.assembly.sweeps.quantities import (
 )
 from forcefit.inputs.errors import BadInput, nearest, quoted
 
-DEFAULT = "default"  # stands for the variables stored if none are named
+DEFAULT = "default"  # selects the variables that are stored without names
 MODES = 6  # default number of natural frequencies
 _STIFFNESS = (
     "compliance", "stiffness", "eigen_stiffness", "stiffness_condition", "share",
@@ -27,18 +27,18 @@ _NEEDED = (
 
 
 def select(question: Question, texts: Sequence[str]) -> Question:
-    """Restrict a sweep to named quantities.
+    """Select the quantities of a sweep by their names.
 
     Args:
-        question: quantities requested by all other options.
-        texts: names of data variables, separated by commas; ``"default"`` stands for
-            those stored if none are named.
+        question: quantities according to all other options.
+        texts: names of variables, separated by commas. ``"default"`` selects the
+            variables that are stored without names.
 
     Returns:
-        The requested quantities, so that no other variables are computed.
+        The selected quantities.
 
     Raises:
-        BadInput: a variable is unknown, or an option that it requires is missing.
+        BadInput: a variable is unknown or requires another option.
     """
     every = computed(_with_optional(question))
     kept: list[str] = []
@@ -56,7 +56,7 @@ def select(question: Question, texts: Sequence[str]) -> Question:
 
 
 def _with_optional(question: Question) -> Question:
-    """Return a request for all quantities whose options are set or have defaults."""
+    """Return all quantities whose options are given or have default values."""
     return replace(
         question, clearance_only=True, linearisation=True,
         stiffness=question.stiffness or "nominal",
@@ -65,7 +65,7 @@ def _with_optional(question: Question) -> Question:
 
 
 def _for(question: Question, kept: dict[str, Variable]) -> Question:
-    """Return a sweep request for exactly the given variables."""
+    """Return the quantities for the given variables."""
     every = _with_optional(question)
     return replace(
         question,
@@ -81,7 +81,7 @@ def _for(question: Question, kept: dict[str, Variable]) -> Question:
 
 
 def quantities_text() -> str:
-    """List all variables of sweeps as text: name, unit, meaning, required option."""
+    """Return a text with name, unit and description of all variables."""
     from forcefit.assembly.robots import BUILT_IN
 
     robot = BUILT_IN["four_bar"]()

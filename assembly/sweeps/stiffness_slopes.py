@@ -1,4 +1,4 @@
-"""Derivatives of K_C with respect to numbers in a robot file, effects included."""
+"""Derivatives of the platform compliance with respect to numbers in a robot file."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -14,15 +14,14 @@ from forcefit.assembly.platform_stiffness.tangent_slopes import (
 from forcefit.assembly.sweeps.parameters import Design
 from forcefit.inputs.table import BadInput
 
-# finite-difference step relative to the number, or to 1 if it is zero; the relative
-# error of the derivative is 1e-8
+# finite-difference step relative to the number, or to 1 if the number is zero
 _STEP = 1e-4
-_SMALL_STEP = 1e-8  # [rad, m] step for errors, because contacts change within a few um
+_SMALL_STEP = 1e-8  # [rad, m] finite-difference step for geometric errors
 _AS_ERROR = {"translation": "t", "rotation": "r"}
 
 
 class CannotChange(BadInput):
-    """A design number cannot be varied, because no other value gives a valid robot."""
+    """No other value of a number gives a valid robot."""
 
 
 def stiffness_slopes(
@@ -33,27 +32,26 @@ def stiffness_slopes(
     asked: TangentState | None = None,
     under: Mapping[str, float | str] | None = None,
 ) -> dict[str, NDArray]:
-    """Differentiate the platform's compliance with respect to design numbers.
+    """Differentiate the platform compliance with respect to numbers in a robot file.
 
     Args:
-        design: robot file, including its effects.
-        paths: paths of numbers; a path without the leg's name changes the number in all
-            legs together.
-        pose: nominal platform pose, which is held constant.
-        joints: actuated coordinates, which are held constant instead of the pose.
-        asked: state and point at which the tangent is taken; None for the nominal
-            state.
-        under: covariates on which effects depend.
+        design: content of the robot file.
+        paths: paths of numbers. A path without the leg name refers to the numbers in
+            all legs.
+        pose: nominal platform pose, which is constant.
+        joints: actuated coordinates, which are constant instead of the pose.
+        asked: state in which the stiffness is computed; None for the nominal state.
+        under: covariates of the effects.
 
     Returns:
-        By path, (6, 6) derivative dC [rad/(N m) .. m/N per unit of the number], base
-        axes; NaN where the platform moves freely or at a contact change.
+        By path, derivative of the compliance in base axes, (6, 6) [rad/(N m) .. m/N per
+        unit of the number]. It is NaN for free motions and at a contact change.
 
     Raises:
-        BadInput: a path does not lead to a number.
-        CannotChange: no valid robot or posture exists for a changed number, for example
-            a length in an overconstrained loop.
-        CannotAssemble: the loops cannot be closed with the present errors.
+        BadInput: no number has a given path.
+        CannotChange: a changed number gives no valid robot or posture, for example
+            because it is a length in an overconstrained loop.
+        CannotAssemble: the loops cannot be closed with the geometric errors.
         FreeMotion: a load acts along a motion without stiffness.
         SolverFailed: no equilibrium was found.
     """
@@ -90,13 +88,10 @@ def stiffness_slopes(
 
 
 def _cannot_change(path: str, reason: str) -> str:
-    """Return the error message for a design number that cannot be varied."""
+    """Return the error message for a number that cannot be varied."""
     frame, *keys = path.rsplit(".", 2)
     instead = ""
     if len(keys) == 2 and keys[0] in _AS_ERROR and keys[1] in {"x", "y", "z"}:
         error = f"{frame}.geometric_error.{_AS_ERROR[keys[0]]}{keys[1]}"
-        instead = (
-            "; its change as a geometric error, which forced assembly closes, "
-            f"is --by {error}"
-        )
+        instead = f"; to change it as a geometric error, use --by {error}"
     return f"{path} cannot change alone: {reason}{instead}"

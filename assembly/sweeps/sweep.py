@@ -1,8 +1,8 @@
-"""Computation of a sweep over designs, postures and draws of errors.
+"""Computation of a sweep over design parameters, postures and random errors.
 
-The points of a sweep are all combinations designs x postures x draws, where the draw
-varies fastest. They are divided into blocks, which any process may solve and store in
-any order. No result depends on the process or on other blocks.
+The points of a sweep are all combinations of designs, postures and draws, in this
+order; the draw varies fastest. They are divided into blocks, which are solved
+independently and in any order.
 """
 
 import signal
@@ -29,15 +29,15 @@ if TYPE_CHECKING:
     import xarray
 
 Progress = Callable[[int, int], None]
-# function that yields number and results of each block, in any order
+# function that yields index and results of each block, in any order
 Solver = Callable[["Sweep", Iterable[int]], Iterator[tuple[int, SolvedPoints]]]
 
 
 def solve_here(
     sweep: Sweep, blocks: Iterable[int]
 ) -> Iterator[tuple[int, SolvedPoints]]:
-    """Solve blocks one after another on one thread."""
-    # several threads are slower for small matrices and change the summation order
+    """Solve blocks sequentially on one thread."""
+    # With several threads, small matrices are slower and round-off errors differ.
     with threadpool_limits(1), _interrupts_noted() as noted:
         for block in blocks:
             yield block, solve_points(sweep.question, sweep.points(block))
@@ -47,7 +47,7 @@ def solve_here(
 
 @contextmanager
 def _interrupts_noted() -> Generator[list[int], None, None]:
-    """Let a first Ctrl-C finish the current block; a second one stops at once."""
+    """Delay the first Ctrl-C until the current block is finished."""
     noted: list[int] = []
     if threading.current_thread() is not threading.main_thread():
         yield noted
@@ -72,25 +72,23 @@ def run_sweep(
     solve: Solver = solve_here,
     held: ExitStack | None = None,
 ) -> None:
-    """Solve a sweep and write a NetCDF file, resuming from the journal if it exists.
+    """Solve a sweep and write a NetCDF file.
 
-    The journal, ``<path>.journal``, stores every finished block.  After an
-    interruption, the same call resumes from it and writes the same file, byte for byte.
+    Finished blocks are stored in the journal ``<path>.journal``, from which an
+    interrupted sweep resumes. The resulting file is the same.
 
     Args:
         sweep: sweep to solve.
-        path: path of the file; the journal is removed when the file is complete.
-        progress: called at the start and after each block with the numbers of points in
-            the journal and of all points.
-        solve: function that solves blocks: :func:`solve_here`, or
-            :mod:`forcefit.assembly.sweeps.cluster`.
-        held: exit stack that keeps the journal until the stack is closed, while
-            additional results are computed from the file. No block is then solved again
-            after an interruption.
+        path: path of the NetCDF file.
+        progress: function called after each block with the number of finished points
+            and the number of all points.
+        solve: function that solves blocks, such as :func:`solve_here`.
+        held: exit stack whose closing removes the journal. By default, the journal is
+            removed when the file is complete.
 
     Raises:
-        BadInput: the journal belongs to another sweep or run, or a file cannot be
-            written.
+        BadInput: the journal belongs to another sweep or is used by another process, or
+            a file cannot be written.
     """
     path = Path(path)
     kind = record_type(sweep.question)
@@ -111,7 +109,7 @@ def run_sweep(
 
 
 def journal_path(path: Path | str) -> Path:
-    """Return the path of the journal of a file."""
+    """Return the path of the journal for an output file."""
     path = Path(path)
     return path.with_name(path.name + ".journal")
 
@@ -128,7 +126,7 @@ def sweep_in_memory(
 
     Args:
         sweep: sweep to solve.
-        progress: called after each block with the numbers of finished and all points.
+        progress: see :func:`run_sweep`.
 
     Returns:
         The data set that :func:`run_sweep` would write.
@@ -150,22 +148,21 @@ def sweep_poses(
     progress: Progress = lambda done, total: None,
     assumption: str | None = None,
 ) -> "xarray.Dataset":
-    """Compute margins, energy and, if requested, pose error bounds on a pose grid.
+    """Compute margins, energy and pose error bounds on a grid of poses.
 
     Args:
         robot: robot with its errors, clearances and stiffnesses.
-        axes: values [m or rad] by pose component or ``q.<frame>``; omitted components
-            are free.
-        progress: called after each block with the numbers of finished and all points.
+        axes: values [m or rad] by pose component or ``q.<frame>``. Other components are
+            free.
+        progress: see :func:`run_sweep`.
         assumption: assumption of problem (27): ``"frozen"``, ``"free"`` or
-            ``"budget"``; None if the bounds of the pose error are not computed.
+            ``"budget"``; None to omit pose error bounds.
 
     Returns:
-        Data set over the axes, with ``margin``, ``margin_free``, ``energy``,
-        ``platform_screw``; certificates, distances to singularities and ``status``;
-        with an assumption also ``rotation_error`` and ``translation_error`` (lower and
-        upper).  At points without a solution, values are NaN and the status states the
-        reason.
+        Data set with ``margin``, ``margin_free``, ``energy``, ``platform_screw``,
+        ``status``, certificates and distances to singularities. With an assumption, it
+        also contains ``rotation_error`` and ``translation_error`` (lower and upper
+        bounds). Values are NaN at points without a solution.
     """
     targets = grid_targets(axes)
     question = Question(robot, components=targets.names, assumption=assumption)
@@ -173,5 +170,5 @@ def sweep_poses(
 
 
 def assemblable(data: "xarray.Dataset", key: str = "margin_free") -> NDArray:
-    """Return a bool array over the grid, True inside the assembly zone."""
+    """Return which points are inside the assembly zone, as a bool array."""
     return np.asarray(data[key] <= ASSEMBLABLE)

@@ -1,8 +1,8 @@
-"""Postures of a sweep: a grid of poses or joint coordinates, or a list of them.
+"""Postures of a sweep: a grid or a list of poses or joint coordinates.
 
-A grid has one axis per named component, whereas a list has a single axis, ``posture``.
-Components are either ``tx ty tz rx ry rz`` for the platform pose, or ``q.<frame>`` for
-the coordinates of actuated joints. A list may also use ``pose.tx``, as in campaigns.
+The axes of a grid are components. A list has the single axis ``posture``. Components
+are either ``tx ty tz rx ry rz`` for the platform pose or ``q.<frame>`` for the
+coordinates of actuated joints.
 """
 
 from collections.abc import Mapping, Sequence
@@ -16,19 +16,19 @@ from forcefit.assembly.kinematics.posture import POSE
 from forcefit.assembly.model.robot import Robot
 from forcefit.inputs.table import BadInput, nearest, quoted, read_rows
 
-# largest number of points; more points probably result from a wrong step
+# largest number of points
 LARGEST_GRID = 10_000_000
 _JOINT = "q."
 
 
 @dataclass(frozen=True, eq=False)
 class Targets:
-    """Poses or joint coordinates, either on a grid or in a list.
+    """Poses or joint coordinates, as a grid or as a list.
 
     Attributes:
-        names: component names, ``tx`` .. or ``q.<frame>``.
-        values: values on the axis of each component for a grid, or values of each
-            posture for a list [m or rad].
+        names: names of the components, such as ``tx`` or ``q.<frame>``.
+        values: for each component, the values on its axis (grid) or at each posture
+            (list) [m or rad].
         labels: labels of the postures of a list; None for a grid.
     """
 
@@ -49,7 +49,7 @@ class Targets:
         return self.names if self.labels is None else ("posture",)
 
     def at(self, numbers: NDArray) -> NDArray:
-        """Return the components (k, components) of postures by number."""
+        """Return the components of postures, (k, components), by index."""
         if self.labels is not None:
             return np.stack([v[numbers] for v in self.values], axis=1)
         places = np.unravel_index(numbers, self.shape)
@@ -58,16 +58,16 @@ class Targets:
 
 
 def goals_of(names: Sequence[str], robot: Robot, rows: NDArray) -> NDArray:
-    """Convert postures to the form that ``assembly.kinematics.posture`` expects.
+    """Convert components of postures to poses or joint coordinates.
 
     Args:
-        names: names of the components, either of a pose or of joints.
+        names: names of the components.
         robot: robot of n frames.
         rows: (k, components) values from :meth:`Targets.at`.
 
     Returns:
-        (k, 6) poses with NaN for free components; or (k, n) joint coordinates with NaN
-        for passive joints.
+        Poses, (k, 6), with NaN for free components; or joint coordinates, (k, n), with
+        NaN for passive joints.
     """
     if not of_joints(names):
         goals = np.full((len(rows), len(POSE)), np.nan)
@@ -80,12 +80,12 @@ def goals_of(names: Sequence[str], robot: Robot, rows: NDArray) -> NDArray:
 
 
 def of_joints(names: Sequence[str]) -> bool:
-    """Return whether components are joint coordinates rather than a pose."""
+    """Return whether components are joint coordinates."""
     return any(name.startswith(_JOINT) for name in names)
 
 
 def grid_targets(axes: Mapping[str, NDArray]) -> Targets:
-    """Build the grid of all combinations of the values on each axis."""
+    """Return the grid of all combinations of axis values."""
     return Targets(tuple(axes), tuple(np.asarray(v, float) for v in axes.values()))
 
 
@@ -98,19 +98,20 @@ def unit_of_target(name: str, robot: Robot) -> str:
 
 
 def parse_grid(text: str, robot: Robot | None = None) -> dict[str, NDArray]:
-    """Parse the axes of a grid such as ``"tx=-0.2:0.2:0.025,tz=-0.6:-0.3:0.025"``.
+    """Return the axes of a grid such as ``"tx=-0.2:0.2:0.025,tz=-0.6:-0.3:0.025"``.
 
     Args:
-        text: for each component ``start:stop:step`` [m or rad], or one number.  The
-            value ``stop`` is included if (stop - start)/step is an integer within 1e-9.
-        robot: robot whose actuated joints ``q.<frame>`` may be named; None if only
-            poses are allowed.
+        text: name and ``start:stop:step`` [m or rad] or a number for each component.
+            The value ``stop`` is included if (stop - start)/step is an integer within
+            1e-9.
+        robot: robot whose actuated joints may be components; None if only poses are
+            allowed.
 
     Returns:
-        Values by component, in the given order.
+        Values by component.
 
     Raises:
-        BadInput: the text has a different form, or describes too many points.
+        BadInput: the text is invalid, or there are too many points.
     """
     axes: dict[str, NDArray] = {}
     for part in text.split(","):
@@ -129,7 +130,7 @@ def parse_grid(text: str, robot: Robot | None = None) -> dict[str, NDArray]:
 
 
 def _check_name(whose: str, what: str, name: str, robot: Robot | None) -> None:
-    """Reject a name that is not a component of a posture."""
+    """Raise an error unless a name is a component of a posture."""
     frames = robot.frames if robot is not None else ()
     valid = [*POSE, *(_JOINT + f.name for f in frames if f.actuated)]
     if name not in valid:
@@ -140,7 +141,7 @@ def _check_name(whose: str, what: str, name: str, robot: Robot | None) -> None:
 def _check_columns(
     whose: str, header: Sequence[str], extra: Sequence[str], robot: Robot
 ) -> None:
-    """Reject an unknown column in a table of postures, by its name in the file."""
+    """Raise an error if a table of postures has an unknown column."""
     joints = [_JOINT + f.name for f in robot.frames if f.actuated]
     valid = [*(f"pose.{name}" for name in POSE), *joints, *extra]
     for name in header:
@@ -150,7 +151,7 @@ def _check_columns(
 
 
 def _check_kind(whose: str, names: Mapping | Sequence[str]) -> None:
-    """Reject a mixture of pose components and joint coordinates."""
+    """Raise an error if there are both pose components and joint coordinates."""
     joints = [name for name in names if name.startswith(_JOINT)]
     if joints and len(joints) < len(names):
         other = next(name for name in names if not name.startswith(_JOINT))
@@ -160,17 +161,17 @@ def _check_kind(whose: str, names: Mapping | Sequence[str]) -> None:
 
 
 def parse_values(whose: str, spec: str) -> NDArray:
-    """Parse values given as ``start:stop:step``, or as one number.
+    """Return the values of ``start:stop:step`` or of a number.
 
     Args:
-        whose: origin of the text, for messages.
+        whose: option or file, for error messages.
         spec: the text.
 
     Returns:
-        The values, including ``stop`` if the step fits within 1e-9.
+        The values, including ``stop`` if (stop - start)/step is an integer within 1e-9.
 
     Raises:
-        BadInput: the text has a different form, or describes too many points.
+        BadInput: the text is invalid, or there are too many points.
     """
     expected = "expected START:STOP:STEP or one number"
     try:
@@ -196,19 +197,18 @@ def parse_values(whose: str, spec: str) -> NDArray:
 
 
 def read_targets(path: Path | str, robot: Robot, extra: Sequence[str] = ()) -> Targets:
-    """Read postures from a CSV table with columns ``pose.tx`` or ``q.<frame>``.
+    """Read postures from a CSV file with columns such as ``pose.tx`` or ``q.<frame>``.
 
     Args:
-        path: CSV file with a header and one row for each posture.
-        robot: robot whose actuated joints may be columns; joints without a column stay
-            at their ``position``.
-        extra: names of additional numeric columns, which become components.
+        path: path of the file, with a header and one row per posture.
+        robot: robot. Actuated joints without a column have the coordinate ``position``.
+        extra: names of additional numeric columns.
 
     Returns:
-        The postures in file order.
+        The postures in the order of the file.
 
     Raises:
-        BadInput: the table is invalid; the message states line and column.
+        BadInput: the file is invalid.
     """
     path = Path(path)
     rows = [row for row in enumerate(read_rows(path), 1) if any(map(str.strip, row[1]))]
@@ -243,7 +243,7 @@ def read_targets(path: Path | str, robot: Robot, extra: Sequence[str] = ()) -> T
 
 
 def _cell(whose: str, text: str) -> float:
-    """Parse the number in a table cell."""
+    """Return the number in a cell of a table."""
     try:
         value = float(text)
     except ValueError:
@@ -254,7 +254,7 @@ def _cell(whose: str, text: str) -> float:
 
 
 def _check_labels(path: Path, labels: Sequence[str]) -> None:
-    """Reject a table of postures with equal ids in two rows."""
+    """Raise an error if two rows have the same id."""
     if len(set(labels)) < len(labels):
         twice = next(label for label in labels if labels.count(label) > 1)
         raise BadInput(f"{path}: id: found {quoted(twice)} twice; expected unique ids")

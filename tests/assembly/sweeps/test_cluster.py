@@ -1,4 +1,4 @@
-"""Sweeps on many processes equal those of one process, even if a worker dies."""
+"""Sweeps on several processes, including failures of workers and of the scheduler."""
 
 import os
 import pickle
@@ -24,7 +24,7 @@ pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning")
 
 
 def drawn_sweep(grid):
-    """The five-bar robot with three draws of errors at each posture."""
+    """Return a sweep of a five-bar robot with three random draws at each posture."""
     robot = load_robot("five_bar")
     targets = grid_targets(parse_grid(grid, robot))
     sources = tolerance_sources(robot, np.array([1e-2] * 3 + [1e-3] * 3))
@@ -33,9 +33,11 @@ def drawn_sweep(grid):
 
 
 def test_worker_rejects_a_task_for_another_robot():
-    """A mesh may differ there, for example; its content is part of the hash."""
+    """The digest of the robot differs, for example because a mesh file differs."""
     question = drawn_sweep("tx=0,ty=0.13").question
-    with pytest.raises(BadInput, match="found another robot on a worker"):
+    with pytest.raises(
+        BadInput, match="found different meshes or stiffness libraries on a worker"
+    ):
         solve_task(pickle.dumps(question), "0" * 64, [])
 
 
@@ -52,7 +54,7 @@ def test_workers_with_different_sources_are_rejected():
 
     with pytest.raises(BadInput, match=r"worker tcp://h:1 has forcefit .*, expected "):
         _check_workers(Client(program_sha256=64 * "0"))
-    # another commit of the same sources
+    # Another version with the same sources is accepted.
     _check_workers(Client(program="forcefit 0.2.0.dev7+g1234567"))
 
 
@@ -65,7 +67,7 @@ def test_unreachable_scheduler_is_rejected(tmp_path):
 
 
 class Cluster:
-    """A scheduler and workers, each an OS process on the loopback device."""
+    """Scheduler and workers as separate processes on the local machine."""
 
     def __init__(self, folder, workers):
         self.folder = folder
@@ -109,7 +111,7 @@ def cluster(tmp_path):
 
 @pytest.mark.slow
 def test_sweep_with_a_killed_worker_writes_the_same_file(cluster, tmp_path):
-    """A scheduler and two workers run as processes; one worker receives SIGKILL."""
+    """One of two workers receives SIGKILL."""
     sweep = drawn_sweep("tx=-0.045:0.045:0.003,ty=0.10:0.15:0.003")
     run_sweep(sweep, tmp_path / "one.nc")
     killed = []

@@ -1,4 +1,4 @@
-"""Sweeps of robots under load and with effects equal single postures."""
+"""Sweeps of robots under load and with effects."""
 
 from dataclasses import replace
 
@@ -35,9 +35,9 @@ def swept(robot, grid, **given):
     return sweep_in_memory(Sweep(question, grid_targets(axes)))
 
 
-def test_swept_arm_under_load_and_weight_equals_hand_calculation(tmp_path):
-    """M / k with M = F L cos q for a load, and m g L cos q / 2 for the beam's
-    weight.
+def test_sweep_of_a_loaded_arm_equals_hand_calculation(tmp_path):
+    """The rotation is M / k with M = F L cos q for a load and M = m g L cos q / 2 for
+    the weight of the beam.
     """
     path = arm_with(tmp_path)
     data = sweep(
@@ -52,14 +52,15 @@ def test_swept_arm_under_load_and_weight_equals_hand_calculation(tmp_path):
         place_robot(read_robot(path), joints={"drive": 0.4}),
         [0, 0, 0, 0, 10, 0], gravity=[0, -G, 0],
     )  # fmt: skip
-    # the bar bends too: what is above the drive's own turn is the bar's
+    # The bar deforms too, so only the rotation of the drive is known.
     assert data.platform_screw.values[1] == pytest.approx(joint.platform_screw)
     assert joint.joint_screws[0][2] == pytest.approx(M[1] / 4e4, rel=1e-9)
     assert data.wrench.values[:, 0, 2] == pytest.approx(M, rel=1e-9)
     assert data.duality_gap.values == pytest.approx(0.0, abs=1e-12)
 
 
-# a screw at a joint that follows the drive, and a compliance that follows a covariate
+# an error that depends on a drive coordinate, and a compliance that depends on a
+# covariate
 WAVE = Function("leg1.drive", ("rz",), ("q.leg1.drive",), "waves", {"2.sine": 3e-4})
 SOFT = Function("leg2.drive", ("rz",), ("cov.tilt",), "powers", {"1": 1e-6},
                 kind="compliance")  # fmt: skip
@@ -76,12 +77,8 @@ LOAD = [5.0, 0, 0, 100.0, -40.0, -200.0]
         ({"functions": (WAVE, SOFT)}, {"tilt": 5.0}, [0.0, 0, 0, 30.0, 0, -50.0]),
     ],
 )  # fmt: skip
-def test_swept_points_with_effects_and_functions_equal_single_postures(
-    declared, under, load
-):
-    """With energies certified to 1e-8, screws agree to sqrt(1e-8) of those that close
-    the loops.
-    """
+def test_sweep_with_effects_equals_single_solutions(declared, under, load):
+    """Energies are certified to 1e-8, so screws agree to about 1e-4."""
     robot = replace(irsbot2_with(NUMBERS["cases"][0]), **declared)
     data = swept(robot, GRID, under=under, linearisation="effects" in declared,
                  wrenches=("leg1.link_a",), load=load or (0.0,) * 6)  # fmt: skip
@@ -103,13 +100,13 @@ def test_swept_points_with_effects_and_functions_equal_single_postures(
         plain = solve_assembly(replace(posture, robot=robot.without_effects()), load)
         if "effects" in declared:
             assert abs(one.energy / plain.energy - 1) > 0.05
-        else:  # the rods keep it from turning
+        else:  # the rods prevent a rotation
             change = (one.platform_screw - plain.platform_screw)[3:]
             assert np.abs(change).max() > 0.02 * np.abs(plain.platform_screw[3:]).max()
 
 
-def test_sweep_stores_device_readings_with_the_pose():
-    """A device shifted by b without rotation reads b more."""
+def test_sweep_stores_device_readings():
+    """A device that is displaced by b reads b more."""
     shift = {"base.tx": 3e-5, "base.tz": -1e-5}
     robot = irsbot2_with(NUMBERS["cases"][0])
     data = swept(replace(robot, effects={"registration": shift}), GRID)
@@ -121,7 +118,7 @@ def test_sweep_stores_device_readings_with_the_pose():
 
 
 def test_load_without_resistance_has_the_status_no_equilibrium():
-    """No drive is actuated, so the load moves the robot freely."""
+    """The robot has no actuated joints."""
     robot = load_robot("five_bar")
     frames = tuple(
         replace(f, actuated=False, joint_stiffness=None) if f.actuated else f

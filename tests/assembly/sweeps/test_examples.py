@@ -1,4 +1,4 @@
-"""Example programs that use sweeps run and print the expected numbers."""
+"""Example programs that use sweeps."""
 
 import re
 import subprocess
@@ -12,7 +12,7 @@ pytestmark = pytest.mark.slow
 
 
 def run(name, *words):
-    """Standard output of an example."""
+    """Return the standard output of an example."""
     done = subprocess.run(
         [sys.executable, EXAMPLES / name, *map(str, words)],
         capture_output=True, text=True, check=False,
@@ -21,8 +21,10 @@ def run(name, *words):
     return done.stdout
 
 
-def test_example_draws_the_papers_figure_in_both_sign_conventions(tmp_path):
-    """A coarse subset of the fine grid: energies are within the reference's range."""
+def test_example_of_figure_5_runs_for_both_sign_conventions(tmp_path):
+    """The coarse grid is a subset of the reference grid, so its energies are within the
+    same range.
+    """
     said = run("paper_figure5.py", "--step", "0.2", "-o", tmp_path)
     assert said.count("assemble by clearances with compliant joints free") == 2
     for signs in ("literal", "signed"):
@@ -46,5 +48,6 @@ def test_example_hexapod_with_less_clearance_has_smaller_errors(tmp_path):
     large, small = play.index(8.0), play.index(4.0)
     assert error[small] < error[large]
     assert alone[small] < alone[large]
-    # cardans keep their 5 um: less than in proportion to the balls' own play
+    # The cardan joints keep their clearance, so the error decreases by a smaller factor
+    # than the clearance of the ball joints.
     assert alone[small] > 0.5 * alone[large]

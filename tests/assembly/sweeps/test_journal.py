@@ -1,4 +1,4 @@
-"""Interrupted sweeps are resumed without loss and write the same file."""
+"""Journals of sweeps: interruption, damage and resumption."""
 
 import os
 import shutil
@@ -33,7 +33,7 @@ ROOT = Path(__file__).parents[3]
 
 
 def small_sweep(grid="tx=-0.04:0.04:0.02,ty=0.10:0.14:0.02", **options):
-    """15 postures of the five-bar robot, some out of reach, in blocks of 4."""
+    """Return a sweep of a five-bar robot over 15 postures, in blocks of 4."""
     robot = load_robot("five_bar")
     targets = grid_targets(parse_grid(grid, robot))
     question = Question(robot, None, (), targets.names, **options)
@@ -42,9 +42,7 @@ def small_sweep(grid="tx=-0.04:0.04:0.02,ty=0.10:0.14:0.02", **options):
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
-    """The sweep, the bytes of its file, and the bytes of its journal just before the
-    end.
-    """
+    """Return a sweep, its file and its complete journal."""
     sweep, path = small_sweep(), tmp_path_factory.mktemp("whole") / "map.nc"
     kept = {}
 
@@ -57,15 +55,15 @@ def whole(tmp_path_factory):
 
 
 def kept_blocks(sweep, path):
-    """Return the blocks that a journal lists as finished."""
+    """Return the indices of finished blocks in a journal."""
     kind = record_type(sweep.question)
     with open_journal(path, sweep.identity, kind) as journal:
         return sorted(journal.places)
 
 
 def go_on(sweep, folder, journal):
-    """Finish a sweep from the bytes of a journal; return those of its file, and the
-    points solved.
+    """Resume a sweep from a journal, and return its file and the number of solved
+    points.
     """
     path, solved = folder / "map.nc", []
     journal_path(path).write_bytes(journal)
@@ -78,8 +76,8 @@ def go_on(sweep, folder, journal):
     return path.read_bytes(), solved
 
 
-def test_truncated_journal_preserves_every_block_before_the_cut(whole, tmp_path):
-    """A power failure may truncate the file at any byte."""
+def test_truncated_journal_contains_all_complete_blocks(whole, tmp_path):
+    """The file is truncated at many different positions."""
     sweep, _, kept = whole
     sizes = [len(journal) for journal in kept.values()]
     journal, path = kept[15], tmp_path / "map.nc.journal"
@@ -101,7 +99,9 @@ def test_resumed_sweep_writes_the_same_file(whole, tmp_path, done):
 
 
 def test_flipped_bit_in_a_journal_invalidates_only_its_record(whole, tmp_path):
-    """The first line and the numbers and lengths of records are covered too."""
+    """The flipped bits are in the first line, in block indices, in lengths and in
+    records.
+    """
     sweep, expected, kept = whole
     journal, first_line = kept[15], kept[15].index(b"\n") + 1
     ends = [len(content) for content in kept.values()]
@@ -127,15 +127,15 @@ def test_block_changed_during_the_sweep_is_rejected_with_one_message(whole, tmp_
             content[-3] ^= 8
             journal_path(path).write_bytes(content)
 
-    with pytest.raises(BadInput, match="block 3 was changed while the sweep ran"):
+    with pytest.raises(BadInput, match="block 3 was changed during the sweep"):
         run_sweep(sweep, path, spoil)
     assert sorted(p.name for p in tmp_path.iterdir()) == ["map.nc.journal"]
     run_sweep(sweep, path)
     assert path.read_bytes() == expected
 
 
-def test_second_simultaneous_run_into_the_same_file_is_rejected(whole, tmp_path):
-    """The second run starts during the first and does not disturb it."""
+def test_simultaneous_run_with_the_same_file_is_rejected(whole, tmp_path):
+    """The first run is not affected."""
     sweep, expected, _ = whole
     path, said = tmp_path / "map.nc", []
 
@@ -146,12 +146,12 @@ def test_second_simultaneous_run_into_the_same_file_is_rejected(whole, tmp_path)
             said.append(str(error.value))
 
     run_sweep(sweep, path, begin_again)
-    assert said[0].startswith(f"{path}.journal: another run holds this journal; ")
+    assert said[0].startswith(f"{path}.journal: another process uses this journal; ")
     assert path.read_bytes() == expected
     assert not journal_path(path).exists()
 
 
-def test_killed_run_releases_its_journal(whole, tmp_path):
+def test_journal_of_a_killed_run_is_unlocked(whole, tmp_path):
     sweep, expected, _ = whole
     path = tmp_path / "map.nc"
     child = os.fork()
@@ -163,8 +163,8 @@ def test_killed_run_releases_its_journal(whole, tmp_path):
     assert path.read_bytes() == expected
 
 
-def test_journal_of_different_sources_is_rejected(whole, tmp_path, monkeypatch):
-    """The version is equal, but one line of the sources differs."""
+def test_journal_of_another_program_version_is_rejected(whole, tmp_path, monkeypatch):
+    """One line of the sources differs."""
     sweep, _, kept = whole
     copy = tmp_path / "sources" / "assembly"
     shutil.copytree(ROOT / "assembly", copy, ignore=shutil.ignore_patterns("__*__"))
@@ -172,7 +172,7 @@ def test_journal_of_different_sources_is_rejected(whole, tmp_path, monkeypatch):
         identity.forcefit.assembly, "__file__", str(copy / "__init__.py")
     )
     identity.program_hash.cache_clear()
-    assert small_sweep().identity == sweep.identity  # wherever the sources lie
+    assert small_sweep().identity == sweep.identity  # other folder
     with (copy / "zone.py").open("a") as file:
         file.write("# one line more\n")
     identity.program_hash.cache_clear()
@@ -188,7 +188,7 @@ def test_journal_of_different_sources_is_rejected(whole, tmp_path, monkeypatch):
     "change", [{"under": {"temperature": 6.0}}, {"near": 0.03}, {"seed": 5},
                {"varied": ("elbow.link.young",)}, {"load": (0, 0, 0, 1.0, 0, 0)}]
 )  # fmt: skip
-def test_every_option_changes_the_hash_of_the_requested_computation(change):
+def test_hash_of_a_sweep_depends_on_every_option(change):
     asked = small_sweep().question
     assert question_hash(asked) == question_hash(small_sweep().question)
     assert question_hash(replace(asked, **change)) != question_hash(asked)
@@ -231,7 +231,7 @@ def test_file_that_is_not_a_journal_is_rejected_and_unchanged(tmp_path):
 
 
 def test_block_size_does_not_change_the_results():
-    """Blocks of 4 and of 15 points give bit-identical results."""
+    """Results for blocks of 4 and 15 points are bit-identical."""
     small = small_sweep(assumption="frozen", wrenches=("left.elbow",),
                         clearance_only=True)  # fmt: skip
     one = sweep_in_memory(small)
@@ -242,7 +242,7 @@ def test_block_size_does_not_change_the_results():
 
 @pytest.mark.slow
 def test_commands_killed_at_random_times_resume_and_write_the_same_file():
-    """Twenty kills suffice here; a benchmark performs hundreds."""
+    """The process is killed 20 times."""
     kills = [sys.executable, ROOT / "benchmarks" / "kills.py", "20"]
     run = [*kills, "--seed", "5"]
     done = subprocess.run(run, capture_output=True, text=True, check=False)
@@ -254,11 +254,9 @@ COMMAND = [sys.executable, "-m", "forcefit", "assembly", "sweep", "five_bar", "-
 
 
 def start_command(folder, *words):
-    """Start the command in its own process group, and stop it once its journal has
-    grown.
-    """
+    """Start the command, and stop it when its journal has grown."""
     path = folder / "map.nc"
-    errors = folder.parent / f"{folder.name}.txt"  # a pipe that is not read fills
+    errors = folder.parent / f"{folder.name}.txt"  # a file, because a pipe must be read
     with (
         errors.open("w+") as stderr,
         subprocess.Popen(

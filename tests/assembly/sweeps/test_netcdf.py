@@ -1,4 +1,4 @@
-"""Result files on a full disk, and damaged result files."""
+"""NetCDF files on a full disk, and damaged NetCDF files."""
 
 import os
 import resource
@@ -12,11 +12,11 @@ from forcefit.assembly.sweeps.dataset import open_dataset, save_dataset
 from forcefit.assembly.sweeps.netcdf import check_heaps, netcdf_file
 from forcefit.inputs.table import BadInput
 
-SIZE = 6_500_000  # bytes of the file below, about
+SIZE = 6_500_000  # [bytes] approximate size of the file
 
 
 def write(path):
-    """Write texts and numbers by slabs, as a sweep does; HDF5 reads them back."""
+    """Write texts and numbers in parts, as a sweep does."""
     names = ("error", "message", "screw", "wrench")
     with netcdf_file(path) as file:
         file.dimensions = {"point": 6_000}
@@ -29,7 +29,7 @@ def write(path):
 
 
 def write_on_a_disk_of(size, path):
-    """Return the exit status of a process that may write only so many bytes."""
+    """Return the exit status of a process with a limit on its file size."""
     child = os.fork()
     if not child:
         status = 1
@@ -46,7 +46,7 @@ def write_on_a_disk_of(size, path):
 
 @pytest.mark.parametrize("share", [0.02, 0.1, 0.6])
 def test_full_disk_is_rejected_and_leaves_no_file(tmp_path, share):
-    """HDF5 crashed when it read back data that had not been written."""
+    """HDF5 would crash when it reads data that were not written."""
     path = tmp_path / "sweep.nc"
     assert write_on_a_disk_of(int(share * SIZE), path) == 2
     assert list(tmp_path.iterdir()) == []
@@ -59,9 +59,7 @@ def test_file_is_written_if_the_disk_is_large_enough(tmp_path):
 
 
 def test_file_with_a_damaged_text_heap_is_rejected(tmp_path):
-    """HDF5 steps from entry to entry, and would never get past a free space of
-    size 0.
-    """
+    """HDF5 would run forever on an entry of size 0."""
     path = tmp_path / "x.nc"
     texts = {f"a{k}": f"a text of some length, number {k}" for k in range(9)}
     save_dataset(xarray.Dataset({"x": ("y", np.arange(3.0), texts)}), path)

@@ -1,4 +1,4 @@
-"""Numbers of a robot file selected by their path."""
+"""Numbers in a robot file that are selected by paths."""
 
 from dataclasses import replace
 
@@ -57,15 +57,15 @@ def test_every_kind_of_number_has_a_path(design, path, value, read):
     assert read(design.robot({path: value})) == value
 
 
-def test_path_of_a_product_of_inertia_names_its_two_axes():
-    """The product must be in the file: a body without moments has no such number."""
+def test_product_of_inertia_has_a_path():
+    """The path exists only if the file contains moments of inertia."""
     tip = Frame("tip", mass=1.0, inertia=np.diag([1.0, 2.0, 2.5]))
     design = design_of(Robot("ball", "tip", (tip,)))
     assert design.robot({"tip.inertia.xz": 0.3}).frame("tip").inertia[2, 0] == 0.3
     assert unit_of("tip.inertia.xz") == "kg m^2"
 
 
-def test_path_into_a_symmetric_matrix_changes_both_entries():
+def test_path_in_a_symmetric_matrix_changes_both_entries():
     robot = load_robot("four_bar")
     K = np.diag([1e3, 1e3, 1e3, 1e6, 1e6, 1e6])
     design = design_of(robot.with_links({"middle": MatrixLink(K)}))
@@ -74,8 +74,8 @@ def test_path_into_a_symmetric_matrix_changes_both_entries():
     assert K[0, 4] == K[4, 0] == 5.0
 
 
-def test_numbers_that_exist_only_in_the_file_can_be_changed(tmp_path):
-    """``dh`` is converted to translation and rotation; the file still contains d."""
+def test_denavit_hartenberg_parameters_can_be_changed(tmp_path):
+    """The number d in ``dh`` is changed before conversion to a translation."""
     text = """
 platform = "tip"
 frame = [
@@ -109,8 +109,8 @@ def test_invalid_path_or_number_is_rejected_with_one_message(design, values, mes
 
 
 def test_numbers_that_prevent_loop_closure_are_rejected(design):
-    """With a frame 1 mm off its home position, the parallelogram does not close."""
+    """A parallelogram does not close if a frame is displaced by 1 mm."""
     values = {"leg1.elbow_a.translation.y": 0.2}
-    design.check(values)  # a robot file could say it
+    design.check(values)  # valid in a robot file
     with pytest.raises(BadInput, match="does not hold in the home"):
         design.robot(values)

@@ -1,4 +1,4 @@
-"""Point tables have one row for each point, with the numbers in the data set."""
+"""Tables with one row per point of a sweep."""
 
 import csv
 import itertools
@@ -46,7 +46,7 @@ def test_point_table_cells_equal_the_data_set(data):
 
 
 def test_pose_components_of_listed_postures_are_columns(tmp_path):
-    """They are not axes, so three postures give three rows instead of nine."""
+    """Three postures give three rows."""
     poses = tmp_path / "poses.csv"
     poses.write_text("id,pose.tx,pose.ty\na,0,0.13\nb,0.01,0.14\nc,0.02,0.13\n")
     data = ff.sweep("five_bar", poses=poses, draws=None)
@@ -56,7 +56,7 @@ def test_pose_components_of_listed_postures_are_columns(tmp_path):
 
 
 def test_point_table_of_a_robot_without_joints_has_all_rows(tmp_path):
-    """The joint coordinates have no columns, but all rows exist."""
+    """There are no columns of joint coordinates."""
     (tmp_path / "bar.toml").write_text(
         'platform = "tip"\n[[frame]]\nname = "tip"\nparent = "base"\n'
         "translation = [1.0, 0, 0]\n"
@@ -87,7 +87,7 @@ def test_missing_number_is_an_empty_csv_cell(data, tmp_path):
         assert (row["energy [J]"] == "") == (float(row["tx [m]"]) > 0.01)
 
 
-def test_rows_of_a_table_follow_the_named_axes_and_unknown_axes_are_rejected(data):
+def test_table_rows_are_selected_by_axis_names(data):
     table = ff.point_table(data, ["wrench_component"])
     assert list(table.index) == list(WRENCH)
     with pytest.raises(ff.BadInput, match='table: no axis "txx"; did you mean "tx"'):
@@ -110,7 +110,7 @@ def test_plot_command_writes_a_csv_table(run, data, tmp_path):
 
 
 def test_draws_and_importance_have_separate_tables(run, tmp_path, monkeypatch):
-    """Axes of the importance are not combined with those of the draws."""
+    """One data set contains both."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "errors.toml").write_text(
         '[[errors]]\nframes = ["elbow"]\n'

@@ -1,4 +1,4 @@
-"""Sweep points equal single postures."""
+"""Results at the points of a sweep."""
 
 from dataclasses import replace
 
@@ -40,7 +40,7 @@ def robot():
 
 @pytest.fixture(scope="module")
 def data(robot):
-    """All available quantities at six postures."""
+    """Return a sweep with all quantities at six postures."""
     axes = parse_grid(GRID)
     question = Question(
         robot, None, (), tuple(axes), assumption="free", clearance_only=True,
@@ -49,10 +49,8 @@ def data(robot):
     return sweep_in_memory(Sweep(question, grid_targets(axes)))
 
 
-def test_swept_wrenches_equal_those_of_one_posture(robot, data):
-    """Both follow from multipliers certified to 1e-8 of the energy, that is 1e-4 of a
-    wrench.
-    """
+def test_swept_wrenches_equal_single_solutions(robot, data):
+    """Energies are certified to 1e-8, so wrenches agree to about 1e-4."""
     answer = solve_assembly(place_robot(robot, pose={"tx": 0.2, "tz": -0.4}))
     found = data.wrench.sel(tx=0.2, tz=-0.4, method="nearest")
     assert found.dims == ("frame", "wrench_component")
@@ -64,7 +62,7 @@ def test_swept_wrenches_equal_those_of_one_posture(robot, data):
         )
 
 
-def test_swept_bounds_and_finite_motions_equal_those_of_one_posture(robot, data):
+def test_swept_bounds_and_exact_solutions_equal_single_solutions(robot, data):
     posture = place_robot(robot, pose={"tx": 0.2, "tz": -0.4})
     there = data.sel(tx=0.2, tz=-0.4, method="nearest")
     bounds = bound_pose_error(solve_assembly(posture), "free")
@@ -75,8 +73,8 @@ def test_swept_bounds_and_finite_motions_equal_those_of_one_posture(robot, data)
     assert float(there.linearisation_energy) == pytest.approx(gap.relative_energy)
 
 
-def test_error_due_to_clearances_without_errors_has_the_robot_symmetry(data):
-    """Without errors, x and -x are equal to within the bounds' gap of 1e-6."""
+def test_pose_error_bounds_of_irsbot2_are_symmetric(data):
+    """Bounds at x and -x agree within their gap of 1e-6."""
     for name in ("rotation_error_clearance", "translation_error_clearance"):
         values = data[name].sel(bound="upper").values
         assert values == pytest.approx(values[::-1], abs=2e-6)
@@ -84,7 +82,7 @@ def test_error_due_to_clearances_without_errors_has_the_robot_symmetry(data):
     assert (data.rotation_error_clearance < data.rotation_error).all()
 
 
-def test_varied_design_is_bit_identical_to_its_robot():
+def test_sweep_of_a_design_is_bit_identical_to_that_of_its_robot():
     path = "link_a.link.beam.radius"
     data = sweep("irsbot2", grid=GRID, vary=[f"{path}=0.03,0.05"], assumption="none")
     assert data.energy.dims == (path, "tx", "tz")
@@ -95,7 +93,7 @@ def test_varied_design_is_bit_identical_to_its_robot():
         assert np.array_equal(there[name], one[name], equal_nan=True), name
 
 
-def test_swept_draws_are_bit_identical_to_robots_with_those_errors(tmp_path):
+def test_swept_draws_are_bit_identical_to_single_robots(tmp_path):
     path = tmp_path / "errors.toml"
     path.write_text(ERRORS)
     data = sweep(
@@ -131,7 +129,7 @@ def test_list_and_grid_of_the_same_postures_have_equal_energies(robot, tmp_path)
     assert len(figure_of(found).axes) == 6
 
 
-def test_design_that_cannot_close_has_the_status_invalid_robot():
+def test_design_whose_loops_cannot_close_has_status_invalid_robot():
     path = "leg1.elbow_a.translation.y"
     y = float(load_robot("irsbot2").frame("leg1.elbow_a").translation[1])
     data = sweep("irsbot2", grid="tx=0,tz=-0.5:-0.4:0.1", vary=[f"{path}={y!r},0.4"],
@@ -142,8 +140,8 @@ def test_design_that_cannot_close_has_the_status_invalid_robot():
     assert summary_of(data)["status"] == {"invalid robot": 2, "ok": 2}
 
 
-def test_point_with_a_linear_algebra_error_has_its_own_status(robot, monkeypatch):
-    """The third of five postures raises an error in the middle of its block."""
+def test_linear_algebra_error_affects_only_its_point(robot, monkeypatch):
+    """An error is raised at the third of five postures."""
     solve, axes = points.solve_assembly, parse_grid("tx=-0.2:0.2:0.1,tz=-0.5")
     expected = sweep_poses(robot, axes)
     bad = place_robot(robot, pose={"tx": 0.0, "tz": -0.5}).platform[:3, 3]
@@ -216,10 +214,8 @@ def test_figures_require_only_the_data_set(tmp_path):
         figure_of(data, {"draw": 1, "tx": 0.0, "ty": 0.12})
 
 
-def test_sweep_across_a_singular_line_marks_its_point_as_singular():
-    """Above its centre, the locked 3-UPU can rotate; leg lengths follow from
-    Pythagoras.
-    """
+def test_singular_point_of_a_sweep_has_status_singular():
+    """The 3-UPU robot is singular above its centre."""
     robot = three_upu(seed=1)
     data = sweep_poses(robot, parse_grid("tx=-0.02:0.02:0.02,ty=0,tz=0.45"))
     assert data["status"].values.ravel().tolist() == ["ok", "singular", "ok"]
@@ -229,8 +225,8 @@ def test_sweep_across_a_singular_line_marks_its_point_as_singular():
     assert length == pytest.approx(expected, abs=1e-9)
 
 
-def test_sweep_marks_postures_beyond_a_singularity():
-    """On the axis of the five-bar, the distal arms are collinear at 84.85 mm."""
+def test_postures_beyond_a_singularity_have_a_status():
+    """The distal arms of the five-bar robot are collinear at a distance of 84.85 mm."""
     data = sweep_poses(load_robot("five_bar"), parse_grid("tx=0,ty=0.08:0.09:0.01"))
     assert data["status"].values.ravel().tolist() == ["beyond_singularity", "ok"]
     reason = str(data["reason"].values.ravel()[0])
@@ -238,8 +234,8 @@ def test_sweep_marks_postures_beyond_a_singularity():
     assert np.isfinite(data["energy"].values).all()
 
 
-def test_sweep_marks_postures_beyond_joint_limits():
-    """Along x, the orthoglide's x slide moves with its platform: p_x - r_x = L."""
+def test_postures_beyond_joint_limits_have_a_status():
+    """The x drive of the orthoglide has the coordinate r_x = p_x - L."""
     robot = load_robot("orthoglide")
     home = home_posture(robot).coordinates[robot.index("x.slide")]
     frames = tuple(
@@ -256,8 +252,10 @@ def test_sweep_marks_postures_beyond_joint_limits():
     assert str(data["reason"].values.ravel()[0]).startswith("x.slide at ")
 
 
-def test_singular_point_where_finite_motions_change_the_energy_is_marked():
-    """A short rod near its dead centre stores energy only under finite motions."""
+def test_point_with_invalid_linearisation_has_status_singular():
+    """A short rod near its dead centre has elastic energy only in the exact
+    solution.
+    """
     rod = BeamLink({"radius": 0.01}, 70e9, 0.33)
     robot = slider_crank(0.3, rod, error=-2e-4)
     reach = sum(SLIDER_CRANK)

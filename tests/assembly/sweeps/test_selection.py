@@ -1,4 +1,4 @@
-"""Quantities selected by name have the same values as in the full sweep."""
+"""Selection of the quantities of a sweep."""
 
 import pytest
 import xarray
@@ -61,7 +61,7 @@ def test_invalid_quantities_are_rejected_with_one_message(names, message):
     assert str(error.value).startswith(message)
 
 
-def test_loaded_sweep_without_bounds_among_its_quantities_is_accepted():
+def test_loaded_sweep_without_pose_error_bounds_is_accepted():
     load = [0, 0, 0, 10.0, 0, 0]
     data = ff.sweep("five_bar", grid=GRID, load=load, quantities=["energy"])
     assert set(data.data_vars) == {"energy", *TEXTS}
@@ -88,5 +88,5 @@ def test_sweep_command_lists_and_selects_quantities(run, tmp_path):
 
 def test_figure_without_usual_quantities_is_rejected(tmp_path):
     data = ff.sweep("five_bar", grid=GRID, quantities=["condition"])
-    with pytest.raises(ff.BadInput, match="found none of the usual quantities"):
+    with pytest.raises(ff.BadInput, match="found none of the default quantities"):
         ff.show(data)

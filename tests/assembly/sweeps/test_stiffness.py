@@ -1,4 +1,4 @@
-"""K_C and natural frequencies as quantities of sweeps, and on maps."""
+"""Platform stiffness and natural frequencies in sweeps."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ from forcefit.assembly.sweeps.robot_sweep import sweep
 from forcefit.assembly.sweeps.sweep import sweep_in_memory
 
 
-def test_swept_stiffness_equals_that_of_single_postures():
+def test_swept_stiffness_equals_single_solutions():
     data = sweep("irsbot2", grid="tx=-0.1:0.1:0.1,tz=-0.5:-0.4:0.1",
                  assumption="none", state="nominal")  # fmt: skip
     robot = load_robot("irsbot2")
@@ -41,9 +41,7 @@ LOAD = (0.0, 0.0, 0.0, 0.0, 0.0, -300.0)
 
 @pytest.mark.parametrize("state", ["contact", "exact"])
 def test_swept_tangent_includes_errors_load_and_clearances(state):
-    """The tangent includes the errors of the varied design and changes with
-    the load.
-    """
+    """The tangent stiffness depends on the errors of the design and on the load."""
     options = SweepOptions(
         grid="tx=0.1,tz=-0.5", assumption="none", state=state, load=LOAD,
         vary=["leg1.link_a.geometric_error.rx=0,0.02"],
@@ -77,7 +75,7 @@ def test_unknown_state_is_rejected():
         ask_sweep("irsbot2", options)
 
 
-def test_swept_frequencies_equal_those_of_single_postures():
+def test_swept_frequencies_equal_single_solutions():
     path, pose = "leg1.elbow.link.density", {"tx": 0.1, "tz": -0.9}
     data = sweep(
         "delta", grid="tx=0:0.1:0.1,tz=-0.9", assumption="none", frequencies=3,

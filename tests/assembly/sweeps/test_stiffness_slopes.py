@@ -1,4 +1,4 @@
-"""Derivatives of K_C with respect to design numbers, against closed forms."""
+"""Derivatives of the platform compliance with respect to numbers in a robot file."""
 
 import json
 
@@ -14,8 +14,8 @@ from forcefit.assembly.sweeps.stiffness_slopes import CannotChange, stiffness_sl
 POSE = {"tx": 0.1, "tz": -0.5}
 
 
-def test_derivative_by_youngs_modulus_equals_minus_the_link_compliance_over_it():
-    """dC/dE = -C_links / E, both links of each leg summed (Castigliano)."""
+def test_derivative_by_youngs_modulus_equals_closed_form():
+    """The derivative is -C_links / E, where C_links is the compliance of all links."""
     path = "link_a.link.young"
     slope = stiffness_slopes(load_design("irsbot2"), [path], POSE)[path]
     robot = load_robot("irsbot2")
@@ -55,14 +55,14 @@ parameters = { drive = 5e4 }
 
 
 def slope_by_length(tmp_path, text):
-    """dC / dL of a bar along x, clamped or on a drive."""
+    """Return dC / dL for a bar along x, clamped or on a drive."""
     path, name = tmp_path / "bar.toml", "tip.translation.x"
     path.write_text(text)
     return stiffness_slopes(load_design(path), [name])[name]
 
 
 def test_derivative_by_bar_length_equals_textbook_values(tmp_path):
-    """d(L/EA)/dL = 1/EA and d(L^2/2EI)/dL = L/EI for a single arm."""
+    """The derivatives of L/EA and L^2/2EI are 1/EA and L/EI."""
     slope = slope_by_length(tmp_path, BAR.replace("PARENT", "base"))
     area, inertia = np.pi * 1e-4, np.pi * 1e-8 / 4
     assert slope[3, 3] == pytest.approx(1 / (7e10 * area), rel=1e-6)
@@ -70,7 +70,7 @@ def test_derivative_by_bar_length_equals_textbook_values(tmp_path):
 
 
 def test_stiffness_command_computes_derivatives_at_the_exact_equilibrium(run):
-    """Unlike those without load, they include the stiffness due to the load."""
+    """The derivatives depend on the load."""
     slopes = {}
     for words in ([], ["--state", "exact", "--load", "fx=-300"]):
         status, out, _ = run(
@@ -81,12 +81,14 @@ def test_stiffness_command_computes_derivatives_at_the_exact_equilibrium(run):
         assert status == 0
         slopes[len(words)] = np.array(answer["slopes"]["crank_pin.link.young"])
     assert slopes[4][3, 3] < 0.0
-    # entries beside it are zero or its rounding
+    # All other entries are zero except for round-off.
     assert abs(slopes[4][3, 3] / slopes[0][3, 3] - 1) > 1e-4
 
 
 def test_slopes_include_the_effects_in_the_robot_file(tmp_path):
-    """A drive of k = 5e4 N m/rad below an arm L adds L^2/k, with slope 2 L/k."""
+    """A drive of stiffness k at the start of an arm adds the compliance L^2/k with the
+    derivative 2 L/k.
+    """
     arm = BAR.replace("PARENT", "drive") + DRIVE
     rigid, soft = (slope_by_length(tmp_path, text) for text in (arm, arm + EFFECT))
     difference = np.zeros((6, 6))
@@ -94,7 +96,7 @@ def test_slopes_include_the_effects_in_the_robot_file(tmp_path):
     np.testing.assert_allclose(soft - rigid, difference, atol=1e-11)
 
 
-def test_length_in_an_overconstrained_loop_is_rejected_with_its_alternative(run):
+def test_length_in_an_overconstrained_loop_is_rejected(run):
     path = "leg1.link_a.translation.x"
     with pytest.raises(CannotChange, match="leg1.link_a.translation.x cannot change"):
         stiffness_slopes(load_design("irsbot2"), [path], POSE)

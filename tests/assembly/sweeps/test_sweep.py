@@ -1,4 +1,4 @@
-"""Data sets of sweeps over grids."""
+"""Sweeps over grids of postures."""
 
 import numpy as np
 import pytest
@@ -35,8 +35,10 @@ def test_swept_points_equal_single_solutions(data):
     assert float(point.margin_free) == pytest.approx(reference["t_compliant_free"])
 
 
-def test_points_out_of_reach_have_their_own_status(data):
-    """(-0.4, -0.65) is 0.83 m from leg 1's centre; its links reach 0.758 m."""
+def test_unreachable_points_have_status_out_of_reach(data):
+    """The point (-0.4, -0.65) is 0.83 m from the centre of leg 1, whose links reach
+    0.758 m.
+    """
     point = data.sel(tx=-0.4, tz=-0.65, method="nearest")
     assert point.status.item() == "out of reach"
     assert "cannot be reached" in point.reason.item()
@@ -71,14 +73,12 @@ def test_saving_to_a_missing_folder_is_rejected(data, tmp_path):
 
 
 def test_map_of_a_single_axis_is_rejected(data):
-    with pytest.raises(ValueError, match="two axes, this one has 1"):
+    with pytest.raises(ValueError, match="two axes, this sweep has 1"):
         map_figure(data.isel(tx=[0]))
 
 
-def test_failed_margin_has_the_status_solver_failed_at_its_point(monkeypatch):
-    """The solver fails at one of two points; the result at the other point is
-    unaffected.
-    """
+def test_failed_margin_has_status_solver_failed(monkeypatch):
+    """The solver fails at one of two points."""
     solve = points.zone_margin
 
     def spoilt(postures, reading, errors):
@@ -124,7 +124,7 @@ def test_varying_a_robot_object_is_rejected():
         ff.sweep(ff.load_robot("five_bar"), grid=FIVE_BAR_GRID, vary=["a.b=1,2"])
 
 
-def test_sweep_records_its_command_with_all_options():
+def test_sweep_stores_its_command_line():
     data = ff.sweep("five_bar", grid="ty=0.13", wrench_of=["left.elbow"], seed=3)
     expected = "five_bar --grid ty=0.13 --seed 3 --wrench-of left.elbow"
     assert data.attrs["command"] == f"forcefit assembly sweep {expected}"

@@ -1,4 +1,4 @@
-"""Grids of joint coordinates, and postures listed in a table."""
+"""Grids and tables of postures."""
 
 import numpy as np
 import pytest
@@ -29,7 +29,7 @@ def test_grid_points_are_in_c_order(robot):
     assert goals[4, [0, 2]] == pytest.approx([0.2, -0.5])
 
 
-def test_drives_not_named_in_a_grid_keep_their_position(robot):
+def test_drives_without_a_grid_axis_have_their_default_position(robot):
     targets = grid_targets(parse_grid("q.leg1.drive=0:1:0.5", robot))
     goals = goals_of(targets.names, robot, targets.at(np.arange(3)))
     one, other = robot.index("leg1.drive"), robot.index("leg2.drive")
@@ -38,7 +38,7 @@ def test_drives_not_named_in_a_grid_keep_their_position(robot):
     assert np.isnan(np.delete(goals, [one, other], axis=1)).all()
 
 
-def test_table_of_postures_is_read_in_its_order(robot, tmp_path):
+def test_table_of_postures_is_read_in_order(robot, tmp_path):
     path = tmp_path / "poses.csv"
     path.write_text("\ufeffid,pose.tx, pose.tz\r\nb,0.1,-0.5\r\n\r\na,0.2,-0.4\r\n")
     targets = read_targets(path, robot)
@@ -83,8 +83,8 @@ def test_invalid_table_of_postures_is_rejected_with_one_message(
     ("text", "values"),
     [
         ("tx=0:1:0.25", [0, 0.25, 0.5, 0.75, 1.0]),
-        ("tx=0:1:0.3", [0, 0.3, 0.6, 0.9]),  # not whole: the end is left out
-        ("tx=-0.2:0.2:0.1", [-0.2, -0.1, 0, 0.1, 0.2]),  # whole within rounding
+        ("tx=0:1:0.3", [0, 0.3, 0.6, 0.9]),  # the end is not included
+        ("tx=-0.2:0.2:0.1", [-0.2, -0.1, 0, 0.1, 0.2]),  # the end is included
         ("tx=0.3:0.1:-0.1", [0.3, 0.2, 0.1]),
         ("tx=0.5", [0.5]),
     ],

@@ -188,7 +188,7 @@ def test_sweep_prints_the_reason_of_the_first_failed_point(run, tmp_path):
     robot.write_text(STIFF)
     status, out, _ = run("assembly", "sweep", robot, "--grid", "q.drive=0", "-o", file)
     assert status == 0
-    assert "\ncannot assemble, for one: a rigid part stays open by 0.0001" in out
+    assert "\ncannot assemble, for example: a rigid part stays open by 0.0001" in out
 
 
 def test_sweep_without_a_reachable_point_has_a_summary_and_a_figure(run, tmp_path):
@@ -217,8 +217,8 @@ def test_sweep_of_listed_poses_and_designs_draws_a_map(run, tmp_path):
          "NetCDF file of forcefit: .nc"),
         (["-o", "other.nc"], "other.nc: found a file that is not a NetCDF file of "
          "forcefit; it is not overwritten"),
-        (["-o", "measured.nc"], "measured.nc: found a NetCDF file that is not one of a "
-         "sweep by forcefit"),
+        (["-o", "measured.nc"], "measured.nc: found a NetCDF file that does not "
+         "contain a sweep of forcefit"),
         (["-o", "x.nc", "--figure", "x.xyz"], 'x.xyz: found the ending ".xyz", '
          "expected a picture: .png or .svg or .pdf"),
         (["-o", "x.nc", "--json", "robot.toml"], 'found the ending ".toml", expected a '
