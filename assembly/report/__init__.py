@@ -1,4 +1,4 @@
-"""Present assembly results as text, JSON, tables and figures.
+"""Output of assembly results as text, JSON, tables and figures.
 
 Start with ``results.py``.
 """

@@ -1,23 +1,22 @@
-"""Remark on exact equilibria that differ strongly from the linear solution."""
+"""Remark on equilibria that differ strongly from the linear solution."""
 
 import numpy as np
 
 from forcefit.assembly.exact.exact import ExactAssembly
 
-# largest accepted relative difference between exact and linear model, for the platform
-# motion and for the energy or potential. Link rotations of 0.1 rad cause smaller
-# differences
+# accepted relative difference between exact and linear solution in the platform motion
+# and in the energy
 _FAR = 0.3
 
 
 def far_from_linear(assembly: ExactAssembly) -> list[str]:
-    """Return a remark on a loaded robot that may be beyond a critical load.
+    """Return a remark if a robot may be loaded beyond a critical load.
 
-    Such an equilibrium can be stable, like that of a buckled column, so a stability
-    test does not detect it.
+    A stability test is not sufficient, because the equilibrium of a buckled structure
+    can be stable.
 
     Args:
-        assembly: assembly with finite motions.
+        assembly: exact solution with finite rotations.
 
     Returns:
         A list with one sentence, or an empty list.

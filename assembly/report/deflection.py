@@ -1,4 +1,4 @@
-"""Load-deflection curves as plain values, as text and as a figure."""
+"""Load-deflection curves as a dictionary, as text and as a figure."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Literal
@@ -37,23 +37,23 @@ def deflection_of(
     follow: bool = False,
     progress: Progress = lambda what, done, most: None,
 ) -> dict[str, Any]:
-    """Compute the results of ``assembly deflection`` as a dictionary of plain values.
+    """Compute a load-deflection curve as a dictionary.
 
     Args:
         posture: posture of the robot.
-        component: component of the load that varies, 0 to 5.
-        loads: [N m or N] values of this component in the order of application.
-        load: (6,) [N m, N] constant part of the load.
+        component: index of the load component that varies, 0 to 5.
+        loads: [N m or N] values of this component, in order.
+        load: (6,) [N m, N] constant load on the platform.
         gravity: (3,) [m/s^2] gravity in base axes.
-        state: ``"exact"`` for finite motions, ``"contact"`` for small screws.
-        follow: whether to follow the path by arc length past limit points, from the
-            first to the last load.  This requires finite motions, and clearances are
-            fixed at zero.
-        progress: function called with the kind of step, the number of completed steps,
-            and the largest number of steps.
+        state: ``"exact"`` for finite rotations, ``"contact"`` for the linear model.
+        follow: whether to use an arc-length method, which passes limit points, from the
+            first to the last load. The state is then ``"exact"``, and clearances are
+            zero.
+        progress: function called with the name of the computation, the number of
+            finished steps and the largest number of steps.
 
     Returns:
-        Curve and events; ``status`` is ``"ok"`` or the reason why no curve was found.
+        The curve and its events. ``status`` is ``"ok"`` or the type of failure.
     """
     results: dict[str, Any] = {
         "robot": posture.robot.name, "status": "ok", "pose": posture.pose(),
@@ -76,7 +76,7 @@ def deflection_of(
 
 
 def _curve_values(curve: DeflectionCurve) -> dict[str, Any]:
-    """Convert a load-deflection curve to plain values."""
+    """Convert a load-deflection curve to a dictionary."""
     return {
         "loads": curve.loads,
         "deflection": curve.deflection,
@@ -90,7 +90,7 @@ def _curve_values(curve: DeflectionCurve) -> dict[str, Any]:
 
 
 def deflection_text(results: dict[str, Any]) -> str:
-    """Format a curve as text: a table followed by a list of events."""
+    """Format a curve as a text table, followed by its events."""
     head = listing(results["robot"], lines_of(results, "pose status reason state"))
     if "loads" not in results:
         return head
@@ -119,7 +119,7 @@ def deflection_text(results: dict[str, Any]) -> str:
 
 
 def plot_deflection(results: dict[str, Any]) -> "Figure":
-    """Plot load over deflection, with events marked.
+    """Plot load over deflection, with marks at events.
 
     Args:
         results: result of :func:`deflection_of`.

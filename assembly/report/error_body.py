@@ -1,7 +1,7 @@
-"""Convex set of possible pose errors of the platform.
+"""Convex set of possible platform errors.
 
-The set is approximated from inside by its support points in many directions, and from
-outside by its support function in the same directions.
+The inner approximation is the convex hull of the farthest points in many directions.
+The outer approximation follows from the support function in these directions.
 """
 
 from dataclasses import dataclass
@@ -20,14 +20,15 @@ PARTS = {"rotation": slice(0, 3), "translation": slice(3, 6)}
 
 @dataclass(frozen=True, eq=False)
 class ErrorBody:
-    """Possible rotation or translation errors of the platform.
+    """Set of possible rotations or translations of the platform.
 
     Attributes:
         part: ``"rotation"`` or ``"translation"``.
-        points: (k, 3) [rad or m] points of the set, base axes; vertices of the inner
-        faces: (m, 3) row indices of ``points`` for each face; empty for a flat set.
+        points: (k, 3) [rad or m] farthest point in each direction, in base axes.
+        faces: (m, 3) indices of the points of each triangle of the convex hull; empty
+            if the points are coplanar.
         directions: (k, 3) unit vectors.
-        heights: (k,) [rad or m] certified upper bound along each direction.
+        heights: (k,) [rad or m] upper bound on the support function in each direction.
     """
 
     part: str
@@ -40,20 +41,20 @@ class ErrorBody:
 
     @property
     def slack(self) -> float:
-        """[rad or m] largest distance between the outer and the inner polytope."""
+        """Largest distance between both approximations along a direction [rad or m]."""
         inner = (self.points @ self.directions.T).max(axis=0)
         return float(np.max(self.heights - inner))
 
     def contains(self, error: ArrayLike) -> bool:
-        """Return whether an error (3,) may be in the set; False is certain."""
+        """Return whether an error is in the outer approximation of the set."""
         return bool(np.all(self.directions @ np.asarray(error) <= self.heights))
 
 
 def possible_errors(assembly: Assembly, part: str, assumption: str) -> ErrorBody:
-    """Compute the set of possible platform errors of an assembled robot.
+    """Compute the set of possible platform errors of an assembly.
 
     Args:
-        assembly: assembly at one posture.
+        assembly: the assembly.
         part: ``"rotation"`` or ``"translation"``.
         assumption: assumption of problem (27).
 
@@ -61,8 +62,8 @@ def possible_errors(assembly: Assembly, part: str, assumption: str) -> ErrorBody
         The set of possible errors.
 
     Raises:
-        BadInput: the part is unknown, or the platform moves freely, so that its errors
-            are unbounded.
+        BadInput: the part is unknown, or the errors are unbounded because the platform
+            moves freely.
         SolverFailed: the cone solver failed.
     """
     if part not in PARTS:
@@ -70,27 +71,27 @@ def possible_errors(assembly: Assembly, part: str, assumption: str) -> ErrorBody
     reach = reachable_screws(assembly, assumption)
     if reach.unbounded(PARTS[part].start):
         raise BadInput(
-            f"{assembly.posture.robot.name}: found a free motion of the "
-            f"platform, so its {part} error is unbounded; expected a "
-            "robot without a free platform motion, or no plot of the error"
+            f"{assembly.posture.robot.name}: the {part} error is unbounded, "
+            "because the platform moves freely; expected a robot without a free "
+            "motion of the platform, or no plot of the errors"
         )
     return error_body(reach, part)
 
 
 def error_body(reachable: ReachableSet, part: str, count: int = 200) -> ErrorBody:
-    """Approximate the set of possible errors by means of its support function.
+    """Approximate a set of possible platform errors.
 
     Args:
         reachable: result of
             :func:`forcefit.assembly.linear.reference.pose_error.reachable_screws`.
         part: ``"rotation"`` or ``"translation"``.
-        count: number of directions, evenly distributed.
+        count: number of directions.
 
     Returns:
-        The inner and outer approximation of the set.
+        The approximation.
 
     Raises:
-        ValueError: the part is unknown or unbounded.
+        ValueError: the part is unknown, or its errors are unbounded.
         SolverFailed: the cone solver failed.
     """
     if part not in PARTS:
@@ -106,7 +107,7 @@ def error_body(reachable: ReachableSet, part: str, count: int = 200) -> ErrorBod
 
 
 def _faces(points: NDArray) -> NDArray:
-    """Return the triangles of the convex hull; none if the points are coplanar."""
+    """Return the triangles of the convex hull, if any."""
     try:
         return ConvexHull(points).simplices
     except QhullError:
@@ -114,7 +115,7 @@ def _faces(points: NDArray) -> NDArray:
 
 
 def even_directions(count: int) -> NDArray:
-    """Return unit vectors that are evenly distributed along a golden spiral.
+    """Return evenly distributed unit vectors on a golden spiral.
 
     Args:
         count: number of vectors.

@@ -1,4 +1,4 @@
-"""Check the validity of the first-order analysis against finite motions."""
+"""Validity of the first-order analysis in comparison with the exact solution."""
 
 from typing import Any
 
@@ -15,17 +15,17 @@ from forcefit.assembly.model.statuses import BEYOND_LIMITS, SINGULAR
 from forcefit.assembly.solvers.conic import SolverFailed
 from forcefit.results.display import rounded, screw_text
 
-# relative energy difference above which the first-order analysis counts as invalid
+# relative energy error above which the first-order analysis is invalid
 MOST_ENERGY = 0.5
-# [rad or lengths] joint motion above which the first-order analysis counts as invalid;
-# the linear closures are then off by about 10 %
+# [rad or reference lengths] joint motion above which the first-order analysis is
+# invalid
 _LARGE = 0.3
 
 
 def linearisation_of(
     assembly: Assembly, gravity: ArrayLike | None
 ) -> tuple[dict[str, Any], str]:
-    """Return the linearisation error as values, and the exact solution as text."""
+    """Return the linearisation error, and a text on the exact solution."""
     try:
         exact = solve_exact(assembly.posture, assembly.load, assembly, gravity=gravity)
     except SolverFailed as error:
@@ -41,7 +41,7 @@ def first_order_status(
     Args:
         assembly: result of the first-order analysis.
         linearisation: linearisation error from :func:`linearisation_of`.
-        finite: description of the exact solution.
+        finite: text on the exact solution.
 
     Returns:
         ``status`` and ``reason`` of the public format; empty if the analysis is valid.
@@ -66,7 +66,7 @@ def first_order_status(
 def posture_status(
     posture: Posture, load: ArrayLike | None = None, gravity: ArrayLike | None = None
 ) -> dict[str, str]:
-    """Return status and reason for a posture that is singular or beyond joint limits.
+    """Return status and reason if a posture is singular or outside joint limits.
 
     Args:
         posture: posture of the robot.
@@ -84,7 +84,7 @@ def posture_status(
 def singular_status(
     posture: Posture, load: ArrayLike | None = None, gravity: ArrayLike | None = None
 ) -> dict[str, str]:
-    """Return status and reason for a singular posture, with the exact solution.
+    """Return status and reason if a posture is singular.
 
     Args:
         posture: posture of the robot.
@@ -104,7 +104,7 @@ def singular_status(
 
 
 def off_by(change: float) -> str:
-    """Explain by its energy error that the first-order analysis is invalid."""
+    """Return a text on the energy error of the first-order analysis."""
     return (
         "the first-order analysis is not valid here: its energy is wrong by "
         f"{100 * abs(change):.3g} %"
@@ -117,7 +117,7 @@ def _singular(posture: Posture) -> bool:
 
 
 def _words(exact: ExactAssembly) -> str:
-    """Format the energy and the pose error of the exact solution."""
+    """Format energy and pose error of the exact solution as text."""
     return (
         f"{rounded(exact.energy):.6g} J, platform error "
         f"{screw_text(exact.platform_screw)}"

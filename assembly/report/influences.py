@@ -1,4 +1,4 @@
-"""Effect of the order of the assembly steps on the assembled robot."""
+"""Effect of the order of assembly steps on the assembled robot."""
 
 from itertools import takewhile
 from typing import Any
@@ -17,17 +17,17 @@ from forcefit.assembly.steps.state import State
 def influences_among_joins(
     machine: Machine, state: State, plan: Plan, number: int
 ) -> list[Influence]:
-    """Return the mutual influences of consecutive joins, starting at a given step.
+    """Return the mutual influences of consecutive joining steps.
 
     Args:
-        machine: columns and closure rows of the robot.
+        machine: the robot at its posture.
         state: state before the step.
         plan: assembly steps.
-        number: index of the step, from 0.
+        number: index of the first of these steps.
 
     Returns:
-        The influences; empty if the step is not the first of consecutive joins, or if
-        clearances are open.
+        The influences. Empty if the previous step also joins, or if joints are not in
+        contact.
     """
     before = plan.steps[number - 1] if number else None
     if isinstance(before, Join) or not state.is_linear(machine):
@@ -37,11 +37,11 @@ def influences_among_joins(
 
 
 def about_influences(plan: Plan, found: list[Influence]) -> list[str]:
-    """Describe whether the order of the steps matters and which steps move openings.
+    """Return sentences on the order of the steps and on openings that they move.
 
     Args:
         plan: assembly steps.
-        found: influences among the joins of the plan.
+        found: influences between joining steps.
 
     Returns:
         The sentences.
@@ -66,10 +66,10 @@ def about_influences(plan: Plan, found: list[Influence]) -> list[str]:
 
 
 def influence_values(pair: Influence) -> dict[str, Any]:
-    """Convert the influence between two joins to a dictionary of plain values.
+    """Convert the influence between two joining steps to a dictionary.
 
     Args:
-        pair: influence between the two joins.
+        pair: the influence.
 
     Returns:
         Values by name.
@@ -81,7 +81,7 @@ def influence_values(pair: Influence) -> dict[str, Any]:
 
 
 def about_order(plan: Plan) -> str:
-    """Describe whether the result of a plan depends on the order of its steps.
+    """Return a sentence on whether the result depends on the order of the steps.
 
     Args:
         plan: assembly steps.

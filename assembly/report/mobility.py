@@ -1,4 +1,4 @@
-"""Mobility of a robot as plain values and as text."""
+"""Mobility of a robot as a dictionary and as text."""
 
 from collections.abc import Mapping, Sequence
 from itertools import groupby
@@ -17,7 +17,7 @@ from forcefit.assembly.kinematics.pure_motions import PureMotion, pure_motions
 from forcefit.results.display import listing
 from forcefit.results.text import lines_of
 
-# singular value ratio below which a rank counts as uncertain
+# ratio of singular values below which a rank is uncertain
 CERTAIN = 100.0
 _FREE = ("freedom", "freedoms")
 _OVER = ("over-constraint", "over-constraints")
@@ -29,14 +29,14 @@ _VERBS = {
 
 
 def shown_of(posture: Posture) -> dict[str, Any]:
-    """Return the values that ``assembly show`` prints in addition to the picture.
+    """Return the results of ``assembly show``.
 
     Args:
         posture: posture of the robot.
 
     Returns:
-        Pose, mobility and remarks; and for each frame the point and the x and z axes
-        [m, base axes] in which its errors, clearance and springs are expressed.
+        Pose, mobility and remarks. For each frame, its origin [m] and its x and z axes
+        in base axes.
     """
     robot = posture.robot
     axes = {
@@ -53,21 +53,21 @@ def shown_of(posture: Posture) -> dict[str, Any]:
 
 
 def shown_text(results: Mapping[str, Any]) -> str:
-    """Return the pose, mobility and remarks of :func:`shown_of` as text."""
+    """Format the results of :func:`shown_of` as text."""
     lines = lines_of(results, "pose") | mobility_lines(results["mobility"])
     return listing(results["robot"], lines, results["remarks"])
 
 
 def mobility_of(posture: Posture) -> dict[str, Any]:
-    """Return the mobility at a posture as a dictionary of plain values.
+    """Return the mobility at a posture as a dictionary.
 
     Args:
         posture: posture of the robot.
 
     Returns:
-        The counts of :class:`forcefit.assembly.kinematics.mobility.Mobility`, the
-        platform motions, and whether there are more degrees of freedom than at nearby
-        postures.  In that case, the counts at the nearby postures are included.
+        The attributes of :class:`forcefit.assembly.kinematics.mobility.Mobility`, the
+        platform motions, and whether the posture is singular. For a singular posture,
+        the attributes at a nearby posture are included.
     """
     here = mobility(posture)
     near = mobility_near(posture, here)
@@ -77,15 +77,14 @@ def mobility_of(posture: Posture) -> dict[str, Any]:
     singular = near.freedoms < here.freedoms
     singular |= there.freedoms_drives_locked < here.freedoms_drives_locked
     if singular and near.there is not None:
-        # motions are omitted, because several operation modes may intersect at this
-        # posture
+        # Nearby motions are omitted, because operation modes may intersect here.
         counts["near"] = vars(near.there)
     counts |= {"singular": singular, "finite_freedoms": near.freedoms}
     return counts | {"words": mobility_words(counts)}
 
 
 def _motions(posture: Posture) -> list[dict[str, Any]]:
-    """Convert platform motions to plain values, without keys that do not apply."""
+    """Return the platform motions as dictionaries without empty values."""
     screws, error = platform_screws(posture)
     motions = pure_motions(
         screws, posture.platform[:3, 3], size_of(posture.robot), error
@@ -96,7 +95,7 @@ def _motions(posture: Posture) -> list[dict[str, Any]]:
 
 
 def mobility_words(counts: Mapping[str, Any]) -> str:
-    """Describe degrees of freedom, platform motions and over-constraints.
+    """Format degrees of freedom, platform motions and over-constraints as text.
 
     Args:
         counts: result of :func:`mobility_of`.
@@ -115,7 +114,7 @@ def mobility_words(counts: Mapping[str, Any]) -> str:
 
 
 def motion_words(motions: Sequence[PureMotion]) -> str:
-    """Describe the motions of a body.
+    """Format the motions of a body as text.
 
     Args:
         motions: result of
@@ -143,7 +142,7 @@ def _kind(motion: PureMotion) -> str:
 
 
 def _of_kind(kind: str, motions: Sequence[PureMotion]) -> str:
-    """Describe motions of one kind; rotations intersect in one point."""
+    """Format motions of one kind as text."""
     along = ", ".join(_direction(motion.direction) for motion in motions)
     text = f"{_VERBS[kind]} {along}"
     first = motions[0]
@@ -155,7 +154,7 @@ def _of_kind(kind: str, motions: Sequence[PureMotion]) -> str:
 
 
 def _direction(d: Any) -> str:
-    """Format a direction as the name of a base axis or by its components."""
+    """Format a direction as an axis name or as components."""
     k = int(np.argmax(np.abs(d)))
     if abs(d[k]) > 1 - 1e-9:
         return "xyz"[k]
@@ -163,25 +162,24 @@ def _direction(d: Any) -> str:
 
 
 def _plain(value: float) -> str:
-    """Format a number with 4 digits; round-off becomes 0."""
+    """Format a number with 4 digits."""
     return f"{0.0 if abs(value) < 1e-9 else value:.4g}"
 
 
 def _number(count: int, one: str, many: str) -> str:
-    """Format a count together with its noun."""
+    """Format a number and its noun, in the singular or in the plural."""
     return f"{count} {one if count == 1 else many}"
 
 
 def mobility_lines(counts: Mapping[str, Any]) -> dict[str, str]:
-    """Format the mobility as lines of text.
+    """Format the mobility as lines of text, by title.
 
     Args:
         counts: result of :func:`mobility_of`.
 
     Returns:
-        Texts by title: the mobility and, where applicable, degrees of freedom with
-            locked drives, redundant drives, a different mobility nearby, and uncertain
-            counts.
+        Lines for the mobility, the degrees of freedom with locked drives, redundant
+        drives, a singular posture and uncertain numbers.
     """
     lines = {"mobility": counts["words"]}
     if held := counts["freedoms_drives_locked"]:
@@ -201,7 +199,7 @@ def mobility_lines(counts: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _singular(counts: Mapping[str, Any]) -> str:
-    """Describe the mobility near a singular posture."""
+    """Format the mobility near a singular posture as text."""
     if "near" not in counts:
         finite = _number(counts["finite_freedoms"], *_FREE)
         return f"motions at first order only, {finite} of finite size"

@@ -1,4 +1,4 @@
-"""Platform stiffness and compliance shares of the parts, as values and text."""
+"""Platform stiffness and its contributions, as a dictionary and as text."""
 
 from typing import Any
 
@@ -30,10 +30,10 @@ from forcefit.results.text import lines_of, table_lines, value_text
 from forcefit.stiffness.screws import SCREW, WRENCH
 
 DIRECTIONS = tuple(name.lower() for name in SCREW)
-# names of the two sides of a contact change in results
+# names of both directions of a contact change in the public format
 _SIDES: dict[Side, str] = {"loading": "holding", "unloading": "letting go"}
 _KINDS = {"link": "links", "joint": "joints", "clearance": "clearances"}
-_SHOWN = 12  # number of parts in table and chart; all others are summed in one row
+_SHOWN = 12  # number of contributions in tables and charts
 
 
 def stiffness_of(
@@ -45,18 +45,17 @@ def stiffness_of(
     length: float | None = None,
     direction: ArrayLike | None = None,
 ) -> dict[str, Any]:
-    """Return the results of ``assembly stiffness`` as a dictionary of plain values.
+    """Compute the platform stiffness as a dictionary.
 
     Args:
         posture: posture of the robot.
         load: (6,) [N m, N] load on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] gravity in base axes.
         at: (3,) [m] reference point of screws and wrenches, in platform axes.
-        state: ``"nominal"``, ``"contact"`` or ``"exact"``; the nominal state includes
-            the tangent of problem (22) if the robot has clearances.
-        length: [m] factor on rotations; None for the length of the longest body.
-        direction: (6,) unit screw in base axes, along which stiffness and compliance
-            shares are computed.
+        state: ``"nominal"``, ``"contact"`` or ``"exact"``.
+        length: [m] characteristic length by which rotations are multiplied; None for
+            the length of the longest body.
+        direction: (6,) unit screw in base axes for an additional stiffness, or None.
 
     Returns:
         The keys of the public format. ``status`` is ``"ok"``, ``"free motion"``,
@@ -90,7 +89,7 @@ def stiffness_of(
 def _tangents(
     posture: Posture, load: Any, gravity: Any, state: State
 ) -> tuple[NDArray, list[PlatformStiffness], list[str] | None]:
-    """Return the platform pose, the tangents on one or both sides, and remarks."""
+    """Return the platform pose, one or two tangent stiffnesses, and remarks."""
     if state == "nominal":
         return posture.platform, [without_clearance(posture)], None
     if state == "contact":
@@ -108,7 +107,7 @@ def _tangents(
 
 
 def _along(answer: PlatformStiffness, direction: ArrayLike) -> dict[str, Any]:
-    """Return platform stiffness and compliance shares along a given screw."""
+    """Return the stiffness and its contributions along a screw."""
     way = np.asarray(direction, dtype=float)
     free, blocked = answer.along(way)
     return {
@@ -118,14 +117,14 @@ def _along(answer: PlatformStiffness, direction: ArrayLike) -> dict[str, Any]:
 
 
 def virtual_clearances(posture: Posture) -> bool:
-    """Return whether any joint of the robot has a clearance."""
+    """Return whether the robot has joint clearances."""
     return any(frame.clearance is not None for frame in posture.robot.frames)
 
 
 def _in_contact(
     posture: Posture, load: Any, gravity: Any, point: NDArray, length: float | None
 ) -> list[dict[str, Any]]:
-    """Return the tangent of (22), or two if a clearance just touches a bound."""
+    """Return the tangent stiffness of problem (22), or two at a contact change."""
     assembly = solve_assembly(posture, load, gravity=gravity)
     pressed, touching = contacts(assembly)
     sides: list[Side] = ["loading"]
@@ -143,7 +142,7 @@ def _in_contact(
 
 
 def _status(stiffness: PlatformStiffness) -> str:
-    """Return the status of a stiffness."""
+    """Return the status for a stiffness."""
     if not stiffness.stable:
         return UNSTABLE
     return FREE_MOTION if stiffness.free.shape[1] else "ok"
@@ -152,15 +151,15 @@ def _status(stiffness: PlatformStiffness) -> str:
 def stiffness_values(
     platform: PlatformStiffness, point: NDArray, length: float | None = None
 ) -> dict[str, Any]:
-    """Convert a stiffness to plain values, NaN or infinite where undefined.
+    """Convert a platform stiffness to a dictionary.
 
     Args:
         platform: stiffness of the platform at a posture.
         point: (3,) [m] reference point in base axes.
-        length: [m] factor on rotations.
+        length: [m] characteristic length by which rotations are multiplied.
 
     Returns:
-        Matrices, free motions, eigenscrews, and compliance shares by direction.
+        Matrices, free motions, eigenscrews, and contributions to the compliance.
     """
     platform = platform.at(point, length)
     eigen = platform.eigen
@@ -192,7 +191,7 @@ def stiffness_values(
 
 
 def _share_values(stiffness: PlatformStiffness, axis: NDArray) -> dict[str, Any]:
-    """Return the compliance shares along an axis, by kind of part and frame."""
+    """Return the contributions to the compliance along a screw."""
     table: dict[str, Any] = {"links": {}, "joints": {}}
     for part, share in stiffness.shares(axis).items():
         if part.kind in _KINDS:
@@ -203,13 +202,13 @@ def _share_values(stiffness: PlatformStiffness, axis: NDArray) -> dict[str, Any]
 
 
 def share_rows(shares: dict[str, dict[str, Any]]) -> dict[str, list[float]]:
-    """Return the compliance shares of each part along the six axes, largest first.
+    """Return the contributions to the compliance along six axes, in descending order.
 
     Args:
-        shares: shares from :func:`stiffness_values`.
+        shares: contributions from :func:`stiffness_values`.
 
     Returns:
-        Six shares by the name of the part, such as ``"leg1.distal link"``.
+        Six values for each name, such as ``"leg1.distal link"``.
     """
     rows: dict[str, list[float]] = {}
     for k, name in enumerate(DIRECTIONS):
@@ -226,7 +225,7 @@ def share_rows(shares: dict[str, dict[str, Any]]) -> dict[str, list[float]]:
 
 
 def stiffness_text(results: dict[str, Any]) -> str:
-    """Format a stiffness as text: matrix, eigenstiffnesses and compliant parts."""
+    """Format the results of :func:`stiffness_of` as text."""
     about = lines_of(results, "pose status reason")
     lines = [listing(results["robot"], about, results.get("remarks", ()))]
     if "compliance" not in results:
@@ -245,14 +244,14 @@ def stiffness_text(results: dict[str, Any]) -> str:
 
 
 def _state_lines(values: dict[str, Any]) -> list[str]:
-    """Format one state: K, free motions, eigenstiffnesses and centre of stiffness."""
+    """Format the results for one state as lines of text."""
     K = np.asarray(values["stiffness"])
     size = np.sqrt(np.abs(np.nan_to_num(np.diag(K))))
     K = np.where(np.abs(K) < 1e-10 * np.outer(size, size), 0.0, K)
     rows = dict(zip(WRENCH, np.where(np.isfinite(K), K, np.nan).tolist(), strict=True))
     eigen = " ".join(f"{one['stiffness']:.4g}" for one in values["eigen"])
     point = f"{value_text('point', values['point'])}, base axes"
-    about = lines_of(values, "state") | {"read at": point} | {
+    about = lines_of(values, "state") | {"reference point": point} | {
         f"free motion {k}": numbers(screw)
         for k, screw in enumerate(values["free_motions"], 1)
     } | {
@@ -265,23 +264,23 @@ def _state_lines(values: dict[str, Any]) -> list[str]:
     if np.isfinite(values["centre"]).all():
         centre = value_text("centre", values["centre"])
         about["centre of stiffness"] = f"{centre}, base axes"
-    units = "[N m/rad, N/rad, N m/m, N/m]; - where rigid"
+    units = "[N m/rad, N/rad, N m/m, N/m]; - in rigid directions"
     details = listing("", about).split("\n")[1:]
     return [f"stiffness K_C {units}", *table_lines(("", *SCREW), rows), *details]
 
 
 def _share_lines(shares: dict[str, dict[str, Any]]) -> list[str]:
-    """Format the compliance shares of the parts in per cent."""
+    """Format the contributions to the compliance in per cent."""
     rows = {
         name: [rounded(100 * value) for value in row]
         for name, row in largest_rows(share_rows(shares)).items()
     }
-    head = "shares in the compliance along each direction [%]"
+    head = "contributions to the compliance along each direction [%]"
     return ["", head, *table_lines(("part", *DIRECTIONS), rows, digits=3)]
 
 
 def _direction_lines(along: dict[str, Any]) -> list[str]:
-    """Format the stiffness along a direction, with the most compliant parts."""
+    """Format the stiffness along a screw and its main contributions."""
     parts = sorted(
         (-share, f"{frame} {kind}")
         for kind, word in _KINDS.items()
@@ -290,19 +289,19 @@ def _direction_lines(along: dict[str, Any]) -> list[str]:
     most = ", ".join(f"{name} {-100 * share:.3g} %" for share, name in parts[:3])
     unit = "N m/rad" if np.any(along["direction"][:3]) else "N/m"
     return [
-        f"along {numbers(along['direction'])}: {along['free']:.5g} {unit}, all other "
-        f"directions held {along['blocked']:.5g} {unit}; {most}"
+        f"along {numbers(along['direction'])}: {along['free']:.5g} {unit}; with all "
+        f"other directions fixed: {along['blocked']:.5g} {unit}; {most}"
     ]
 
 
 def largest_rows(rows: dict[str, list[float]]) -> dict[str, list[float]]:
-    """Return the first rows of shares, and the sum of all others.
+    """Return the largest contributions and the sum of all others.
 
     Args:
-        rows: result of :func:`share_rows`, largest first.
+        rows: result of :func:`share_rows`.
 
     Returns:
-        The rows, unchanged if there are only a few.
+        At most 13 rows.
     """
     names = list(rows)
     if len(names) <= _SHOWN + 1:

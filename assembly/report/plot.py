@@ -1,4 +1,4 @@
-"""Plot the deformed robot and the set of possible platform errors."""
+"""3D plots of a deformed robot and of its possible platform errors."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -19,13 +19,13 @@ _SHORT = 1e-9  # [m] length below which a body is not drawn
 
 @dataclass(frozen=True, eq=False)
 class DisplacedBodies:
-    """Positions, displacements and bending of each body of an assembled robot.
+    """Nominal positions and displacements of the bodies of an assembly.
 
     Attributes:
-        starts: (n, 3) [m] nominal start of each frame's body, base axes.
-        ends: (n, 3) [m] nominal end of each frame's body, base axes.
-        start_screws: (n, 6) [rad, m] small screw of the start, at the start.
-        end_screws: (n, 6) [rad, m] small screw of the end, at the end.
+        starts: (n, 3) [m] nominal start of each body, in base axes.
+        ends: (n, 3) [m] nominal end of each body, in base axes.
+        start_screws: (n, 6) [rad, m] displacement of the start.
+        end_screws: (n, 6) [rad, m] displacement of the end.
         bends: (n, 3) [rad] elastic rotation of the end relative to the start.
     """
 
@@ -43,21 +43,20 @@ def plot_assembly(
     assumption: str = "budget",
     off_screen: bool = True,
 ) -> Any:
-    """Plot an assembled robot, optionally with its possible platform errors.
+    """Plot an assembled robot, and optionally its possible platform errors.
 
     Args:
         assembly: assembly of the robot.
-        exaggeration: factor on all displacements; by default they are clearly visible.
-        errors: ``"translation"`` or ``"rotation"``, the set of errors to draw; None for
-            none.
+        exaggeration: factor on all displacements; None to choose it automatically.
+        errors: set of errors to draw: ``"translation"``, ``"rotation"`` or None.
         assumption: assumption of problem (27) for the set of errors.
-        off_screen: True to open no window when the plotter is shown.
+        off_screen: True to suppress the window.
 
     Returns:
         A pyvista plotter.
 
     Raises:
-        BadInput: the platform moves freely, so that its errors are unbounded.
+        BadInput: the errors are unbounded because the platform moves freely.
         SolverFailed: the cone solver failed for the set of errors.
     """
     plotter = robot_plotter(assembly, exaggeration, off_screen)
@@ -78,18 +77,17 @@ def robot_plotter(
 
     Args:
         assembly: assembly of the robot.
-        exaggeration: factor on all displacements, which is displayed in the plot.  By
-            default, it is chosen so that displacements are at most 10 % of the robot's
-            size and rotations at most 0.5 rad.
-        off_screen: True to open no window.
+        exaggeration: factor on all displacements; None for the result of
+            :func:`readable_factor`.
+        off_screen: True to suppress the window.
 
     Returns:
-        A pyvista plotter; the caller shows it or takes a screenshot.
+        A pyvista plotter.
     """
     import pyvista
     from vtkmodules.vtkCommonCore import vtkLogger
 
-    # without a display, VTK tries other back ends and reports so on stderr
+    # Without a display, VTK prints messages on stderr.
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
     bodies = displaced_bodies(assembly)
     size = float(np.ptp(bodies.ends, axis=0).max()) or 1.0
@@ -115,13 +113,13 @@ def add_bodies(
     plotter: Any, assembly: Assembly, bodies: DisplacedBodies, factor: float,
     size: float,
 ) -> None:  # fmt: skip
-    """Add displaced bodies to a plot, replacing those added before.
+    """Draw displaced bodies, and remove those drawn before.
 
     Args:
         plotter: pyvista plotter.
         assembly: assembly of the robot.
         bodies: result of :func:`displaced_bodies`.
-        factor: exaggeration of the displacements.
+        factor: factor on all displacements.
         size: [m] size of the robot.
     """
     import pyvista
@@ -137,7 +135,7 @@ def add_bodies(
 
 
 def _drawn_rows(robot: Robot, bodies: DisplacedBodies) -> list[int]:
-    """Return the indices of bodies to draw, except short bodies and joint contacts."""
+    """Return the indices of the bodies to draw."""
     lengths = np.linalg.norm(bodies.ends - bodies.starts, axis=1)
     contacts = contact_frames(robot)
     return [
@@ -147,7 +145,7 @@ def _drawn_rows(robot: Robot, bodies: DisplacedBodies) -> list[int]:
 
 
 def _add_joint_axes(plotter: Any, posture: Posture, size: float) -> None:
-    """Add short rods along the axes of all joints, at their nominal positions."""
+    """Draw short rods along the nominal joint axes."""
     import pyvista
 
     for frame, T in zip(posture.robot.frames, posture.transforms, strict=True):
@@ -159,8 +157,8 @@ def _add_joint_axes(plotter: Any, posture: Posture, size: float) -> None:
 
 
 def fill_window(plotter: Any) -> None:
-    """Centre the scene in the window and make it fill the window."""
-    # fraction of the window used by the scene; captions are above and below
+    """Move the camera so that the scene fills the window."""
+    # fraction of the window without captions
     camera, share = plotter.camera, 0.85
     low, high = np.reshape(plotter.bounds, (3, 2)).T
     corners = np.array([[(low, high)[b][c] for c, b in enumerate(bits)]
@@ -176,14 +174,14 @@ def fill_window(plotter: Any) -> None:
 def add_error_body(
     plotter: Any, body: ErrorBody, origin: NDArray, size: float, assumption: str
 ) -> None:
-    """Add the set of translation or rotation errors to a plot, magnified.
+    """Draw a magnified set of platform errors.
 
     Args:
         plotter: result of :func:`robot_plotter`.
         body: set of errors.
-        origin: (3,) [m] position of zero error: the platform's nominal origin.
+        origin: (3,) [m] position of a zero error in the plot.
         size: [m] size of the largest error in the plot.
-        assumption: assumption of problem (27), shown in the caption.
+        assumption: assumption of problem (27), for the caption.
     """
     import pyvista
 
@@ -203,15 +201,15 @@ def add_error_body(
 
 
 def displaced_bodies(assembly: Assembly, closing: float = 1.0) -> DisplacedBodies:
-    """Compute the displacements of all bodies from the small screws along the tree.
+    """Compute the displacements of all bodies in the linear model.
 
     Args:
         assembly: assembly of a robot of n frames.
-        closing: fraction of the deformations and joint motions.  For 0, only geometric
-            errors are applied, and closures are open.
+        closing: fraction of the deformations and joint motions. For 0, the loops are
+            open due to geometric errors.
 
     Returns:
-        The bodies in the order of the robot's frames.
+        The bodies in the order of the frames.
     """
     posture = assembly.posture
     turned = screw_map(np.zeros(3), posture.transforms[:, :3, :3])
@@ -231,19 +229,18 @@ def displaced_bodies(assembly: Assembly, closing: float = 1.0) -> DisplacedBodie
 
 
 def finitely_displaced_bodies(assembly: ExactAssembly) -> DisplacedBodies:
-    """Compute the displacements of all bodies for finite motions.
+    """Compute the displacements of all bodies in the exact solution.
 
     Args:
-        assembly: assembly of a robot of n frames with finite motions.
+        assembly: exact solution for a robot of n frames.
 
     Returns:
-        The bodies with the exact displacements of their ends; rotations are rotation
-        vectors.
+        The bodies. Rotations are rotation vectors.
     """
     posture = assembly.posture
     nominal = posture.transforms
     ends = assembly.placement.body_ends[assembly.cut.last]
-    # row -1 is the base, which does not move
+    # row -1 for the base
     at_start, at_end = np.zeros((len(nominal) + 1, 6)), np.zeros((len(nominal), 6))
     for screws, T in ((at_start[:-1], assembly.transforms), (at_end, ends)):
         turned = T[:, :3, :3] @ np.swapaxes(nominal[:, :3, :3], 1, 2)
@@ -257,21 +254,21 @@ def finitely_displaced_bodies(assembly: ExactAssembly) -> DisplacedBodies:
 
 
 def body_starts(posture: Posture) -> NDArray:
-    """Return nominal starts (n, 3) [m] of all bodies: the origins of their parents."""
-    origins = np.vstack([posture.transforms[:, :3, 3], np.zeros(3)])  # row -1 is base
+    """Return the nominal starts of all bodies, (n, 3) [m]."""
+    origins = np.vstack([posture.transforms[:, :3, 3], np.zeros(3)])  # row -1: base
     return origins[posture.robot.parents]
 
 
 def readable_factor(bodies: DisplacedBodies, size: float) -> float:
-    """Return an exaggeration of 1, 2 or 5 times a power of ten for a readable plot.
+    """Return a factor on displacements that makes a plot readable.
 
     Args:
         bodies: bodies with their displacements.
         size: [m] size of the robot.
 
     Returns:
-        The largest factor for which no translation exceeds 10 % of the size and no
-        rotation exceeds 0.5 rad.
+        The largest factor of the form 1, 2 or 5 times a power of ten for which no
+        translation exceeds 10 % of the size and no rotation exceeds 0.5 rad.
     """
     shift = float(np.abs(bodies.end_screws[:, 3:]).max())
     turn = float(np.abs(bodies.end_screws[:, :3]).max())
@@ -283,15 +280,14 @@ def readable_factor(bodies: DisplacedBodies, size: float) -> float:
 
 
 def _shape(bodies: DisplacedBodies, i: int, factor: float) -> NDArray:
-    """Return 20 points (20, 3) along a displaced body with cubic deflection."""
+    """Return points along a displaced body with cubic deflection, (20, 3)."""
     a = bodies.starts[i] + factor * bodies.start_screws[i, 3:]
     b = bodies.ends[i] + factor * bodies.end_screws[i, 3:]
     if not np.any(bodies.bends[i]):
         return np.linspace(a, b, 20)
     bend = rotation_matrix(factor * bodies.bends[i])
     chord = b - a
-    # end slopes lie halfway between the chord and the chord rotated by the bending
-    # angle
+    # The slope at each end is the mean of the chord and the rotated chord.
     slope_a, slope_b = bend.T @ chord, bend @ chord
     slope_a, slope_b = (chord + slope_a) / 2, (chord + slope_b) / 2
     s = np.linspace(0, 1, 20)[:, None]

@@ -1,8 +1,7 @@
-"""Animate the closing of a robot, from open loops to the assembled state.
+"""Animation of a robot from open loops to the assembled state.
 
-In the first frame, only the geometric errors are applied, so the loops are open.  The
-deformations and joint motions then increase from zero to those of the minimum-energy
-solution, problem (22).
+In the first picture, the loops are open due to geometric errors. Deformations and joint
+motions increase from zero to those of the minimum-energy solution (22).
 """
 
 from collections.abc import Iterator
@@ -22,8 +21,8 @@ from forcefit.assembly.report.plot import (
 )
 from forcefit.inputs.errors import BadInput
 
-_STEPS = 24  # number of pictures from open to closed
-_STEP, _OPEN, _CLOSED = 60, 900, 1800  # [ms] duration of an inner, first, last picture
+_STEPS = 24  # number of steps of the animation
+_STEP, _OPEN, _CLOSED = 60, 900, 1800  # [ms] duration of inner, first and last picture
 _WINDOW = (720, 540)  # [pixels] size of a picture
 
 
@@ -35,8 +34,7 @@ def closing_gaps(assembly: Assembly, closing: float) -> NDArray:
         closing: fraction of the deformations and joint motions, 0 to 1.
 
     Returns:
-        (k, 3) [m] vectors from the first to the second frame, base axes, to first
-        order.
+        Vectors from the first to the second frame in base axes, (k, 3) [m].
     """
     robot = assembly.posture.robot
     moved = displaced_bodies(assembly, closing).end_screws[:, 3:]
@@ -47,17 +45,17 @@ def closing_gaps(assembly: Assembly, closing: float) -> NDArray:
 def closing_pictures(
     assembly: Assembly, exaggeration: float | None = None
 ) -> Iterator[tuple[NDArray, int]]:
-    """Yield the frames of an animation of closing.
+    """Yield the pictures of the animation.
 
     Args:
         assembly: assembly of the robot.
         exaggeration: factor on all displacements; by default they are clearly visible.
 
     Yields:
-        A picture as (rows, columns, 3) values from 0 to 255, and its duration [ms].
+        A picture, (rows, columns, 3) with values from 0 to 255, and its duration [ms].
 
     Raises:
-        BadInput: all closures hold without deformation.
+        BadInput: all loops are closed without deformation.
     """
     if not np.any(np.abs(closing_gaps(assembly, 0.0)) > 1e-12):
         raise BadInput(
@@ -89,7 +87,7 @@ def _draw(
     plotter: Any, assembly: Assembly, bodies: DisplacedBodies, factor: float,
     size: float,
 ) -> None:  # fmt: skip
-    """Draw the bodies, with a line between the two frames of each open closure."""
+    """Draw the bodies, and a line in the gap of each open loop."""
     import pyvista
 
     add_bodies(plotter, assembly, bodies, factor, size)

@@ -1,4 +1,4 @@
-"""Results of ``assembly error``: pose error bounds of problem (27)."""
+"""Pose error bounds, problem (27), as a dictionary and as text."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -35,32 +35,31 @@ def pose_error_of(
     gravity: ArrayLike | None = None,
     **options: Any,
 ) -> dict[str, Any]:
-    """Compute the results of ``assembly error`` as a dictionary of plain values.
+    """Compute pose error bounds as a dictionary.
 
     Args:
         posture: posture of the robot.
-        assumptions: assumptions of problem (27); by default all, except ``budget``
-            under a load.
+        assumptions: assumptions of problem (27); by default all or, under a load, all
+            except ``budget``.
         point: (3,) [m] point whose translation is bounded, in platform axes.
-        direction: (6,) direction along which the largest error is bounded as well.
+        direction: (6,) direction for an additional bound, or None.
         load: (6,) [N m, N] load on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] gravity in base axes.
         options: options of
             :func:`forcefit.assembly.linear.pose_error.bound_pose_error`.
 
     Returns:
-        The keys of the public format; ``status`` as in :func:`solution_of`.
+        The keys of the public format.
 
     Raises:
-        BadInput: the assumption ``budget`` is requested with a load, or a joint of a
-            loaded robot has ``left = "worst"``.
+        BadInput: there is a load, and the assumption is ``budget`` or a joint has
+            ``left = "worst"``.
     """
     loaded = bool(np.any(load) or np.any(gravity) or driven(posture.robot))
     if loaded and "budget" in (assumptions or ()):
         raise BadInput(
-            "assumption budget: found a load, expected none; use frozen or "
-            "free, because the budget is a factor on the energy of a robot "
-            "without load"
+            "assumption budget: found a load, expected none, because the budget is "
+            "defined by the energy without loads; use frozen or free"
         )
     assumptions = assumptions or (ASSUMPTIONS[:2] if loaded else ASSUMPTIONS)
     results: dict[str, Any] = {
@@ -84,7 +83,7 @@ def pose_error_of(
         for name in assumptions:
             try:
                 bound = bound_pose_error(assembly, name, offset=offset, **options)
-            except FreeMotion as error:  # "free" may remove all springs
+            except FreeMotion as error:  # for "free", there may be no spring
                 no_bounds = dict.fromkeys(("rotation", "translation"))
                 table[name] = no_bounds | {"reason": str(error)}
                 continue
@@ -120,7 +119,7 @@ def _bounds(bound: PoseError) -> dict[str, Any]:
 
 
 def _worst_left(posture: Posture, offset: NDArray) -> dict[str, Any]:
-    """Return the pose error bounds over all positions in which joints can be bolted."""
+    """Return pose error bounds over all positions of bolted joints."""
     worst = worst_left(posture, offset)
     bounds = {
         part: dict(zip(("lower", "upper"), getattr(worst, part), strict=True))
@@ -133,7 +132,7 @@ def _support(
     assembly: Assembly, assumption: str, offset: NDArray, direction: ArrayLike,
     energy_budget: float = 0.05, **_: float,
 ) -> dict[str, Any]:  # fmt: skip
-    """Bound the largest error along a direction, and return its screw."""
+    """Return bounds on the largest error along a direction."""
     reach = reachable_screws(assembly, assumption, energy_budget).at_point(offset)
     support = reach.support(direction)
     if support.height == np.inf:
@@ -143,12 +142,12 @@ def _support(
 
 
 def _bracket(bounds: Sequence[float] | NDArray, screw: NDArray) -> dict[str, Any]:
-    """Return both bounds and the platform screw that attains the lower one."""
+    """Return a dictionary of both bounds and the screw of the lower bound."""
     return {"lower": bounds[0], "upper": bounds[1], "platform_screw": screw}
 
 
 def pose_error_text(results: dict[str, Any]) -> str:
-    """Format the pose error bounds, one line per assumption."""
+    """Format pose error bounds as text."""
     lines = lines_of(results, "pose status reason")
     for assumption, bounds in (results["error"] or {}).items():
         if "reason" in bounds:

@@ -1,4 +1,4 @@
-"""Assembly results as plain values (keys of the public format) and as text."""
+"""Results of an assembly as a dictionary and as text."""
 
 from collections.abc import Callable
 from typing import Any
@@ -37,18 +37,18 @@ from forcefit.assembly.solvers.conic import SolverFailed
 from forcefit.results.display import listing
 from forcefit.results.text import lines_of, value_text
 
-# numbers of a certificate, all relative except the duality gap [J]
+# keys of a certificate
 _PROOF = (
     "closure_residual clearance_excess duality_gap relative_gap stationarity iterations"
 )
-# margins and related quantities; clearances suffice up to a margin of 1
+# keys of margins
 _ZONE = (
     "zone.assemblable zone.margin zone.assemblable_free zone.margin_free zone.status "
     "zone.reason"
 )
 _UNSTABLE = (
-    "the potential energy decreases along a motion: the equilibrium is unstable, as "
-    "beyond a critical load"
+    "the equilibrium is unstable, because the potential energy decreases along a "
+    "motion; the load may exceed a critical load"
 )
 
 
@@ -68,15 +68,19 @@ def zone_of(posture: Posture) -> dict[str, Any]:
 
 
 def _finite(value: float) -> float | None:
-    """Return a margin; None if the robot cannot be assembled with any clearance."""
+    """Return a margin, or None if it is infinite."""
     return None if np.isinf(value) else value
 
 
 def zone_text(results: dict[str, Any]) -> str:
-    """Return the margins as text.
+    """Format the margins as text.
 
     Args:
-        results: table with ``robot``, ``pose`` and ``zone`` from :func:`zone_of`.
+        results: dictionary with ``robot``, ``pose`` and ``zone``, the result of
+            :func:`zone_of`.
+
+    Returns:
+        The text.
     """
     return listing(results["robot"], lines_of(results, f"pose {_ZONE}"))
 
@@ -86,7 +90,7 @@ def solution_of(
     load: ArrayLike | None = None,
     gravity: ArrayLike | None = None,
 ) -> dict[str, Any]:
-    """Compute the results of ``assembly solve`` as a dictionary of plain values.
+    """Compute the results of ``assembly solve`` as a dictionary.
 
     Args:
         posture: posture of the robot.
@@ -94,10 +98,9 @@ def solution_of(
         gravity: (3,) [m/s^2] gravity in base axes.
 
     Returns:
-        The keys of the public format.  ``status`` is ``"ok"``; ``"not proved"``, in
-        which case ``reason`` states the gap of the certificate; ``"singular"``, in
-        which case the first-order solution is invalid and ``reason`` describes the
-        solution with finite motions; or the kind of failure, without a solution.
+        The keys of the public format. ``status`` is ``"ok"``, ``"not proved"``
+        (incomplete certificate), ``"singular"`` (invalid first-order solution) or the
+        type of failure. ``reason`` contains details.
     """
     robot = posture.robot
     names = [f.name for f in robot.frames]
@@ -133,7 +136,7 @@ def solution_of(
             | _assembly_results(assembly, bound)
             | {"linearisation_error": linearisation, "worst_error": worst(assembly)}
             | proof_status("; ".join(unproved_parts))
-            # without errors and loads, the nominal posture is a solution
+            # The nominal posture is a solution without errors and loads.
             | (first_order_status(assembly, linearisation, finite) if forced else {})
         )
     except (CannotAssemble, FreeMotion, SolverFailed) as error:
@@ -142,12 +145,12 @@ def solution_of(
 
 
 def proof_status(reason: str) -> dict[str, str]:
-    """Return status and reason if a certificate is incomplete; otherwise empty."""
+    """Return status and reason if a certificate is incomplete."""
     return {"status": NOT_PROVED, "reason": reason} if reason else {}
 
 
 def _assembly_results(assembly: Assembly, bound: ScrewBound) -> dict[str, Any]:
-    """Return the results of a solved assembly."""
+    """Return the results of a minimum-energy solution."""
     certificate = {
         "closure_residual": assembly.closure_residual(),
         "reference_length": assembly.linearisation.size,
@@ -164,7 +167,7 @@ def _assembly_results(assembly: Assembly, bound: ScrewBound) -> dict[str, Any]:
 
 
 def _screws_and_wrenches(assembly: Assembly | ExactAssembly) -> dict[str, Any]:
-    """Return energy and pose error, with screws and wrenches of frames and closures."""
+    """Return energy and pose error, and screws and wrenches of frames and closures."""
     robot = assembly.posture.robot
     frames = {
         f.name: {
@@ -200,7 +203,7 @@ def exact_of(
     gravity: ArrayLike | None = None,
     progress: Callable[[int, int], None] = lambda done, most: None,
 ) -> dict[str, Any]:
-    """Compute the results of ``assembly solve --state exact`` as plain values.
+    """Compute the results of ``assembly solve --state exact`` as a dictionary.
 
     Args:
         posture: posture of the robot.
@@ -209,8 +212,8 @@ def exact_of(
         progress: argument of :func:`forcefit.assembly.exact.exact.solve_exact`.
 
     Returns:
-        The keys of ``assembly solve`` for finite motions. ``status`` has the same
-        values, or is ``"unstable"`` if the potential decreases along a motion.
+        The keys of the public format. ``status`` may be ``"unstable"`` in addition to
+        the values in :func:`solution_of`.
     """
     results: dict[str, Any] = {
         "robot": posture.robot.name, "status": "ok", "pose": posture.pose(),
@@ -257,7 +260,7 @@ def exact_text(results: dict[str, Any]) -> str:
 
 
 def _joint_frames(robot: Robot) -> dict[str, dict[str, str]]:
-    """Return the main frame of each joint that consists of several frames."""
+    """Return the main frames of joints that consist of several frames."""
     frames = {name: joint.main for name, joint in robot.joints.items()}
     return {"joint_frames": frames} if frames else {}
 
@@ -269,7 +272,7 @@ def solution_text(results: dict[str, Any]) -> str:
         results: result of :func:`solution_of`.
 
     Returns:
-        Text without colours.
+        The text.
     """
     solved = results["energy"] is not None
     lines = lines_of(results, "pose") | mobility_lines(results["mobility"])
@@ -287,7 +290,7 @@ def solution_text(results: dict[str, Any]) -> str:
 
 
 def _linearisation_lines(results: dict[str, Any]) -> dict[str, str]:
-    """Format the linearisation error, linear minus exact."""
+    """Format the linearisation error as lines of text."""
     error = results.get("linearisation_error", {})
     if "rotation" not in error:
         words = "linearisation error"
@@ -296,8 +299,7 @@ def _linearisation_lines(results: dict[str, Any]) -> dict[str, str]:
         f"linearisation_{part}": float(np.linalg.norm(error[part]))
         for part in ("rotation", "translation")
     } | {"linearisation_energy": error["relative_energy"]}
-    # identical solutions differ by round-off: 1e-12 rad, 1e-15 m, and 1e-11 of the
-    # energy
+    # round-off errors of rotation [rad], translation [m] and relative energy
     least = (1e-12, 1e-15, 1e-11)
     for name, small in zip(sizes, least, strict=True):
         sizes[name] = sizes[name] if abs(sizes[name]) >= small else 0.0
@@ -305,7 +307,7 @@ def _linearisation_lines(results: dict[str, Any]) -> dict[str, str]:
 
 
 def _bound_lines(results: dict[str, Any]) -> dict[str, str]:
-    """Format the error bound on the screw, and undetermined motions."""
+    """Format the error bound on the platform screw as lines of text."""
     bound, largest = results["certificate"], results["worst_error"]
     lines = lines_of(bound, "screw_rotation_error screw_translation_error")
     if (
@@ -322,20 +324,20 @@ def _bound_lines(results: dict[str, Any]) -> dict[str, str]:
 
 
 def status_line(results: dict[str, Any]) -> str:
-    """Format status and reason of a result, unless the status is ok."""
+    """Format status and reason of a result as a line of text."""
     status, reason = results["status"], results["reason"]
     return reason if reason.startswith(status) else f"{status}: {reason}"
 
 
 def worst(assembly: Assembly) -> dict[str, Any] | None:
-    """Compute certified pose error bounds under the assumption ``frozen``.
+    """Compute pose error bounds for the assumption ``frozen``.
 
     Args:
         assembly: minimum-energy assembly.
 
     Returns:
-        Upper bounds ``rotation`` [rad] and ``translation`` [m]; None if they are
-        unproved.
+        Upper bounds ``rotation`` [rad] and ``translation`` [m], or None without a
+        proof.
     """
     try:
         bound = bound_pose_error(assembly, "frozen")

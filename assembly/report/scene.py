@@ -23,7 +23,7 @@ from forcefit.page.charts import scene
 from forcefit.results.units import shown_in
 from forcefit.stiffness.screws import skew
 
-# number of points along a body, which resolves the cubic shape of a bent beam
+# number of points along a body
 _SAMPLES = 9
 
 
@@ -32,17 +32,16 @@ def robot_scene(
 ) -> str:
     """Return an HTML scene of the nominal and the assembled robot.
 
-    Displacements are linear in the exaggeration, and a bent link is drawn as a cubic
-    curve.
+    Links with deformations are drawn as cubic curves.
 
     Args:
         assembly: assembly of a robot of n frames.
-        closing: (k, n, 4, 4) frame poses during a simulated closing, or None.
+        closing: (k, n, 4, 4) poses of all frames during closing, or None.
         body: set of possible platform errors, or None.
         caption: text below the figure.
 
     Returns:
-        HTML of a figure.
+        HTML of the scene.
     """
     return scene(forced_scene(assembly, closing, body), caption)
 
@@ -50,7 +49,7 @@ def robot_scene(
 def forced_scene(
     assembly: Assembly, closing: NDArray | None = None, body: ErrorBody | None = None
 ) -> dict[str, Any]:
-    """Return the data of a scene; arguments as for :func:`robot_scene`."""
+    """Return the data of an assembled robot, see :func:`robot_scene`."""
     posture = assembly.posture
     ends = posture.transforms[:, :3, 3]
     moved = [] if closing is None else closing[:, :, :3, 3] - ends
@@ -60,9 +59,9 @@ def forced_scene(
 
 
 def exact_scene(assembly: ExactAssembly) -> dict[str, Any]:
-    """Return the data of a scene of an assembly with finite motions.
+    """Return the data of an exact solution.
 
-    Small displacements are exaggerated, whereas large ones are drawn to scale.
+    Small displacements are magnified. Large displacements are to scale.
     """
     bodies = finitely_displaced_bodies(assembly)
     forces = _forces(assembly, assembly.transforms)
@@ -75,7 +74,7 @@ def exact_scene(assembly: ExactAssembly) -> dict[str, Any]:
 
 
 def nominal_scene(posture: Posture) -> dict[str, Any]:
-    """Return the data of a scene of the nominal robot, without errors and loads."""
+    """Return the data of a nominal robot."""
     still = np.zeros((len(posture.robot.frames), 6))
     bodies = DisplacedBodies(
         body_starts(posture), posture.transforms[:, :3, 3], still, still, still[:, :3]
@@ -86,7 +85,7 @@ def nominal_scene(posture: Posture) -> dict[str, Any]:
 def _spec(
     posture: Posture, bodies: DisplacedBodies, closing: Any, forces: Any, body: Any
 ) -> dict[str, Any]:
-    """Return the data of a scene, including its size, units and exaggeration."""
+    """Return the data of a scene."""
     ends = bodies.ends
     size = float(np.ptp(np.vstack([ends, np.zeros(3)]), axis=0).max()) or 1.0
     drawn = np.vstack([bodies.starts, ends])
@@ -110,7 +109,7 @@ def _spec(
 
 
 def _body(robot: Robot, bodies: DisplacedBodies, i: int) -> dict[str, Any]:
-    """Return the data of a body: its points, their displacements, and its joint."""
+    """Return the data of a body."""
     frame, parent = robot.frames[i], int(robot.parents[i])
     start, end = bodies.starts[i], bodies.ends[i]
     s = np.linspace(0.0, 1.0, _SAMPLES)[:, None]
@@ -125,12 +124,12 @@ def _body(robot: Robot, bodies: DisplacedBodies, i: int) -> dict[str, Any]:
 
 
 def _moved(bodies: DisplacedBodies, i: int, s: NDArray) -> NDArray:
-    """Return (k, 3) [m] displacements along a body, as a cubic curve."""
+    """Return the displacements of points along a body, (k, 3) [m]."""
     chord = bodies.ends[i] - bodies.starts[i]
     a, b = bodies.start_screws[i, 3:], bodies.end_screws[i, 3:]
     if not np.any(bodies.bends[i]):
         return a + s * (b - a)
-    # exact for a cantilever loaded at its end, whose deflection is cubic
+    # cubic curve, which is exact for a cantilever with a load at its end
     turn = bodies.start_screws[i, :3]
     slope_a, slope_b = skew(turn) @ chord, skew(turn + bodies.bends[i]) @ chord
     return (
@@ -142,7 +141,7 @@ def _moved(bodies: DisplacedBodies, i: int, s: NDArray) -> NDArray:
 def _forces(
     assembly: Assembly | ExactAssembly, transforms: NDArray
 ) -> list[dict[str, Any]]:
-    """Return the forces [N] that elastic links transmit at their tips, base axes."""
+    """Return the forces that links transmit at their tips, in base axes [N]."""
     posture = assembly.posture
     turned = transforms[:, :3, :3] @ assembly.tip_wrenches[:, 3:, None]
     largest = float(np.abs(turned).max(initial=0.0))
@@ -156,7 +155,7 @@ def _forces(
 
 
 def _error_body(body: ErrorBody, origin: NDArray) -> dict[str, Any]:
-    """Convert the set of possible platform errors to plain values, with its origin."""
+    """Return the data of a set of possible platform errors."""
     sizes = np.linalg.norm(body.points, axis=1)
     shown = shown_in("m", float(sizes.max(initial=0.0)))
     text = f"possible platform errors, up to {sizes.max() * shown.factor:.4g}"

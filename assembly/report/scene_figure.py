@@ -1,4 +1,4 @@
-"""Draw the scene of a page as a matplotlib figure."""
+"""Drawing of a 3D scene as a matplotlib figure."""
 
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -13,19 +13,18 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _LIGHT, _ORANGE, _DARK, _GOLD = "#c3c9cf", "#d68910", "#5b6773", "#e0a800"
-_ELEVATION, _AZIMUTH = 22.0, -62.0  # [deg] view from the front right, from above
+_ELEVATION, _AZIMUTH = 22.0, -62.0  # [deg] direction of view
 
 
 def scene_figure(spec: Mapping[str, Any], title: str) -> "Figure":
-    """Draw a robot in three dimensions, nominal or both nominal and forced.
+    """Draw a robot in its nominal state or in both states.
 
     Args:
         spec: data from :mod:`forcefit.assembly.report.scene`, in SI units.
         title: title above the axes.
 
     Returns:
-        A pyplot figure that is not displayed: ``savefig`` writes it, and
-        ``pyplot.show()`` opens a window if there is a display.
+        A pyplot figure.
     """
     from matplotlib import pyplot
 
@@ -64,14 +63,14 @@ def scene_figure(spec: Mapping[str, Any], title: str) -> "Figure":
 
 
 def _moved(body: Mapping[str, Any], factor: float, scale: float) -> NDArray:
-    """Return (k, 3) points along a displaced body, in the displayed unit."""
+    """Return points along a displaced body in the displayed unit, (k, 3)."""
     return np.asarray(scale * (body["nominal"] + factor * body["moved"]))
 
 
 def _draw(
     axes: Any, lines: Sequence[NDArray], name: str, color: str, width: float
 ) -> None:
-    """Draw lines that share one legend entry."""
+    """Draw lines with one entry in the legend."""
     gap = np.full((1, 3), np.nan)
     if lines:
         points = np.concatenate([part for line in lines for part in (line, gap)])
@@ -81,7 +80,7 @@ def _draw(
 def _draw_errors(
     axes: Any, body: Mapping[str, Any], factor: float, scale: float
 ) -> None:
-    """Draw the possible errors at the platform's origin, with the same exaggeration."""
+    """Draw the set of possible errors at the origin of the platform."""
     points = scale * (body["origin"] + factor * body["points"])
     look = {"color": _GOLD, "label": plot_label(body["text"])}
     if len(body["faces"]):

@@ -1,4 +1,4 @@
-"""Charts of the compliance shares of the parts."""
+"""Charts of the contributions to the platform compliance."""
 
 from collections.abc import Mapping
 from itertools import cycle
@@ -19,15 +19,15 @@ if TYPE_CHECKING:
 
 
 def plot_shares(results: Mapping[str, Any], figure: "Figure | None" = None) -> "Figure":
-    """Draw a bar chart of the compliance shares of the parts in each direction.
+    """Draw a bar chart of the contributions to the compliance in each direction.
 
     Args:
         results: result of
             :func:`forcefit.assembly.report.platform_stiffness.stiffness_of`.
-        figure: empty figure to draw in; None to create a new one.
+        figure: empty figure; None to create one.
 
     Returns:
-        The figure; directions without a finite compliance are left empty.
+        The figure. There is no bar without a finite compliance.
     """
     from matplotlib.figure import Figure
 
@@ -47,10 +47,10 @@ def plot_shares(results: Mapping[str, Any], figure: "Figure | None" = None) -> "
 
 
 def share_chart(shares: Mapping[str, Any], caption: str) -> str:
-    """Return an HTML chart of the largest compliance shares, one bar per direction.
+    """Return an HTML chart of the largest contributions in each direction.
 
     Args:
-        shares: shares from
+        shares: contributions from
             :func:`forcefit.assembly.report.platform_stiffness.stiffness_values`.
         caption: caption below the chart.
 
@@ -67,7 +67,7 @@ def share_chart(shares: Mapping[str, Any], caption: str) -> str:
 
 
 def _coloured(shares: Mapping[str, Any]) -> dict[str, tuple[list[float], str]]:
-    """Assign colours to the largest shares; the sum of all others is grey."""
+    """Return the largest contributions with their colours."""
     rows = share_rows(dict(shares))
     shown = largest_rows(rows).items()
     return {

@@ -1,4 +1,4 @@
-"""Show robots and results, interactively in a notebook and otherwise by matplotlib."""
+"""Interactive scenes and figures of robots and results."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -34,37 +34,37 @@ def show(
     assumption: str = "frozen",
     interactive: bool | None = None,
 ) -> "Picture | Figure":
-    """Show a robot, or a result at one point.
+    """Draw a robot or a result at one point.
 
     Args:
-        thing: object to draw.  A robot is drawn in its home pose, and a posture without
-            errors.  An assembly is drawn nominal and forced, with exaggerated
-            displacements; with finite motions, large displacements are drawn to scale.
-            For a platform stiffness, the compliance shares of its parts are drawn.
-        errors: ``"translation"`` or ``"rotation"``, to add the possible platform errors
-            within the clearances to an assembly.
-        assumption: assumption of problem (27) for these errors: ``"frozen"``,
+        thing: object to draw. A robot is drawn in its home pose. A posture is drawn
+            without errors. An assembly is drawn in its nominal and its forced state
+            with magnified displacements. A platform stiffness is drawn as the
+            compliance contribution of each body.
+        errors: for an assembly: ``"translation"`` or ``"rotation"`` to add the set of
+            platform errors due to clearances.
+        assumption: assumption of problem (27) for this set: ``"frozen"``,
             ``"free"`` or ``"budget"``.
-        interactive: True for an interactive scene, which is displayed by a notebook or
-            opened in a browser (attribute ``html``); False for a matplotlib figure;
-            None for a scene in a notebook and a figure elsewhere.
+        interactive: True for an interactive 3D scene, whose attribute ``html`` is a
+            page for the browser; False for a matplotlib figure; None for a scene in
+            notebooks and a figure elsewhere.
 
     Returns:
-        The scene; or the figure, which is not displayed: ``savefig`` writes it, and
-        ``pyplot.show()`` opens a window.
+        The scene or the figure. In a script, use ``savefig`` or ``pyplot.show()`` to
+        see a figure.
 
     Raises:
-        BadInput: the object is of an unsupported type or has many points; errors are
-            requested for an object other than an assembly, or for one with a free
-            motion; or matplotlib is not installed.
-        SolverFailed: the cone solver failed for the errors.
+        BadInput: the object has another type or many points; ``errors`` is given for
+            another object than an assembly or for an assembly with a free motion; or
+            matplotlib is not installed.
+        SolverFailed: the cone solver failed for ``errors``.
     """
     if interactive is None:
         interactive = in_notebook()
     if errors is not None and not isinstance(thing, Assembly):
         kind = type(thing).__name__
         raise BadInput(
-            f"show: found errors of a {kind}, expected errors of an Assembly"
+            f"show: found errors for a {kind}, expected errors for an Assembly"
         )
     if isinstance(thing, PlatformStiffness):
         return _shares(thing, interactive)
@@ -78,7 +78,7 @@ def show(
 def _scene(
     thing: object, errors: str | None, assumption: str
 ) -> tuple[dict[str, Any], str, str]:
-    """Return the data of a scene, the robot's name, and a caption."""
+    """Return the data of a scene, the name of the robot, and a caption."""
     if isinstance(thing, Robot):
         return nominal_scene(home_posture(thing)), thing.name, _NOMINAL
     if isinstance(thing, ExactAssembly):
@@ -101,7 +101,7 @@ def _scene(
 
 
 def _shares(stiffness: PlatformStiffness, interactive: bool) -> "Picture | Figure":
-    """Show the compliance shares of the parts."""
+    """Draw the contributions to the platform compliance."""
     shares = stiffness_values(stiffness, stiffness.point)["shares"]
     name = stiffness.posture.robot.name
     if interactive:

@@ -1,4 +1,4 @@
-"""Results of stepwise assembly, as plain values and as text."""
+"""Results of a stepwise assembly as a dictionary and as text."""
 
 from collections.abc import Callable
 from typing import Any
@@ -29,15 +29,14 @@ from forcefit.results.display import listing, numbers
 from forcefit.results.text import lines_of
 
 QUANTILES = (0.05, 0.5, 0.95, 0.99)
-_BLOCK = 2_000  # number of machines computed together
+_BLOCK = 2_000  # number of robots that are computed together
 _IN_CLEARANCES = (
-    "clearances without force stay as close as possible to their position after the "
-    "previous step; a clamp or a load determines them"
+    "joints without contact forces stay as close as possible to their position after "
+    "the previous step; a clamp or a load determines their position"
 )
 _ADJUSTED = (
-    "an adjustment to a frame, or under loads, is the better of two local minima: the "
-    "one near the present error, and the one near the change that is best while all "
-    "closed clearances stay at their bounds"
+    "an adjustment to a frame or under loads is the better of two local minima: one "
+    "near the present error, and one near the optimum for constant contacts"
 )
 
 
@@ -46,19 +45,19 @@ def steps_of(
     best: BestOrder | None = None, objective: str = "",
     states: list[State] | None = None,
 ) -> dict[str, Any]:  # fmt: skip
-    """Compute the results of ``assembly steps`` as a dictionary of plain values.
+    """Compute the results of ``assembly steps`` as a dictionary.
 
     Args:
         plan: assembly steps, which have been checked.
         posture: pose at which the robot is assembled.
         gravity: (3,) [m/s^2] gravity in base axes.
-        best: result of a search for the best order, whose plan is carried out.
+        best: result of a search for the best order, which replaces ``plan``.
         objective: objective of that search.
         states: list to which the state after each step is appended.
 
     Returns:
-        Results of all steps that can be carried out.  ``status`` is ``"ok"``, or the
-        reason why the next step cannot be carried out.
+        Results of all steps until the first failure. ``status`` is ``"ok"`` or the type
+        of failure.
     """
     plan = plan if best is None else best.plan
     machine = machine_at(posture)
@@ -97,7 +96,7 @@ def steps_of(
 
 
 def kind_of(step: Step) -> str:
-    """Return the kind of a step, as named in a plan file."""
+    """Return the kind of a step as in a plan file."""
     kinds = {Join: "join", Preload: "preload", Release: "release", Adjust: "adjust"}
     if isinstance(step, Fix):
         return step.kind
@@ -105,7 +104,7 @@ def kind_of(step: Step) -> str:
 
 
 def _values(result: StepResult) -> dict[str, Any]:
-    """Convert the result of one step of one machine to plain values."""
+    """Convert the result of a step for one robot to a dictionary."""
     values: dict[str, Any] = {
         "name": result.step.name, "kind": kind_of(result.step),
         "energy": float(result.energy[0]), "work": float(result.work[0]),
@@ -130,7 +129,7 @@ def _values(result: StepResult) -> dict[str, Any]:
 
 
 def _totals(results: dict[str, Any]) -> dict[str, Any]:
-    """Return the energy balance over all steps and totals for the assembled machine."""
+    """Return the energy balance and the results for the assembled robot."""
     steps = results["steps"]
     work = sum(step["work"] + step["load_work"] for step in steps)
     lost = sum(step["lost"] for step in steps)
@@ -147,25 +146,26 @@ def drawn_steps(
     plan: Plan, posture: Posture, errors: NDArray, gravity: ArrayLike | None = None,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> dict[str, Any]:  # fmt: skip
-    """Compute quantiles of the step results over many machines.
+    """Compute quantiles of the results over many robots with random errors.
 
-    After Ctrl-C, the quantiles refer to the machines that have been assembled so far.
+    After Ctrl-C, the quantiles are those of the robots assembled so far.
 
     Args:
         plan: assembly steps, which have been checked.
         posture: pose at which the robot of n frames is assembled.
-        errors: (k, n, 6) [rad, m] geometric errors of the machines.
+        errors: (k, n, 6) [rad, m] geometric errors of the robots.
         gravity: (3,) [m/s^2] gravity in base axes.
-        progress: function called with the number of finished and of all machines.
+        progress: function called with the number of finished robots and the number of
+            all robots.
 
     Returns:
-        ``draws``, the number of machines, and ``quantiles`` by step and quantity.
+        ``draws``, the number of robots, and ``quantiles`` by step and quantity.
 
     Raises:
-        CannotAssemble: the constraints on rigid parts of a machine contradict each
+        CannotAssemble: the constraints on rigid bodies of a robot contradict each
             other.
         FreeMotion: a load acts along a motion that nothing resists.
-        KeyboardInterrupt: Ctrl-C was pressed before any machine was assembled.
+        KeyboardInterrupt: Ctrl-C was pressed before a robot was assembled.
         SolverFailed: the solver for the clearances did not converge.
     """
     machine = machine_at(posture)
@@ -190,7 +190,7 @@ def drawn_steps(
 def _drawn_block(
     machine: Machine, plan: Plan, errors: NDArray, gravity: ArrayLike | None
 ) -> dict[tuple[str, str], NDArray]:
-    """Compute the results of a block of machines by step and quantity."""
+    """Compute the results of a block of robots by step and quantity."""
     state, values = first_state(machine, plan, errors, gravity), {}
     for step in plan.steps:
         state, result = carry_out(machine, state, step)
@@ -205,7 +205,7 @@ def _drawn_block(
 
 
 def steps_text(results: dict[str, Any]) -> str:
-    """Format the steps as text, one line each.
+    """Format the results of :func:`steps_of` as text.
 
     Args:
         results: result of :func:`steps_of`.
@@ -221,7 +221,7 @@ def steps_text(results: dict[str, Any]) -> str:
         given = "none" if order["given"] is None else f"{order['given']:.4g} {unit}"
         lines.append(
             f"minimum {order['objective']} {order['value']:.4g} {unit} (at least "
-            f"{order['bound']:.4g} in any order, {given} as given)"
+            f"{order['bound']:.4g} in any order, {given} in the given order)"
         )
     head = ("step", "energy [J]", "work [J]", "lost [J]", "force [N]", "moment [N m]")
     table = [head]
@@ -249,7 +249,7 @@ def steps_text(results: dict[str, Any]) -> str:
 
 
 def _extra(step: dict[str, Any]) -> str:
-    """Format results that occur only for some kinds of steps."""
+    """Format the results that exist only for some kinds of steps."""
     words = {
         "reading": "reads", "adjustment": "changed by", "left_open": "left open",
         "spring_back": "springs back",

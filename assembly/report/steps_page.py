@@ -1,4 +1,4 @@
-"""HTML page on stepwise assembly, with the machine after each step."""
+"""HTML page on a stepwise assembly."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -18,10 +18,10 @@ from forcefit.page.page import Page, Provenance, Tile, page, paragraph, section
 from forcefit.page.tables import Cell, Column, Value, rotation_and_translation, table
 
 _ASSUMED = (
-    "Small screws at one pose: every step is linear, contacts of clearances excepted.",
-    "No friction, no yield; each step ends at rest.",
-    "Clearances without force stay as close as possible to their position after the "
-    "previous step.",
+    "Small screws at one pose: apart from contacts, every step is linear.",
+    "There is no friction and no plastic deformation.",
+    "Joints without contact forces stay as close as possible to their position "
+    "after the previous step.",
 )
 _UNITS = {"force": "N", "energy": "J", "error": "m"}
 
@@ -30,16 +30,16 @@ def steps_page(
     results: Mapping[str, Any], machine: Machine, states: Sequence[State],
     provenance: Provenance,
 ) -> str:  # fmt: skip
-    """Create the HTML page of a plan that was carried out.
+    """Return the HTML page for the results of a stepwise assembly.
 
     Args:
         results: result of :func:`forcefit.assembly.report.steps.steps_of`.
-        machine: robot at the pose at which it is assembled.
+        machine: the robot at its posture.
         states: states after each step.
-        provenance: the command and its input files.
+        provenance: command line and input files.
 
     Returns:
-        Self-contained HTML.
+        HTML that includes all data and scripts.
     """
     done = results["status"] == "ok"
     return page(
@@ -63,7 +63,7 @@ def steps_page(
 
 
 def _verdict(results: Mapping[str, Any]) -> str:
-    """State whether all steps are carried out, followed by the first remark."""
+    """Return a sentence on the success of the steps, and the first remark."""
     verdict = results.get("reason", "")
     if results["status"] == "ok":
         verdict = f"All {len(results['steps'])} steps are carried out"
@@ -74,21 +74,21 @@ def _verdict(results: Mapping[str, Any]) -> str:
 
 
 def _good(results: Mapping[str, Any]) -> bool | None:
-    """Return True if all steps succeed, or None if one exceeds its force limit."""
+    """Return whether all steps succeed; None if a force limit is exceeded."""
     if results["status"] != "ok":
         return False
     return None if any(step.get("exceeded") for step in results["steps"]) else True
 
 
 def _tiles(results: Mapping[str, Any]) -> list[Tile]:
-    """Return tiles with the main numbers of the assembled machine."""
+    """Return tiles on the assembled robot."""
     screw = np.asarray(results["platform_screw"])
     peak, energy = results["peak_force"], results["energy"]
     turn, shift = np.linalg.norm(screw[:3]), np.linalg.norm(screw[3:])
     lost: list[str | Value] = [Value(results["lost"], "J"), " lost at releases."]
     return [
         Tile("Largest closing force", [Value(peak, "N")], ["of a step that joins."]),
-        Tile("Energy that stays", [Value(energy, "J")], lost),
+        Tile("Elastic energy", [Value(energy, "J")], lost),
         Tile(
             "Platform error",
             rotation_and_translation(float(turn), float(shift)),
@@ -98,7 +98,7 @@ def _tiles(results: Mapping[str, Any]) -> list[Tile]:
 
 
 def _table(results: Mapping[str, Any]) -> str:
-    """Return the table with one row per step as HTML."""
+    """Return a table with one row per step as HTML."""
     head: list[str | Column] = [
         "step", Column("energy", "J"), Column("work", "J"), Column("lost", "J"),
         Column("closing force", "N"), Column("closing moment", "N m"),
@@ -115,7 +115,7 @@ def _table(results: Mapping[str, Any]) -> str:
 
 
 def _charts(results: Mapping[str, Any]) -> str:
-    """Return charts of the energy and the closing force over the steps as HTML."""
+    """Return charts of energy and closing force over the steps as HTML."""
     numbers = list(range(1, len(results["steps"]) + 1))
     charts = []
     for key, words, unit, colour in (
@@ -131,28 +131,27 @@ def _charts(results: Mapping[str, Any]) -> str:
 
 
 def _scene(machine: Machine, states: Sequence[State]) -> str:
-    """Return an HTML scene in which the reader selects the state after a step."""
+    """Return a 3D scene in which the user can select a step, as HTML."""
     assemblies = [assembly_of(machine, state) for state in states]
     closing = np.repeat(machine.posture.transforms[None], len(states), axis=0)
     for transforms, assembly in zip(closing, assemblies, strict=True):
         transforms[:, :3, 3] += displaced_bodies(assembly).end_screws[:, 3:]
     caption = (
-        "Bodies after the steps, exaggerated; the control for the closing shows the "
-        "state after each step. Parts that are not yet joined lie where they are free."
+        "Robot with magnified displacements; the control selects the step. Bodies that "
+        "are not yet joined are free of forces."
     )
     return robot_scene(assemblies[-1], closing, None, caption)
 
 
 def assembly_of(machine: Machine, state: State) -> Assembly:
-    """Convert the state of a partly assembled machine to an assembly.
+    """Convert the state of a partly assembled robot to an assembly.
 
     Args:
-        machine: columns and closure rows of the robot.
-        state: state of one machine.
+        machine: the robot at its posture.
+        state: the state of one robot.
 
     Returns:
-        The assembly, in which closures that are not yet joined are open and carry no
-        wrench.
+        The assembly. Loops that are not yet joined are open.
     """
     posture, found = machine.posture, state.found
     robot = posture.robot.with_errors(state.errors[0].reshape(-1, 6))
@@ -175,7 +174,7 @@ def assembly_of(machine: Machine, state: State) -> Assembly:
 
 
 def _order(results: Mapping[str, Any]) -> str:
-    """Return a paragraph on the search for the best order; empty without a search."""
+    """Return the section on the search for the best order, if any."""
     order = results.get("order")
     if order is None:
         return ""
@@ -185,13 +184,13 @@ def _order(results: Mapping[str, Any]) -> str:
         "; in any order at least ", Value(order["bound"], unit),
     ]  # fmt: skip
     if order["given"] is not None:
-        parts += ["; as given ", Value(order["given"], unit)]
+        parts += ["; in the given order ", Value(order["given"], unit)]
     names = ", ".join(order["steps"])
     return section("The best order", paragraph(*parts, "."), paragraph(f"{names}."))
 
 
 def _machines(results: Mapping[str, Any]) -> str:
-    """Return the table of quantiles over many machines; empty without them."""
+    """Return the section on quantiles over many robots, if any."""
     if "quantiles" not in results:
         return ""
     head: list[str | Column] = [

@@ -1,4 +1,4 @@
-"""Natural frequencies as plain values and as text."""
+"""Natural frequencies as a dictionary and as text."""
 
 from typing import Any, Literal
 
@@ -19,11 +19,11 @@ from forcefit.results.display import listing, numbers
 from forcefit.results.text import lines_of
 
 _NOMINAL = (
-    "these are the frequencies of the nominal robot, without load and gravity; "
-    "--state exact includes them and the stiffness due to them"
+    "these are the frequencies of the nominal robot without load and gravity; "
+    "--state exact includes load, gravity and their effect on the stiffness"
 )
 _COARSE = 0.01  # [-] estimated error of a frequency above which a remark is printed
-_NAMED = 3  # largest number of parts that are named for a mode
+_NAMED = 3  # number of links and joints that are named for each mode
 
 
 def vibration_of(
@@ -33,22 +33,22 @@ def vibration_of(
     gravity: ArrayLike | None = None,
     state: Literal["nominal", "exact"] = "nominal",
 ) -> dict[str, Any]:
-    """Compute the results of ``assembly frequencies`` as a dictionary of plain values.
+    """Compute the results of ``assembly frequencies`` as a dictionary.
 
     Args:
         posture: posture of the robot.
         count: largest number of modes.
         load: (6,) [N m, N] load on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] gravity in base axes.
-        state: ``"exact"`` for the equilibrium with errors, clearances and loads,
-            ``"nominal"`` without them.
+        state: ``"nominal"``, or ``"exact"`` for the equilibrium with errors, clearances
+            and loads.
 
     Returns:
-        Frequencies and modes; ``status`` is ``"ok"``, ``"free motion"``,
-        ``"unstable"``, or the reason why there is no equilibrium.
+        Frequencies and modes. ``status`` is ``"ok"``, ``"free motion"``, ``"unstable"``
+        or the type of failure.
 
     Raises:
-        BadInput: no moving part has a mass.
+        BadInput: no body that can move has a mass.
     """
     results: dict[str, Any] = {
         "robot": posture.robot.name, "status": "ok", "pose": posture.pose(),
@@ -86,7 +86,7 @@ def vibration_of(
 
 
 def vibration_text(results: dict[str, Any]) -> str:
-    """Format the frequencies as text, with the parts that deform most."""
+    """Format the frequencies and the largest deformations as text."""
     about = lines_of(results, "pose status reason state idle_motions")
     lines = [listing(results["robot"], about, results["remarks"])]
     for mode in results.get("modes", ()):
@@ -109,7 +109,7 @@ def _coarse(errors: NDArray) -> str:
 
 
 def _free(mode: dict[str, Any]) -> str:
-    """Describe a free motion by a platform screw of 1 rad or 1 m."""
+    """Format a free motion of the platform as text."""
     screw = np.asarray(mode["platform_screw"])
     turn, shift = np.linalg.norm(screw[:3]), np.linalg.norm(screw[3:])
     unit = screw / (turn if turn > 1e-6 * shift else shift or 1.0)

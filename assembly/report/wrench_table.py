@@ -1,4 +1,4 @@
-"""Format tables of wrenches as text with aligned columns, in SI units."""
+"""Text tables of wrenches."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -13,7 +13,7 @@ from forcefit.stiffness.screws import WRENCH
 _HEAD = tuple(f"{name} [{'N m' if name[0] == 'M' else 'N'}]" for name in WRENCH)
 
 
-# suffixes of frame names that belong to a joint, after the name of the joint
+# last words in the frame names of joints that consist of several frames
 _OF_JOINT = {
     "first", "second", "third", "turn", "slide", "slide_x", "slide_y"
 }  # fmt: skip
@@ -24,20 +24,18 @@ def wrench_lines(
 ) -> list[str]:
     """Format the wrenches through all frames and closures as lines of text.
 
-    A joint that consists of several frames has a single row, at the point of the joint
-    in its axes, because the wrench through its other frames is the same.  For the same
-    reason, the last frame of a joint that closes a loop has no row, and the joint is
-    named in the table of closures.  Contacts of a clearance have no row, because
-    together they carry the wrench through their joint.
+    A joint that consists of several frames has a single row, because the wrench through
+    all these frames is the same. A joint that closes a loop is listed with the
+    closures. The contacts of a joint have no rows.
 
     Args:
         frames: wrenches by frame, from
             :func:`forcefit.assembly.report.results.solution_of`.
         closures: wrenches of the closures from the same function.
-        joints: for each joint of several frames, the frame with its point and axes.
+        joints: main frame of each joint that consists of several frames.
 
     Returns:
-        Lines with one table for each kind of wrench.
+        Lines of text with one table for each kind of wrench.
     """
     names = {*frames, *joints}
     closing = closing_names([c["frames"] for c in closures], names)
@@ -66,7 +64,7 @@ def wrench_lines(
 
 
 def _shown(name: str, joints: Mapping[str, str]) -> str:
-    """Return the name of a frame in the table; empty for frames without a row."""
+    """Return the name of a frame in a table; empty if the frame has no row."""
     for joint, main in joints.items():
         if name == main:
             return joint

@@ -1,4 +1,4 @@
-"""Text of objects in a console or notebook: a few lines with units, at any size."""
+"""Display of objects in a console or notebook."""
 
 import re
 from dataclasses import replace
@@ -37,7 +37,7 @@ def link():
 
 @pytest.fixture(scope="module")
 def shown(answer, link):
-    """One object of every kind that is returned to users."""
+    """Return one object of each type that users obtain."""
     posture = answer.posture
     return [
         posture.robot, posture.robot.frames[0], posture, answer, solve_exact(posture),
@@ -50,7 +50,7 @@ def shown(answer, link):
 
 
 def test_text_of_every_result_object_is_a_few_lines_long(shown):
-    """The default text has 11 000 characters for a robot and 52 000 for an assembly."""
+    """The default text of a dataclass would have thousands of characters."""
     for thing in shown:
         text = repr(thing)
         assert len(text) <= CHARACTERS, type(thing)
@@ -75,8 +75,8 @@ def test_assembly_summary_equals_the_lines_of_the_command(answer):
     assert answer.summary() == repr(answer)
 
 
-def test_text_of_many_points_states_their_number_and_the_largest_value():
-    """The ratios of gap to clearance are 1, 2 and 4."""
+def test_text_of_many_points_contains_number_and_maximum():
+    """The margins of the points are 1, 2 and 4."""
     play = Clearance(axial=1e-5, radial=1e-5)
     at = home_posture(coaxial_beams(np.zeros(6), clearance=play))
     errors = np.zeros((3, 6, 6))
@@ -91,7 +91,7 @@ def test_text_of_many_points_states_their_number_and_the_largest_value():
     assert f"translation  {1e3 * low:.6g} to {1e3 * high:.6g} mm" in repr(bounds)
 
 
-def test_text_states_the_largest_force_and_error_of_the_arrays(answer):
+def test_text_contains_the_largest_force_and_error(answer):
     robot = answer.posture.robot
     forces = np.linalg.norm(answer.wrenches[:, 3:], axis=1)
     where = robot.frames[forces.argmax()].name

@@ -1,4 +1,4 @@
-"""Set of possible errors: closed forms, inner points and outer bounds."""
+"""Sets of possible platform errors."""
 
 from itertools import product
 
@@ -23,7 +23,9 @@ def reach_of(*plays):
 
 
 def test_error_body_of_a_joint_clearance_is_a_cylinder():
-    """Disc r = 3e-5 and interval h = 1e-5: heights r sin(polar) + h cos(polar)."""
+    """For a disc of radius r and an interval of half width h, the support function is r
+    sin(polar) + h cos(polar).
+    """
     body = error_body(reach_of(Clearance(radial=3e-5, axial=1e-5)), "translation", 150)
     flat = np.hypot(body.directions[:, 0], body.directions[:, 1])
     expected = 3e-5 * flat + 1e-5 * np.abs(body.directions[:, 2])
@@ -61,8 +63,10 @@ def test_free_platform_or_unknown_part_has_no_error_body():
         error_body(reach_of(Clearance(radial=1e-5)), "both")
 
 
-def test_reported_deviation_of_an_error_body_is_the_largest_height_beyond_its_points():
-    """Four corners of a cube are given; the others are 2 / sqrt 3 beyond them."""
+def test_slack_of_an_error_body_equals_hand_calculation():
+    """The points are four corners of a cube. The other corners are beyond them by 2 /
+    sqrt(3).
+    """
     corners = np.array(list(product([-1.0, 1.0], repeat=3)))
     even = corners[corners.prod(axis=1) > 0]
     directions = np.vstack([corners / np.sqrt(3), np.eye(3)])
@@ -74,7 +78,7 @@ def test_reported_deviation_of_an_error_body_is_the_largest_height_beyond_its_po
 
 
 @pytest.mark.slow
-def test_picture_shows_the_error_body_and_states_its_size():
+def test_plot_contains_the_error_body_and_its_size():
     answer = solve_assembly(place_robot(irsbot2(), pose={"tx": 0.1, "tz": -0.5}))
     plotter = plot_assembly(answer, errors="translation", assumption="frozen")
     said = plotter.actors["body"].GetText(0)

@@ -1,4 +1,4 @@
-"""At singular postures, solve, error and study report no first-order result."""
+"""Status of results at singular postures."""
 
 import math
 import re
@@ -19,8 +19,8 @@ from tests.three_upu_for_tests import HEIGHT, three_upu
 SAID = "singular posture: the first-order analysis is inconclusive; finite motions: 0 J"
 
 
-def test_solution_at_a_singular_posture_has_the_energy_of_finite_motions():
-    """To first order, the intersecting modes would take up errors without force."""
+def test_energy_at_a_singular_posture_is_that_of_the_exact_solution():
+    """The first-order solution would have zero energy."""
     results = solution_of(home_posture(three_upu(seed=1)))
     assert results["energy"] > 1e-4
     assert results["status"] == "singular"
@@ -28,30 +28,30 @@ def test_solution_at_a_singular_posture_has_the_energy_of_finite_motions():
     assert SAID in solution_text(results)
 
 
-def test_perfect_robot_at_a_singular_posture_is_solved_with_zero_energy():
+def test_robot_without_errors_has_zero_energy_at_a_singular_posture():
     results = solution_of(home_posture(three_upu()))
     assert results["status"] == "ok"
     assert results["energy"] == 0.0
 
 
-def test_solution_away_from_the_singular_posture_is_of_first_order():
+def test_regular_posture_has_a_first_order_solution():
     aside = {"tx": 0.05, "ty": 0.02, "tz": HEIGHT}
     assert solution_of(place_robot(three_upu(seed=1), pose=aside))["status"] == "ok"
 
 
 @pytest.mark.parametrize("seed", [None, 1])
-def test_pose_error_at_a_singular_posture_has_no_first_order_bound(seed):
+def test_singular_posture_has_no_pose_error_bounds(seed):
     results = pose_error_of(home_posture(three_upu(seed)), ["frozen"])
     assert results["status"] == "singular"
     assert results["error"] is None
     assert SAID in pose_error_text(results)
 
 
-def test_energy_that_exists_only_for_finite_motions_is_reported_as_singular():
-    """Near its dead centre, a rod that is too short is in tension: k (e - s)^2 / 2.
+def test_rod_near_its_dead_centre_has_status_singular():
+    """Near its dead centre, a rod with the length error e has the energy k (e - s)^2 /
+    2.
 
-    The slack is s = crank + rod - distance; to first order, the crank rotates through
-    the dead centre without a force.
+    Here, s = crank + rod - distance. The first-order solution has zero energy.
     """
     angle, short = 0.02, 2e-4
     rod = BeamLink({"radius": 0.01}, 70e9, 0.33)
@@ -67,8 +67,8 @@ def test_energy_that_exists_only_for_finite_motions_is_reported_as_singular():
     assert float(said[1]) == pytest.approx(expected, rel=1e-3)
 
 
-def test_large_first_order_motion_is_reported_as_singular():
-    """0.1 mm from the singular axis, the first-order rotation is several radians."""
+def test_large_first_order_motion_has_status_singular():
+    """At 0.1 mm from the singular axis, the first-order rotation is several radians."""
     aside = {"tx": 1e-4, "ty": 0.0, "tz": HEIGHT}
     results = solution_of(place_robot(three_upu(seed=1), pose=aside))
     assert np.abs(results["platform_screw"][:3]).max() > 0.3

@@ -1,4 +1,4 @@
-"""Mobility as text and as JSON, for mechanisms whose motions are known."""
+"""Mobility of mechanisms with known motions."""
 
 import json
 from pathlib import Path
@@ -41,14 +41,14 @@ WORDS = {
 
 
 @pytest.mark.parametrize("name", WORDS)
-def test_mobility_in_words_equals_the_literature(name):
+def test_mobility_text_agrees_with_the_literature(name):
     found = mobility_of(home_posture(MECHANISMS[name][0]()))
     assert found["words"] == WORDS[name]
     assert found["counts_certain"]
 
 
-def test_coupler_of_a_four_bar_rotates_about_the_crossing_of_its_arms():
-    """Crank (0, 0) to (0.1, 0.3), rocker (0.8, 0) to (0.7, 0.5): 3x = -5 (x - 0.8)."""
+def test_coupler_of_a_four_bar_rotates_about_its_instant_centre():
+    """The lines along crank and rocker intersect at y = 3x = -5 (x - 0.8)."""
     (turn,) = mobility_of(home_posture(MECHANISMS["four_bar"][0]()))["motions"]
     assert turn["kind"] == "turn"
     np.testing.assert_allclose(turn["point"], [0.5, 1.5, 0.0], atol=1e-9)
@@ -69,7 +69,7 @@ def test_redundant_drive_is_reported():
 
 
 def test_seoul_robot_has_fewer_degrees_of_freedom_near_its_singular_home():
-    """5 at home and 3 near it (Zlatanov, Bonev, Gosselin 2002)."""
+    """It has 5 in the home pose and 3 nearby (Zlatanov, Bonev, Gosselin 2002)."""
     found = mobility_of(home_posture(three_upu(X, 0.24)))
     assert (found["freedoms"], found["singular"]) == (5, True)
     assert (found["finite_freedoms"], found["near"]["freedoms"]) == (3, 3)
@@ -77,7 +77,9 @@ def test_seoul_robot_has_fewer_degrees_of_freedom_near_its_singular_home():
 
 
 def test_three_coplanar_parallel_axes_allow_only_infinitesimal_motions():
-    """Collinear bars of 0.3 and 0.2 m between hinges 0.5 m apart are rigid."""
+    """Collinear bars of 0.3 and 0.2 m between hinges at a distance of 0.5 m cannot
+    move.
+    """
     robot = mechanism(
         "one", [0.1, 0, 0],
         joint("revolute", "base", "one", [0, 0, 0], driven=True),
@@ -91,7 +93,7 @@ def test_three_coplanar_parallel_axes_allow_only_infinitesimal_motions():
 
 
 @pytest.mark.parametrize("name", ["agile_eye", "tsai", "sarrus", "6-SPS", "bennett"])
-def test_regular_home_is_not_singular(name):
+def test_regular_home_pose_is_not_reported_as_singular(name):
     found = mobility_of(home_posture(MECHANISMS[name][0]()))
     assert not found["singular"]
     assert found["finite_freedoms"] == found["freedoms"]
@@ -99,7 +101,7 @@ def test_regular_home_is_not_singular(name):
 
 
 def test_ball_joint_rotated_by_a_right_angle_has_three_degrees_of_freedom():
-    """It rotates about every axis, whichever three axes model it."""
+    """The result does not depend on the axes that model the ball joint."""
     robot = mechanism("ball", [0, 0, 0.2], joint("spherical", "base", "ball", [0] * 3))
     home = home_posture(robot)
     for axis in (X, Y, Z):
@@ -112,10 +114,10 @@ def test_ball_joint_rotated_by_a_right_angle_has_three_degrees_of_freedom():
 
 
 SCREWS = {
-    # a turn about z through (1, 2, 0): at the origin v = p x w
+    # Rotation about z through (1, 2, 0), with the velocity v = p x w at the origin.
     "turn": ([[0, 0, 1, 2, -1, 0]], [("turn", [1, 2, 0], None)]),
     "screw": ([[0, 0, 1, 2, -1, 0.3]], [("screw", [1, 2, 0], 0.3 * 2 * np.pi)]),
-    # cylindrical: the screw is a rotation, except for the translation along its axis
+    # The screw is the sum of a rotation and a translation along its axis.
     "cylindrical": (
         [[0, 0, 1, 2, -1, 0.3], [0, 0, 0, 0, 0, 1]],
         [("translation", None, None), ("turn", [1, 2, 0], None)],
@@ -124,8 +126,9 @@ SCREWS = {
         [[0, 0, 1, 2, -1, 0], [0, 0, 0, 1, 0, 0], [0, 0, 0, 1, 1, 0]],
         [("translation", None, None)] * 2 + [("turn", None, None)],
     ),
-    # turns about two lines along x and y, at z = 0 and z = 0.4: the principal screws
-    # of this cylindroid are along the bisectors, half way, of pitches -+ 0.4/2
+    # Rotations about lines along x at z = 0 and along y at z = 0.4. The principal
+    # screws of this cylindroid are along the bisectors at z = 0.2, with pitches -0.2
+    # and 0.2.
     "two skew turns": (
         [[1, 0, 0, 0, 0, 0], [0, 1, 0, -0.4, 0, 0]],
         [("screw", [0, 0, 0.2], -0.4 * np.pi), ("screw", [0, 0, 0.2], 0.4 * np.pi)],
@@ -147,7 +150,7 @@ def test_pure_motions_of_screw_systems_equal_hand_calculation(name, size):
 
 
 def rounded(digits):
-    """Function that creates joints whose points and axes are rounded to some digits."""
+    """Return a function that creates joints with rounded points and axes."""
 
     def make(name, kind, first, second, at, axis, across, axis2, driven):
         axis, axis2 = (unit(np.round(v, digits)) for v in (axis, axis2))
@@ -162,7 +165,7 @@ def rounded(digits):
 def test_mobility_of_files_rounded_to_6_digits_equals_that_of_exact_files(
     name, monkeypatch
 ):
-    """For Bennett's linkage, the mobility would be 0 if all singular values counted."""
+    """Rounding makes all singular values of Bennett's linkage nonzero."""
     make, expected = MECHANISMS[name]
     monkeypatch.setattr(mechanisms, "DrawnJoint", rounded(6))
     found = mobility_of(home_posture(make()))
@@ -174,8 +177,8 @@ def test_mobility_of_files_rounded_to_6_digits_equals_that_of_exact_files(
     assert found["finite_freedoms"] == found["freedoms"] - 2 * (name == "snu")
 
 
-def test_mobility_is_reported_as_uncertain_if_the_singular_values_have_no_gap():
-    """Axes tilted by 1e-4 and 2e-5 rad cause singular values of these sizes."""
+def test_mobility_without_a_singular_value_gap_is_uncertain():
+    """The axes are tilted by 1e-4 and 2e-5 rad."""
     robot = mechanism(
         "one", [0.1, 0.2, 0],
         joint("revolute", "base", "one", [0, 0, 0], driven=True),
@@ -190,7 +193,7 @@ def test_mobility_is_reported_as_uncertain_if_the_singular_values_have_no_gap():
     assert "differ only by" in mobility_lines(found)["counts not certain"]
 
 
-def test_show_writes_mobility_and_axes_when_no_picture_is_requested(run):
+def test_show_command_writes_mobility_without_a_picture(run):
     status, out, err = run("assembly", "show", DRAWN / "three_upu.toml", "--json", "-")
     assert (status, err) == (0, "")
     found = json.loads(out)

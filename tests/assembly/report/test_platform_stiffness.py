@@ -1,4 +1,4 @@
-"""Results of assembly stiffness: keys, sums, statuses, and share charts."""
+"""Results of ``assembly stiffness`` and charts of contributions."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ from forcefit.page.charts import GREY
 from tests.pages_for_tests import parse
 
 
-def test_free_motion_is_reported_and_other_entries_stay_finite():
+def test_stiffness_with_a_free_motion_has_finite_other_entries():
     slide = Frame("slide", joint="prismatic", link=MatrixLink(np.eye(6)))
     tip = Frame("tip", "slide")
     results = stiffness_of(home_posture(Robot("slider", "tip", (slide, tip))))
@@ -37,13 +37,13 @@ def test_load_without_resistance_is_reported_as_no_equilibrium():
 
 
 def shares(parts):
-    """Equal shares of the links in the compliance along every axis."""
+    """Return equal contributions of links along every axis."""
     one = {f"part{k}": 1.0 / parts for k in range(parts)}
     return {name: {"links": dict(one), "joints": {}} for name in DIRECTIONS}
 
 
 @pytest.mark.parametrize(("parts", "others"), [(5, 0), (20, 8)])
-def test_sum_of_other_parts_is_shown_in_grey_and_shares_add_up_to_one(parts, others):
+def test_contributions_in_the_chart_sum_to_one(parts, others):
     (spec,) = parse(share_chart(shares(parts), "")).figures
     heights = {t["name"]: t["y"] for t in spec["traces"]}
     np.testing.assert_allclose(sum(np.array(v) for v in heights.values()), 1.0)
@@ -52,7 +52,7 @@ def test_sum_of_other_parts_is_shown_in_grey_and_shares_add_up_to_one(parts, oth
     assert all(one["y"] == pytest.approx([others / parts] * 6) for one in grey)
 
 
-def test_plot_shows_the_sum_of_the_other_parts_in_grey():
+def test_plot_shows_the_sum_of_small_contributions_in_grey():
     figure = plot_shares({"robot": "r", "shares": shares(20)})
     bars = {c.get_label(): c.patches[0] for c in figure.axes[0].containers}
     spread = {name: np.ptp(p.get_facecolor()[:3]) for name, p in bars.items()}

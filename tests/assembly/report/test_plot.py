@@ -1,4 +1,4 @@
-"""Plots of a robot: displaced bodies meet, and gaps close in an animation."""
+"""3D plots and animations of robots."""
 
 import numpy as np
 import pytest
@@ -18,8 +18,8 @@ def _assembly():
     return solve_assembly(place_robot(robot, pose={"tx": 0.1, "tz": -0.5}))
 
 
-def test_displaced_chains_meet_at_every_closure():
-    """Displacements along the tree are independent of the closure matrix (16)-(20)."""
+def test_both_frames_of_a_closure_have_the_same_displacement():
+    """The displacements are computed without the closure equations (16)-(20)."""
     answer = _assembly()
     robot = answer.posture.robot
     screws = displaced_bodies(answer).end_screws
@@ -31,8 +31,8 @@ def test_displaced_chains_meet_at_every_closure():
 
 
 @pytest.mark.parametrize("name", ["delta", "hexapod", "orthoglide", "arm6"])
-def test_picture_fits_the_whole_robot_into_the_window(name):
-    """The robot does not touch the edges and fills more than half of the window."""
+def test_robot_fits_into_the_plot_window(name):
+    """The robot fills more than half of the window, without its edges."""
     answer = solve_assembly(home_posture(load_robot(name)))
     plotter = robot_plotter(answer, exaggeration=1)
     plotter.remove_actor("caption")
@@ -88,7 +88,7 @@ def test_picture_that_cannot_be_drawn_is_rejected_before_solving(
 def test_error_body_of_a_loaded_robot_uses_the_frozen_assumption(
     run, tmp_path, monkeypatch
 ):
-    """The assumption budget, the default without a load, requires an unloaded robot."""
+    """The default assumption ``budget`` is not valid under a load."""
     import forcefit.assembly.report.error_body
 
     readings = []
@@ -129,7 +129,7 @@ LONGER = 1e-3  # [m]
 
 @pytest.fixture(scope="module")
 def robot():
-    """The paper's robot with one link that is too long."""
+    """Return IRSBot-2 with a length error of one link."""
     perfect = load_robot("irsbot2")
     errors = np.zeros((len(perfect.frames), 6))
     errors[perfect.index("leg1.link_a"), 3] = LONGER
@@ -137,8 +137,8 @@ def robot():
 
 
 @pytest.mark.parametrize("closing", [0.0, 0.3, 1.0])
-def test_gaps_shrink_from_the_length_error_to_zero(robot, closing):
-    """A pure translation has the same length at the end of its chain."""
+def test_gaps_decrease_from_the_length_error_to_zero(robot, closing):
+    """The largest gap is equal to the length error."""
     assembly = solve_assembly(place_robot(robot, pose=POSE))
     sizes = np.linalg.norm(closing_gaps(assembly, closing), axis=1)
     open_closures = sizes > 1e-12
@@ -148,7 +148,7 @@ def test_gaps_shrink_from_the_length_error_to_zero(robot, closing):
 
 
 @pytest.mark.slow
-def test_animation_begins_open_and_ends_with_the_assembly(robot, run, tmp_path):
+def test_animation_ends_with_the_assembled_robot(robot, run, tmp_path):
     write_robot(robot, tmp_path / "long.toml")
     words = ["assembly", "show", tmp_path / "long.toml", "--pose", "tx=0.1,tz=-0.5",
              "--exaggeration", "50"]  # fmt: skip
@@ -165,7 +165,7 @@ def test_animation_begins_open_and_ends_with_the_assembly(robot, run, tmp_path):
     assert len(pictures) == 25
     assert max(durations[1:-1]) < min(durations[0], durations[-1])
     pink = [np.minimum(p[..., 0], p[..., 2]) - p[..., 1] > 100 for p in pictures]
-    assert pink[0].sum() > 50  # the line across the gap
+    assert pink[0].sum() > 50  # line in the gap
     assert pink[-1].sum() == 0
     moved = [np.abs(p - pictures[-1]).max(axis=2) > 60 for p in pictures]
     shares = [m.mean() for m in moved]

@@ -1,4 +1,4 @@
-"""Results printed by solve: certified errors, remarks, and wrench tables."""
+"""Results of ``assembly solve`` as text."""
 
 from pathlib import Path
 
@@ -13,8 +13,8 @@ from forcefit.assembly.report.results import solution_of, solution_text
 from forcefit.assembly.robots import load_robot
 
 
-def test_largest_error_of_solve_equals_the_certified_pose_error():
-    """The tip of a bush with radius r and half length a moves by hypot(r, a)."""
+def test_largest_error_of_a_bush_equals_closed_form():
+    """For radial clearance r and axial clearance a, the error is hypot(r, a)."""
     r, a = 3e-5, 4e-5
     frames = (
         Frame("bush", clearance=Clearance(radial=r, axial=a)), Frame("tip", "bush")
@@ -53,7 +53,7 @@ joint = [{ name = "rail", type = "prismatic", between = ["base", "tool"], at = [
 
 
 def test_table_of_wrenches_has_one_row_for_a_joint_with_contacts(write_file):
-    """50 N along -y, 0.15 m above a vertical rail: 7.5 N m about the joint's x."""
+    """A force of 50 N at a distance of 0.15 m causes a moment of 7.5 N m."""
     posture = home_posture(read_robot(write_file(ARM)))
     text = solution_text(solution_of(posture, [0, 0, 0, 0, -50, 0]))
     table = text.split("wrenches through the bodies")[1].splitlines()[2:]
@@ -76,8 +76,8 @@ joint = [
 
 
 @pytest.mark.parametrize("kind", ["prismatic", "cylindrical"])
-def test_tables_of_wrenches_name_the_drawn_joint_that_closes_a_loop(write_file, kind):
-    """The public keys keep the names of the frames."""
+def test_wrench_tables_contain_the_joint_that_closes_a_loop(write_file, kind):
+    """The JSON keys contain the frame names."""
     results = solution_of(
         home_posture(read_robot(write_file(GANTRY.replace("TYPE", kind)))),
         [0, 0, 0, 0, -50, 0],

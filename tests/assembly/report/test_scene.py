@@ -1,4 +1,4 @@
-"""Scene of a robot, whose displacements and forces equal those of the assembly."""
+"""Data of 3D scenes: displacements, forces and platform errors."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ FORCE, LENGTH = 50.0, 0.4
 
 
 def cantilever(force=FORCE):
-    """A round bar along x, clamped at its base and loaded at its tip."""
+    """Return a round bar along x with a load at its tip."""
     beam = BeamLink({"radius": 0.01}, 2e11, 0.3, theory="euler")
     tip = Frame("tip <b>", translation=[LENGTH, 0, 0], link=beam)
     return solve_assembly(home_posture(Robot("bar", "tip <b>", (tip,))),
@@ -26,8 +26,8 @@ def scene_of(assembly, closing=None, body=None):
     return spec
 
 
-def test_bent_bar_follows_the_elastic_line_of_a_cantilever():
-    """w(s) = F s^2 (3 L - s) / (6 E I), so the middle has 5/16 of the tip value."""
+def test_displacement_of_a_bar_equals_that_of_a_cantilever():
+    """The deflection is w(s) = F s^2 (3 L - s) / (6 E I)."""
     (bar,) = scene_of(cantilever())["bodies"]
     moved, nominal = np.array(bar["moved"]), np.array(bar["nominal"])
     s = nominal[:, 0]
@@ -56,7 +56,7 @@ def test_scene_contains_the_closing_motion_and_the_error_body():
     np.testing.assert_allclose(np.array(spec["closing"])[:, 0, 2], [1e-3, 0, 0])
     np.testing.assert_array_equal(spec["body"]["points"], points)
     np.testing.assert_allclose(spec["body"]["origin"], [LENGTH, 0, 0])
-    assert "0.1732 mm" in spec["body"]["text"]  # sqrt(3) of 0.1 mm
+    assert "0.1732 mm" in spec["body"]["text"]  # sqrt(3) times 0.1 mm
 
 
 def test_unloaded_robot_is_drawn_without_displacement():

@@ -1,4 +1,4 @@
-"""Pictures of robots and results in a notebook and elsewhere."""
+"""Figures and interactive scenes of robots and results."""
 
 import html
 import re
@@ -20,7 +20,7 @@ from tests.forcefit.page.test_browser import browser, wait
 from tests.pages_for_tests import parse
 
 FORCE, LENGTH = 50.0, 0.4
-STIFFNESS = 2e11 * np.pi * 0.01**4 / 4  # [N m^2] of a round bar of 10 mm radius
+STIFFNESS = 2e11 * np.pi * 0.01**4 / 4  # [N m^2] bending stiffness
 
 
 @pytest.fixture(autouse=True)
@@ -30,7 +30,7 @@ def _windows_are_closed():
 
 
 def cantilever():
-    """A round bar along x, held at its base."""
+    """Return a round bar along x, clamped at its base."""
     beam = BeamLink({"radius": 0.01}, 2e11, 0.3, theory="euler")
     tip = Frame("tip <b>", translation=[LENGTH, 0, 0], link=beam)
     return home_posture(Robot("bar <i>", "tip <b>", (tip,)))
@@ -41,7 +41,7 @@ def bent():
 
 
 def lines_of(figure):
-    """Points of the line with a given legend entry, in the unit of the axes."""
+    """Return the points of a line with a given legend entry."""
     (axes,) = figure.axes
     return {
         line.get_label(): np.column_stack(line.get_data_3d())
@@ -50,8 +50,8 @@ def lines_of(figure):
     }
 
 
-def test_figure_of_a_loaded_bar_follows_the_elastic_line():
-    """w(L) = F L^3 / (3 E I), exaggerated by the factor in the title, in mm."""
+def test_figure_of_a_loaded_bar_has_the_deflection_of_a_cantilever():
+    """The deflection F L^3 / (3 E I) is magnified by the factor in the title."""
     figure = bent().plot(interactive=False)
     lines = lines_of(figure)
     title = figure.axes[0].get_title()
@@ -64,10 +64,10 @@ def test_figure_of_a_loaded_bar_follows_the_elastic_line():
     assert figure.axes[0].get_zlabel() == "z [mm]"
 
 
-def test_picture_of_a_finite_rotation_has_its_true_size():
-    """A rigid bar on a torsion spring: k a = F L cos a; the tip is at L (cos a, sin a).
+def test_large_rotation_is_drawn_to_scale():
+    """For a rigid bar on a torsion spring, the angle a satisfies k a = F L cos a.
 
-    With k = 10 N m/rad and F L = 20 N m the angle is 1.0298665 rad.
+    For k = 10 N m/rad and F L = 20 N m, the angle is 1.0298665 rad.
     """
     hinge = Frame("hinge", joint_stiffness=[np.inf, np.inf, 10.0, *[np.inf] * 3])
     tip = Frame("tip", "hinge", translation=[LENGTH, 0, 0])
@@ -85,7 +85,7 @@ def test_picture_of_a_finite_rotation_has_its_true_size():
 
 
 def test_figure_of_a_robot_shows_its_home_pose():
-    """A crank of 0.3 m at 90 degrees, with a collinear bar of 0.2 m."""
+    """The robot has a crank of 0.3 m at 90 degrees and a collinear bar of 0.2 m."""
     drive = Frame("drive", joint="revolute", actuated=True, position=np.pi / 2)
     elbow = Frame("elbow", "drive", translation=[0.3, 0, 0])
     tip = Frame("tip", "elbow", translation=[0.2, 0, 0])
@@ -96,8 +96,10 @@ def test_figure_of_a_robot_shows_its_home_pose():
     np.testing.assert_allclose(ends.reshape(4, 3), expected, atol=1e-10)
 
 
-def test_bar_chart_shows_springs_in_series_in_proportion_to_their_compliance():
-    """For k and 2 k in series, the first has two thirds of the compliance."""
+def test_bar_chart_is_proportional_to_compliance():
+    """Of two springs k and 2 k in series, the first contributes two thirds of the
+    compliance.
+    """
     soft = MatrixLink(np.diag([1e3, 1e3, 1e3, 1e5, 1e5, 1e5]))
     stiff = MatrixLink(np.diag([2e3, 2e3, 2e3, 2e5, 2e5, 2e5]))
     frames = (Frame("a", link=soft), Frame("b", "a", link=stiff))
@@ -111,24 +113,26 @@ def test_bar_chart_shows_springs_in_series_in_proportion_to_their_compliance():
 
 
 def slack():
-    """A bar whose tip can move by 0.2 mm within the clearance of its joint."""
+    """Return a bar with a joint clearance of 0.2 mm."""
     joint = Frame("joint", clearance=ff.Clearance(radial=2e-4, axial=1e-4))
     tip = Frame("tip", "joint", translation=[LENGTH, 0, 0])
     return solve_assembly(home_posture(Robot("slack", "tip", (joint, tip))))
 
 
-def test_errors_within_a_clearance_are_shown_in_both_kinds_of_picture():
+def test_platform_errors_are_drawn_in_figures_and_scenes():
     figure = slack().plot(errors="translation", assumption="frozen")
     assert any(isinstance(c, Poly3DCollection) for c in figure.axes[0].collections)
     page = slack().plot(errors="translation", interactive=True)
     (spec,) = parse(page.html).figures
     largest = np.linalg.norm(spec["body"]["points"], axis=1).max()
-    # a cylinder's edge: radius and half height
+    # The largest error is at the edge of a cylinder.
     assert largest == pytest.approx(np.hypot(2e-4, 1e-4), rel=0.03)
 
 
 def test_interactive_scene_is_shown_in_a_notebook(monkeypatch):
-    """``get_ipython()`` has a kernel in a notebook, and none in a console."""
+    """The result of ``get_ipython()`` has the attribute ``kernel`` only in a
+    notebook.
+    """
     shell = SimpleNamespace()
     module = SimpleNamespace(get_ipython=lambda: shell)
     monkeypatch.setitem(sys.modules, "IPython", module)
@@ -145,13 +149,13 @@ def test_interactive_scene_is_shown_in_a_notebook(monkeypatch):
 
 
 class Formatter(dict):
-    """Formatting functions by type, as stored by IPython."""
+    """Stores formatting functions by type, as IPython does."""
 
     for_type = dict.__setitem__
 
 
 def maps(monkeypatch, known):
-    """PNG of a sweep's figure in a notebook; ``known`` formats figures already."""
+    """Return the PNG of a sweep figure in a notebook."""
     formats = {"image/png": Formatter(), "image/svg+xml": Formatter(known)}
     shell = SimpleNamespace(
         kernel=object(), display_formatter=SimpleNamespace(formatters=formats)
@@ -162,7 +166,7 @@ def maps(monkeypatch, known):
     return ff.show(data.squeeze(), quantities=["energy"]), formats["image/png"]
 
 
-def test_notebook_shows_the_maps_of_a_sweep_as_the_result_of_a_cell(monkeypatch):
+def test_notebook_displays_maps_of_a_sweep(monkeypatch):
     pytest.importorskip("xarray")
     figure, functions = maps(monkeypatch, {})
     assert functions[type(figure)](figure).startswith(b"\x89PNG")
@@ -179,11 +183,11 @@ def test_figure_format_chosen_by_the_user_is_not_changed(monkeypatch):
     [
         (lambda: 3.0, {}, "show: found float, expected a Robot"),
         (lambda: solve_assembly([cantilever()] * 2), {}, "Assembly of many points"),
-        (cantilever, {"errors": "translation"}, "errors of a Posture"),
+        (cantilever, {"errors": "translation"}, "errors for a Posture"),
         (slack, {"errors": "translaton"}, "translation"),
     ],
 )
-def test_object_that_cannot_be_shown_is_named(thing, options, message):
+def test_show_rejects_invalid_objects(thing, options, message):
     with pytest.raises(BadInput, match=message):
         ff.show(thing(), **options)
 

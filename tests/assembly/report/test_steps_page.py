@@ -1,4 +1,4 @@
-"""HTML page of stepwise assembly."""
+"""HTML page on a stepwise assembly."""
 
 from dataclasses import replace
 
@@ -18,7 +18,7 @@ from tests.pages_for_tests import parse
 
 
 def pinned(posture):
-    """All closures joined in sequence, and the intermediate states."""
+    """Return the results of joining all loops in sequence, and the states."""
     plan = Plan(tuple(Join(" - ".join(c), c) for c in posture.robot.closures))
     states = []
     results = steps_of(plan, posture, states=states)
@@ -34,7 +34,7 @@ def four_bar(rng):
     return home_posture(replace(robot, frames=frames).with_errors(errors))
 
 
-def test_assembled_machine_matches_the_pose_and_wrenches_of_solve_assembly(four_bar):
+def test_stepwise_assembly_agrees_with_solve_assembly(four_bar):
     results, machine, states = pinned(four_bar)
     found, expected = assembly_of(machine, states[-1]), solve_assembly(four_bar)
     assert results["energy"] == pytest.approx(expected.energy, rel=1e-9)
@@ -59,10 +59,8 @@ def test_report_page_contains_the_numbers_of_every_step(four_bar):
     assert np.shape(scene["closing"])[0] == len(results["steps"])
 
 
-def test_interrupted_sampling_returns_quantiles_of_the_machines_computed_so_far(
-    four_bar, rng
-):
-    """The second block of machines is interrupted."""
+def test_interrupted_computation_returns_quantiles(four_bar, rng):
+    """The computation is interrupted in the second block of robots."""
     plan = Plan(tuple(Join(" - ".join(c), c) for c in four_bar.robot.closures))
     errors = rng.normal(size=(20_001, *four_bar.robot.errors.shape)) * 1e-5
 

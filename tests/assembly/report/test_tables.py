@@ -1,4 +1,4 @@
-"""Results as data sets and tables: numbers, labels and units."""
+"""Results as data sets and tables."""
 
 import numpy as np
 import pytest
@@ -40,7 +40,7 @@ def test_assembly_data_set_has_labelled_frames_and_equal_numbers(answer):
 
 
 def test_screws_of_the_data_set_sum_to_the_platform_screw(answer):
-    """Eq. (8) with labelled errors, clearances, links and joints."""
+    """The sum is eq. (8) of the paper."""
     data = answer.to_xarray()
     total = (
         data.geometric_error + data.clearance_screw + data.link_screw + data.joint_screw
@@ -49,7 +49,7 @@ def test_screws_of_the_data_set_sum_to_the_platform_screw(answer):
     np.testing.assert_allclose(screw, data.platform_screw, rtol=1e-12)
 
 
-def test_exact_data_set_has_the_names_of_the_linear_one(answer):
+def test_exact_data_set_has_the_variables_of_the_linear_data_set(answer):
     linear, exact = answer.to_xarray(), solve_exact(answer.posture).to_xarray()
     assert {*linear.variables} == {*exact.variables}
     assert float(exact.energy) < float(linear.energy)
@@ -92,14 +92,14 @@ def test_table_of_many_points_has_a_row_for_each_point(batches):
 
 
 def small_stiffness():
-    """A round bar of length L = 0.4 m along x, clamped at its base."""
+    """Return a round bar of length L = 0.4 m along x, clamped at its base."""
     beam = ff.BeamLink({"radius": 0.01}, 2e11, 0.3, 7850.0, theory="euler")
     tip = ff.Frame("tip", translation=[0.4, 0, 0], link=beam)
     return ff.place_robot(ff.Robot("bar", "tip", (tip,)))
 
 
 def test_stiffness_data_set_of_a_bar_equals_handbook_values():
-    """E A / L along the axis and 3 E I / L^3 across it; one part has all compliance."""
+    """The stiffness is E A / L along the axis and 3 E I / L^3 across it."""
     tangent = ff.platform_stiffness(small_stiffness())
     data, table = tangent.to_xarray(), tangent.to_pandas()
     axial, lateral = 2e11 * np.pi * 1e-4 / 0.4, 3 * 2e11 * np.pi * 1e-8 / 4 / 0.4**3
@@ -144,7 +144,7 @@ def test_modes_table_has_a_row_for_each_mode_and_shares_that_sum_to_one():
     assert table.attrs["units"]["frequency"] == "Hz"
 
 
-def test_curve_table_of_a_bar_obeys_hookes_law():
+def test_load_deflection_table_of_a_bar_obeys_hookes_law():
     lateral = 3 * 2e11 * np.pi * 1e-8 / 4 / 0.4**3
     table = ff.deflection_curve(small_stiffness(), 5, [-10, 0, 20]).to_pandas()
     np.testing.assert_array_equal(table["load", ""], [-10, 0, 20])
