@@ -192,7 +192,7 @@ class CalloutSources:
         return full if self.fixed is None else full + self.fixed
 
     def of_numbers(self, slopes: NDArray) -> NDArray:
-        """Convert derivatives with respect to delta l, (..., n, 6), to (..., m)."""
+        """Return derivatives with respect to the random numbers, (..., m)."""
         return np.einsum("...ni,nim->...m", slopes, self.maps)
 
     @cached_property

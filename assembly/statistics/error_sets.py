@@ -18,7 +18,7 @@ from forcefit.assembly.statistics.callout_sources import CalloutSources, Sources
 from forcefit.assembly.statistics.linear_response import LinearResponse
 from forcefit.inputs.table import BadInput
 
-_ROUNDING = 1e-9  # relative singular value below which a row is round-off
+_ROUNDING = 1e-9  # relative threshold for singular values
 
 
 @dataclass(frozen=True, eq=False)

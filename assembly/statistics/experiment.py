@@ -31,7 +31,7 @@ from forcefit.inputs.renamed import renamed_fields, warn_renamed
 from forcefit.inputs.table import BadInput
 from forcefit.results.display import html_table, short_repr
 
-# required difference of both bounds, relative to the limit on a pose error
+# required difference between upper and lower bound, relative to a limit
 _PRECISION = 1e-3
 
 
@@ -160,8 +160,8 @@ class Experiment:
                 raise BadInput(f"limit {name}: the margins are not computed")
             if name == "stress" and not self.links:
                 raise BadInput(
-                    f"limit stress: no link of {self.posture.robot.name} has a shape "
-                    "from which its stress follows"
+                    f"limit stress: found no link of {self.posture.robot.name} with a "
+                    "known shape, so no stress is computed"
                 )
 
     def solve(self, first: int, count: int) -> NDArray:

@@ -161,7 +161,7 @@ def importance_dataset(
 def _parts(variances: NDArray) -> NDArray:
     """Compute the parts, (2, d), from the variances of the screw, (6, d)."""
     lost = np.isnan(variances).all(axis=0)
-    # A component that does not vary has an index of NaN.
+    # The index of a constant component is NaN.
     variances = np.maximum(np.nan_to_num(variances), 0.0)
     part = np.sqrt(np.stack([variances[:3].sum(axis=0), variances[3:].sum(axis=0)]))
     part[:, lost] = np.nan

@@ -19,7 +19,7 @@ from forcefit.assembly.linear.zone import Compliant, Zone, zone_margin
 from forcefit.assembly.solvers.cones import cone_starts
 from forcefit.assembly.statistics.linear_response import checked_errors
 
-# [rad, reference lengths] infeasible error component above which the loops cannot close
+# [rad, reference lengths] largest infeasible error component that is treated as zero
 _CLEARLY_INFEASIBLE = 1e-10
 
 

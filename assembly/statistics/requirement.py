@@ -22,7 +22,7 @@ from forcefit.results.display import html_table, short_repr
 
 CONVEX = ("margin", "margin_free", "energy")
 COSTS = ("reciprocal", "logarithm")
-# required difference of both bounds, relative to the limit on a pose error
+# required difference between upper and lower bound, relative to a limit
 _PRECISION = 1e-4
 _BATCH = 512  # number of draws per stored result
 # random number streams; repeated verifications use the streams after FRESH

@@ -23,9 +23,9 @@ from forcefit.assembly.linear.energy import Assembly
 from forcefit.assembly.solvers.conic import GAP_WITHOUT_CLEARANCE
 from forcefit.assembly.statistics.linear_response import LinearResponse
 
-# fraction of the largest clearance force below which a force is zero
+# forces below this fraction of the largest clearance force are treated as zero
 _ACTIVE = 1e-7
-# relative singular value below which clearances are undetermined
+# singular values below this fraction of the largest one are treated as zero
 _RANK = 1e-10
 
 

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     import xarray
 
 QUANTILES = (0.05, 0.5, 0.95, 0.99)
-_ROUNDING = 1e-18  # fraction of the largest value below which a value is zero
+_ROUNDING = 1e-18  # values below this fraction of the maximum are treated as zero
 _MARGINS = {"margin": "rigid", "margin_free": "rigid_compliant_free"}
 WORDS = {
     "forced": "assembles, by force if necessary",

@@ -25,7 +25,7 @@ from forcefit.assembly.statistics.linear_response import LinearResponse
 from forcefit.assembly.statistics.quantities import POSE_ERRORS
 
 ASSUMPTION = "frozen"
-PRECISION = (1e-6, 1e-6)  # [rad, m] default difference of upper and lower bounds
+PRECISION = (1e-6, 1e-6)  # [rad, m] default precision of the bounds
 # [rad or m] precision of the support function for derivatives
 _SUPPORT_PRECISION = 1e-12
 

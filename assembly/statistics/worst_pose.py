@@ -50,7 +50,7 @@ from forcefit.inputs.table import BadInput, describe, nearest
 from forcefit.results.display import Figures, html_table, short_repr
 from forcefit.results.text import in_unit
 
-# accepted difference of the bounds, relative to the support function
+# precision of the bounds, relative to the largest support function
 _TOLERANCE = 3e-4
 _STARTS = 24  # number of random starting corners of the tolerance box
 _CLIMBS = 12  # largest number of steps of the search

@@ -77,7 +77,7 @@ def check_axes(sizes: Mapping[str, int]) -> None:
         )
     if not long:
         raise BadInput(
-            "figure: found a single point; expected one or two axes of several points"
+            "figure: found a single point; expected one or two axes with several points"
         )
 
 

@@ -167,7 +167,7 @@ def load_design(name: str | Path) -> Design:
     from forcefit.assembly.exchange.robot_files import is_robot_file, load_robot
     from forcefit.assembly.robots import BUILT_IN
 
-    # An invalid file raises an error here.
+    # This raises an error if the file is invalid.
     robot = load_robot(name, links=False)
     if str(name) in BUILT_IN or not is_robot_file(Path(name)):
         return design_of(robot)

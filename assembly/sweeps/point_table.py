@@ -17,8 +17,7 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-# variables whose axes are the axes of the table rows: of sweeps and draws, of
-# tolerances
+# variables with the axes of the rows, for sweeps and draws or for tolerances
 _OF_POINTS = ("status", "tolerance")
 
 

@@ -156,8 +156,8 @@ def _check(options: SweepOptions, machine: Robot) -> None:
             raise BadInput(f"--yield-strength: found {strength:g}, expected > 0 Pa")
         if not stressed_names(machine):
             raise BadInput(
-                f"--yield-strength: no link of {machine.name} has a shape from which "
-                "its stress follows"
+                f"--yield-strength: found no link of {machine.name} with a known "
+                "shape, so no stress is computed"
             )
     if options.state is not None and options.state not in STATES:
         hint = nearest(options.state, list(STATES))

@@ -14,7 +14,7 @@ from forcefit.assembly.sweeps.quantities import (
 )
 from forcefit.inputs.errors import BadInput, nearest, quoted
 
-DEFAULT = "default"  # selects the variables that are stored without names
+DEFAULT = "default"  # selects the variables that are stored by default
 MODES = 6  # default number of natural frequencies
 _STIFFNESS = (
     "compliance", "stiffness", "eigen_stiffness", "stiffness_condition", "share",
@@ -32,7 +32,7 @@ def select(question: Question, texts: Sequence[str]) -> Question:
     Args:
         question: quantities according to all other options.
         texts: names of variables, separated by commas. ``"default"`` selects the
-            variables that are stored without names.
+            variables that are stored if no names are given.
 
     Returns:
         The selected quantities.

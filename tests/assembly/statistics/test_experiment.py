@@ -109,8 +109,8 @@ def test_limits_on_quantities_that_are_not_computed_are_rejected():
     for limit, message in (
         ("margin", "limit margin: the margins are not computed"),
         ("margin_free", "limit margin_free: the margins are not computed"),
-        ("stress", "limit stress: no link of irsbot2 has a shape from which its stress "
-                   "follows"),
+        ("stress", "limit stress: found no link of irsbot2 with a known shape, so no "
+                   "stress is computed"),
     ):  # fmt: skip
         with pytest.raises(BadInput) as error:
             bare.check_limits(["energy", limit])

@@ -175,7 +175,7 @@ def test_allocated_tolerances_have_the_required_yield(several):
             for p in postures
         )
         fits, largest = fits + (share <= 1 + 1e-6), max(largest, share)
-    # a yield of 0.9: fewer than 124 of 150 happen once in 300 such tests
+    # For a yield of 0.9, fewer than 124 of 150 have a probability of 1/300.
     assert fits >= 124
     assert largest > 1.0
 
@@ -212,7 +212,7 @@ def test_allocation_in_the_worst_clearance_model_has_the_required_yield(paper):
         erring = replace(posture, robot=posture.robot.with_errors(draw))
         worst = bound_pose_error(solve_assembly(erring), "frozen").translation_error
         fits, largest = fits + (worst[0] <= limit), max(largest, worst[0])
-    # a yield of 0.9: fewer than 124 of 150 happen once in 300 such tests
+    # For a yield of 0.9, fewer than 124 of 150 have a probability of 1/300.
     assert fits >= 124
     assert largest > 0.8 * limit
 

@@ -86,7 +86,7 @@ def test_sweep_command_lists_and_selects_quantities(run, tmp_path):
     assert (status, err) == (0, "")
 
 
-def test_figure_without_usual_quantities_is_rejected(tmp_path):
+def test_figure_without_default_quantities_is_rejected(tmp_path):
     data = ff.sweep("five_bar", grid=GRID, quantities=["condition"])
     with pytest.raises(ff.BadInput, match="found none of the default quantities"):
         ff.show(data)
