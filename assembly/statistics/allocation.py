@@ -58,7 +58,8 @@ def allocate(
         postures: postures of one robot in its workspace.
         plan: costs and limits.
         fresh: number of independent draws for the verification; 0 to skip it.
-        progress: callback that receives the name of a step, its progress and its total.
+        progress: function called with the name of a computation, the number of
+            finished steps and the number of all steps.
         replay: stored results of an interrupted computation.
 
     Returns:

@@ -27,7 +27,7 @@ def draws_at_bounds(prepared: LinearResponse, draws: Assembly) -> NDArray:
     """Return in which draws a passive joint may reach its motion limit.
 
     Args:
-        prepared: the prepared posture.
+        prepared: linear response of the posture.
         draws: solutions for k draws at the posture.
 
     Returns:
@@ -67,7 +67,7 @@ def bounded_position(
     """Compute the platform screw of one draw in the contact or the uniform model.
 
     Args:
-        draws: draws of one posture.
+        draws: solutions for random draws at one posture.
         i: index of the draw.
         wrench: (6,) [N m, N] wrench that moves the platform into contact; None to
             sample the platform screw uniformly from its feasible set.

@@ -263,7 +263,7 @@ def sources_of(
     """Collect a robot's random errors from its callouts, fits and independent errors.
 
     Args:
-        robot: any robot.
+        robot: the robot.
         independent: independent errors, or the path of a TOML file that defines them
             (see docs/statistics.md), or None. A result of this function is returned
             unchanged.
@@ -273,8 +273,8 @@ def sources_of(
         The error sources. Without callouts, these are the independent errors.
 
     Raises:
-        BadInput: the file violates a rule, or the robot has no callouts and no
-            independent errors are given.
+        BadInput: the file is invalid, or there are neither callouts nor independent
+            errors.
     """
     if isinstance(independent, Path | str):
         independent = read_sources(independent, robot, fixed)

@@ -126,7 +126,7 @@ def quantile_cpk(
             valid for any distribution.
 
     Returns:
-        Value, lower and upper bound; 0 if the draws are too few to bound a quantile.
+        Value, lower and upper bound; a bound is 0 if there are too few draws.
     """
     each = (1 + level) / 2
     middle, tail = (quantile(values, share, each) for share in (0.5, _TAIL))
@@ -155,7 +155,7 @@ def quantile_cp(
         level: confidence level as for :func:`quantile_cpk`.
 
     Returns:
-        Value, lower and upper bound; 0 if the draws are too few to bound a quantile.
+        Value, lower and upper bound; a bound is 0 if there are too few draws.
     """
     each = (1 + level) / 2
     low, tail = (quantile(values, share, each) for share in (1 - _TAIL, _TAIL))

@@ -52,7 +52,7 @@ def position_clearances(
     """Return platform screws for joint positions from a clearance model.
 
     Args:
-        prepared: the prepared posture.
+        prepared: linear response of the posture.
         draws: minimum-energy solutions for k draws.
         clearance: one of :data:`CLEARANCE_MODELS` except the worst model.
         generators: random number generator for each draw; not used for "least".

@@ -38,7 +38,8 @@ def cut_planes(
 
     Args:
         requirement: requirement at all postures.
-        progress: called with the name of a step, its progress and its total.
+        progress: function called with the name of a computation, the number of
+            finished steps and the number of all steps.
 
     Returns:
         Tolerances, (G,) [rad or m], a lower bound on their cost, and the number of

@@ -79,7 +79,7 @@ def error_sets(prepared: LinearResponse, sources: Sources) -> ErrorSets:
 
     Args:
         prepared: a posture without loads.
-        sources: sources of the errors.
+        sources: the errors, with their distributions.
 
     Returns:
         The zones.

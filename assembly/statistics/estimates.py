@@ -103,8 +103,7 @@ def most_probable(
 ) -> dict[str, float]:
     """Estimate the mode of a sample's density, with a bootstrap interval.
 
-    The density is estimated on 1024 bins with a Gaussian kernel, whose width is
-    Silverman's.
+    The density is estimated on 1024 bins by a Gaussian kernel with Silverman's width.
 
     Args:
         values: (k,) a sample.

@@ -114,7 +114,7 @@ class Experiment:
 
     @cached_property
     def zones(self) -> dict[str, PostureMargins]:
-        """Prepared problems (21) by the name of the margin."""
+        """Problem (21) of the posture for each margin, by name."""
         if not self.margins:
             return {}
         return {k: prepare_margins(self.posture, r) for k, r in MARGINS.items()}
@@ -170,7 +170,7 @@ class Experiment:
         return self.evaluate(values, range(first, first + count))
 
     def evaluate(self, values: NDArray, draws: Sequence[int] | NDArray) -> NDArray:
-        """Evaluate the records for given values of the error sources.
+        """Return the records for given errors.
 
         Args:
             values: (k, m) [rad or m] errors.

@@ -177,10 +177,10 @@ def linear_importance(
 
 
 def source_groups(sources: Sources, by: str) -> list[tuple[str, NDArray]]:
-    """Group the error sources by source, by frame or by kind of error.
+    """Group errors by source, by frame or by kind.
 
     Args:
-        sources: sources of a robot.
+        sources: the errors of a robot.
         by: ``"source"``, ``"frame"`` or ``"kind"``. Errors of the same kind have the
             same component and the same frame name in different legs.
 

@@ -55,7 +55,7 @@ def platform_slopes(prepared: LinearResponse, draws: Assembly) -> NDArray:
     """Differentiate the platform screw with respect to every geometric error.
 
     Args:
-        prepared: the prepared posture.
+        prepared: linear response of the posture.
         draws: solutions for k draws, with clearances relative to their bounds.
 
     Returns:

@@ -83,7 +83,7 @@ def importance_rows(
     that is not due to the errors.
 
     Args:
-        experiment: distributions and quantities.
+        experiment: error distributions and quantities.
         design: design of the draws.
         first: first row of the design.
         count: number of rows.
@@ -112,7 +112,7 @@ def importance_dataset(
     """Compute the importance of errors for the results of an experiment.
 
     Args:
-        experiment: distributions and quantities.
+        experiment: error distributions and quantities.
         design: design of the draws.
         rows: records of all rows of the design.
         level: confidence level of the intervals.

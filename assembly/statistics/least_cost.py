@@ -50,7 +50,8 @@ def least_cost(
         requirement: requirement at all postures.
         samples: samples of the errors that must satisfy the limits.
         t: (G,) [rad or m] initial tolerances, up to a common factor.
-        progress: called with the name of a step, its progress and its total.
+        progress: function called with the name of a computation, the number of
+            finished steps and the number of all steps.
 
     Returns:
         Tolerances, (G,) [rad or m], and the samples including all worst corners found.

@@ -151,7 +151,7 @@ def tornado_figure(data: "xarray.Dataset", most: int = 15) -> "Figure":
         indices are dark.
 
     Raises:
-        ValueError: the data set contains no importance.
+        ValueError: the data set does not contain the importance of errors.
     """
     from matplotlib.figure import Figure
 

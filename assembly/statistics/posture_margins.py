@@ -93,7 +93,7 @@ def prepare_margins(posture: Posture, compliant: Compliant = "free") -> PostureM
             :mod:`forcefit.assembly.linear.zone`.
 
     Returns:
-        The prepared posture.
+        The prepared problem.
 
     Raises:
         ValueError: ``compliant`` has another value.

@@ -132,7 +132,7 @@ class Requirement:
 
     @cached_property
     def prepared(self) -> dict[str, list]:
-        """Prepared postures for each limited quantity."""
+        """Problem (21) or linear response of each posture, by quantity."""
         return {
             key: [prepare_margins(p, MARGINS[key]) for p in self.postures]
             if key in MARGINS else [e.energies for e in self.experiments]
@@ -141,7 +141,7 @@ class Requirement:
 
     @cached_property
     def convex(self) -> dict[str, list]:
-        """Prepared postures for each limited quantity that is convex in the errors.
+        """The same as ``prepared`` for quantities that are convex in the errors.
 
         If a joint is bolted, no quantity is convex, because the clearance that the bolt
         fixes is not linear in the errors.

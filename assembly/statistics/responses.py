@@ -42,7 +42,7 @@ def respond(
     Args:
         prepared: prepared problem (21) for a margin, or linear response for another
             quantity.
-        sources: m sources of errors.
+        sources: the m errors, with their distributions.
         values: (k, m) [rad or m] errors.
         key: quantity for a linear response: energy [J], force [N], moment [N m], stress
             [Pa], rotation [rad] or translation [m].

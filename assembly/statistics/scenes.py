@@ -31,7 +31,7 @@ def drawn_robot(experiment: Experiment, data: "xarray.Dataset") -> str:
     """Show the random draw whose pose error is closest to the 95 % quantile.
 
     Args:
-        experiment: the experiment of the draws.
+        experiment: experiment that produced the draws.
         data: data set of all draws.
 
     Returns:

@@ -50,7 +50,7 @@ def solution_slopes(
     """Differentiate a function of wrenches and platform screw by geometric errors.
 
     Args:
-        prepared: the prepared posture.
+        prepared: linear response of the posture.
         draws: solutions for k draws, from :meth:`LinearResponse.solve`.
         by_wrench: (k, n, 6) derivatives of the function with respect to the wrenches.
         by_screw: (k, 6) derivatives with respect to the platform screw.

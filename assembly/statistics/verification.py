@@ -31,7 +31,8 @@ def prove_worst(
     Args:
         requirement: requirement at all postures.
         t: (G,) [rad or m] tolerances.
-        progress: called with the name of a step, its progress and its total.
+        progress: function called with the name of a computation, the number of
+            finished steps and the number of all steps.
 
     Returns:
         For each limit, the value at the worst corner found and the proven upper bound
@@ -85,7 +86,8 @@ def verify(
         requirement: requirement at all postures.
         t: (G,) [rad or m] tolerances.
         fresh: number of draws per verification.
-        progress: called with the name of a step, its progress and its total.
+        progress: function called with the name of a computation, the number of
+            finished steps and the number of all steps.
 
     Returns:
         Tolerances, (G,) [rad or m], and the results of the last verification.
@@ -118,7 +120,8 @@ def verify_yield(
         requirement: requirement at all postures.
         t: (G,) [rad or m] tolerances.
         fresh: number of draws.
-        progress: called with the name of a step, its progress and its total.
+        progress: function called with the name of a computation, the number of
+            finished steps and the number of all steps.
         stream: random number stream.
         level: confidence level of the interval.
 

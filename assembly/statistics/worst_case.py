@@ -113,7 +113,7 @@ def bound_margin(
 
     Args:
         zone: prepared problem (21) of a posture.
-        sources: m sources of errors.
+        sources: the m errors, with their distributions.
         tolerances: (m,) [rad or m] half widths of the tolerances.
 
     Returns:
@@ -137,7 +137,7 @@ def bound_energy(
 
     Args:
         prepared: linear response of a posture.
-        sources: m sources of errors.
+        sources: the m errors, with their distributions.
         tolerances: (m,) [rad or m] half widths of the tolerances.
 
     Returns:

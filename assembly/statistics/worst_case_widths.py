@@ -84,7 +84,8 @@ def allot_worst_case(
         postures: postures of one robot.
         plan: plan with callouts, limits on rotation or translation, and a yield of 1.
         fresh: number of new draws for the verification; 0 to skip it.
-        progress: called with the name of a step, its progress and its total.
+        progress: function called with the name of a computation, the number of
+            finished steps and the number of all steps.
         replay: stored results of an interrupted computation.
 
     Returns:

@@ -105,7 +105,7 @@ def worst_error_slopes(
     direction of the pose error.
 
     Args:
-        prepared: the prepared posture.
+        prepared: linear response of the posture.
         draws: solutions for k draws without loads.
         key: ``"rotation"`` or ``"translation"``.
         screws: (k, 6) [rad, m] screws of the largest error, from
