@@ -1,7 +1,7 @@
-"""State the conclusions of a study about assembly, pose error and checks.
+"""Summarise the results of a study: assembly, pose error and independent checks.
 
 The first pose error is the certified bound over all positions within the clearances.
-Every other pose error is stated with its assumption about the clearances.
+The summary names the assumption of each pose error.
 """
 
 from typing import Any
@@ -13,14 +13,18 @@ from forcefit.results.text import in_unit
 from forcefit.validation.study.drawn_tolerances import DRAWN_ERRORS
 from forcefit.validation.study.study import StudyResults
 
-# Assumption of problem (27): all motions within the clearances, without elastic
-# deformation.
+# Assumption of problem (27) under which the worst case is computed: deformations do
+# not change, and unloaded joints are anywhere within their clearances.
 WORST = "frozen"
 _CHECKED = {
     "energy": "energy", "margin": "zone margin", "margin_free": "free zone margin"
 }  # fmt: skip
+_LARGER = {
+    "free": "compliant joints also rotate about their axis",
+    "budget": "the deformation energy may be 5 % above its minimum",
+}
 _OUTCOMES = ("passed", "failed", "not decided")  # possible results of a check
-# [-] A required fraction of the clearances below this value is round-off.
+# [-] Smallest required fraction of the clearances that exceeds round-off.
 _NO_CLEARANCE = 1e-6
 
 
@@ -32,11 +36,12 @@ def worst_clearance(results: StudyResults) -> dict[str, Any]:
 
     Returns:
         Bounds ``rotation`` [rad] and ``translation`` [m] under the assumption
-        ``frozen`` of problem (27), at the study's pose (``pose``) and as maxima over
-        its ``map``. ``points`` of the ``of`` map points have bounds.  A bound is None
-        if it was not computed, and infinite if the pose is unbounded.  For a robot with
-        drawing tolerances, ``drawn`` contains the bounds over all parts within
-        tolerance and the corresponding assumption.
+        ``frozen`` of problem (27), at the study's pose (``pose``) and their maxima over
+        the map (``map``).  ``points`` is the number of map points with bounds, and
+        ``of`` the number of all map points.  A bound is None if it was not computed,
+        and infinite if the pose is unbounded.  For a robot with drawing tolerances,
+        ``drawn`` contains the bounds over all parts within tolerance and their
+        assumption.
     """
     parts = ("rotation", "translation")
     error = results.error.get(WORST)
@@ -77,22 +82,21 @@ def _worst_drawn(results: StudyResults) -> dict[str, Any] | None:
 
 
 def verdict(results: StudyResults) -> str:
-    """Join the conclusions of a study to one text; see :func:`conclusions`."""
-    return " ".join(conclusions(results))
+    """Return the conclusions of a study as text, with one conclusion per line."""
+    return "\n".join(conclusions(results))
 
 
 def conclusions(results: StudyResults) -> list[str]:
     """Return the conclusions of a study, most important first.
 
-    Pose errors begin with the certified bound within the clearances and, if there is a
-    map, its maximum over the map.  The pose error of the minimum-energy solution
-    follows.
+    Certified bounds on the pose error precede the pose error of the minimum-energy
+    solution.
 
     Args:
         results: results of :func:`forcefit.validation.study.study.run_study`.
 
     Returns:
-        A list of sentences, of which the first concerns the assembly.
+        A list of texts.  The first is a sentence about the assembly.
     """
     solution = results.solution
     if solution["status"] == BEYOND_LIMITS:
@@ -104,7 +108,7 @@ def conclusions(results: StudyResults) -> list[str]:
         why = f"{solution['status']}, {solution['reason']}"
         return [f"No solution at this pose: {why}."]
     parts = (
-        _assembly_text(results) + ".", _pose_error_text(results), _drawn_text(results),
+        *_assembly_texts(results), *_pose_error_texts(results), _drawn_text(results),
         _checks_text(results),
     )  # fmt: skip
     return list(filter(None, parts))
@@ -117,7 +121,7 @@ def by_force(results: StudyResults) -> bool:
         results: results of :func:`forcefit.validation.study.study.run_study`.
 
     Returns:
-        True or False; False also if the robot cannot be assembled at all.
+        Whether force is required.  False if the robot cannot be assembled at all.
     """
     if results.solution["status"] != "ok":
         return False
@@ -126,92 +130,117 @@ def by_force(results: StudyResults) -> bool:
     return not (needless or zone["assemblable"] or zone["assemblable_free"])
 
 
-def _assembly_text(results: StudyResults) -> str:
-    """State whether the robot assembles by its clearances or only by force."""
+def _assembly_texts(results: StudyResults) -> list[str]:
+    """Return sentences on whether the robot assembles only by force."""
     zone, assembly = results.solution["zone"], results.assembly
     assert assembly is not None
     if not by_force(results):
         if zone["margin"] is not None and zone["margin"] < _NO_CLEARANCE:
-            return "It assembles without force or clearance"
+            return ["It assembles without force or clearance."]
         text = "It assembles by its clearances alone"
-        return text + (
-            "" if zone["assemblable"] else " if its compliant joints rotate freely"
-        )
-    text = f"It assembles only by force: {assembly.energy:.4g} J"
+        return [
+            f"{text}."
+            if zone["assemblable"]
+            else f"{text} if its compliant joints rotate freely."
+        ]
+    energy = f"the minimum deformation energy is {assembly.energy:.4g} J"
+    texts = [f"It assembles only by force: {energy}."]
     if zone["margin_free"] is not None:
-        text += f", its clearances being {zone['margin_free']:.3g} times too small"
-    return text
+        factor = f"{zone['margin_free']:.3g} times as large"
+        texts.append(f"Its clearances must be {factor} to assemble it without force.")
+    return texts
 
 
-def _pose_error_text(results: StudyResults) -> str:
-    """State the platform's pose error, beginning with the certified bound."""
+def _pose_error_texts(results: StudyResults) -> list[str]:
+    """Return the platform's pose errors, beginning with the certified bound."""
     worst = worst_clearance(results)
     screw = results.solution["platform_screw"]
     turn, shift = (float(np.linalg.norm(half)) for half in (screw[:3], screw[3:]))
-    at_rest = f"in the minimum-energy solution it is {_pose_text(turn, shift)} away."
+    at_rest = (
+        f"In the minimum-energy solution, the platform is {_pose_text(turn, shift)} "
+        "from the nominal pose."
+    )
     if worst["pose"] is None:
-        return f"No bound on its pose error within the clearances was found; {at_rest}"
-    where, drawn = "For all positions within the clearances", ""
+        return ["No bound on the pose error within the clearances was found.", at_rest]
+    texts, where = [], "For all positions within the clearances"
     if "drawn" in worst:
         one = worst["drawn"]
-        drawn = "For all parts within the drawing tolerances and all positions "
-        drawn += f"within the clearances its platform is {_bounds_text(one)} "
-        drawn += f"(certified bounds; {one['assumption']}). "
+        every = "For all parts within the drawing tolerances and all positions within "
+        texts.append(
+            f"{every}the clearances, {_bounds_text(one)} These bounds are certified "
+            f"({one['assumption']})."
+        )
         at_mean = ", with fits at their mean clearance," if results.robot.fits else ""
         where = f"Without these tolerances{at_mean} and for all positions within the "
         where += "clearances"
-    others = _other_assumptions(results)
-    return (
-        f"{drawn}{where} its platform is {_bounds_text(worst)} (certified bounds of "
-        f"(27), assumption {WORST}{others}); {at_rest}"
+    texts.append(
+        f"{where}, {_bounds_text(worst)} These certified bounds assume that the "
+        f"deformations do not change within the clearances (assumption {WORST})."
     )
+    return [*texts, *_other_assumptions(results), at_rest]
 
 
 def _bounds_text(worst: dict[str, Any]) -> str:
-    """Format the bounds at the pose and their maxima over the map."""
-    text = f"{_bound_text(worst['pose'])} from the nominal pose"
-    if worst["map"] is not None:
-        over = worst["map"]
-        some = f" {over['points']} of" if over["points"] < over["of"] else ""
-        text += f", {_bound_text(over)} over{some} the {over['of']} poses of the map"
+    """Format the bounds at the pose and their maxima over the map as sentences."""
+    text = f"the platform is {_bound_text(worst['pose'])}."
+    over = worst["map"]
+    if over is None:
+        return text
+    points, of = over["points"], over["of"]
+    some = "all" if points == of else f"{points} of the"
+    if _finite(over):
+        text += f" At {some} {of} poses of the map, it is {_bound_text(over)}."
+    else:
+        text += f" At some of the {of} poses of the map, it is {_bound_text(over)}."
     return text
 
 
 def _drawn_text(results: StudyResults) -> str:
-    """State the statistics of parts within the drawing tolerances."""
+    """Return sentences on the statistics of parts within the drawing tolerances."""
     if not (results.robot.callouts or results.robot.fits):
         return ""
     found, text = results.statistics, ""
     if found is None or "worst_case" not in found:
-        text = "The certified bounds exclude the drawing tolerances"
-        text += ", with fits at their mean. " if results.robot.fits else ". "
+        text = "The certified bounds do not include the drawing tolerances"
+        text += ", and use the mean of each fit. " if results.robot.fits else ". "
     if found is None:
         return text.strip()
-    text += f"Of {found['draws']} drawn machines {found['assembled']} assemble"
+    text += f"Of {found['draws']} randomly drawn machines, {found['assembled']} "
+    text += "assemble."
     sizes = {key: found["quantities"][key] for key in ("rotation", "translation")}
     if all("quantiles" in one for one in sizes.values()):
         high = {key: one["quantiles"]["0.95"]["value"] for key, one in sizes.items()}
-        text += f"; the pose error of 95 % of these is {_bound_text(high)}"
-    return f"{text}."
+        text += " The 95 % quantiles of their pose error are "
+        text += f"{_pose_text(high['rotation'], high['translation'])}."
+    return text
 
 
-def _other_assumptions(results: StudyResults) -> str:
-    """Format bounds under other assumptions that are more than one per cent larger."""
-    text = ""
+def _other_assumptions(results: StudyResults) -> list[str]:
+    """Return bounds under other assumptions that are more than one per cent larger."""
+    texts = []
     own = results.error[WORST]
     for assumption, error in results.error.items():
         parts = ("rotation", "translation")
         if any(error[p]["upper"] > 1.01 * own[p]["upper"] for p in parts):
             bounds = {part: error[part]["upper"] for part in parts}
-            text += f"; {assumption}: {_bound_text(bounds)} at the study's pose"
-    return text
+            texts.append(
+                f"If {_LARGER[assumption]} (assumption {assumption}), the platform is "
+                f"{_bound_text(bounds)} at the study's pose."
+            )
+    return texts
 
 
 def _bound_text(bounds: dict[str, float]) -> str:
     """Format an upper bound on the pose error."""
-    if not all(np.isfinite([bounds["rotation"], bounds["translation"]])):
+    if not _finite(bounds):
         return "free to move without bound"
-    return f"at most {_pose_text(bounds['rotation'], bounds['translation'])}"
+    size = _pose_text(bounds["rotation"], bounds["translation"])
+    return f"at most {size} from the nominal pose"
+
+
+def _finite(bounds: dict[str, float]) -> bool:
+    """Return whether the bounds of rotation and translation are both finite."""
+    return bool(np.isfinite([bounds["rotation"], bounds["translation"]]).all())
 
 
 def _pose_text(rotation: float, translation: float) -> str:
@@ -226,7 +255,7 @@ def covered(results: StudyResults) -> list[str]:
         results: results of :func:`forcefit.validation.study.study.run_study`.
 
     Returns:
-        One phrase per check; checks without a significant comparison are omitted.
+        One phrase per check.  Checks without an outcome are omitted.
     """
     phrases = []
     verdicts = results.verdicts
@@ -236,19 +265,19 @@ def covered(results: StudyResults) -> list[str]:
             if outcome != "no signal"
         ]  # fmt: skip
         phrases.append(
-            f"{', '.join(names)} by the printed problems in cvxpy: "
-            f"{verdicts['reference']}"
+            f"{', '.join(names)}, by solving the paper's problems in cvxpy "
+            f"({verdicts['reference']})"
         )
     if verdicts.get("crosscheck") in _OUTCOMES:
         phrases.append(
-            "pose without clearances by a multibody simulation: "
-            f"{verdicts['crosscheck']}"
+            "pose without clearances, by a multibody simulation "
+            f"({verdicts['crosscheck']})"
         )
     return phrases
 
 
 def _checks_text(results: StudyResults) -> str:
-    """State the outcomes of independent checks and which checks are missing."""
+    """Return sentences on the independent checks and on those that did not run."""
     phrases, missing = covered(results), results.unchecked
     text = "No independent check was requested."
     if phrases:
@@ -258,6 +287,5 @@ def _checks_text(results: StudyResults) -> str:
     elif results.verdicts:
         text = "No independent check of these results was possible."
     if missing:
-        names = ", ".join(missing)
-        text += f" Not checked: {names}."
+        text += f" Checks that were not possible: {', '.join(missing)}."
     return text

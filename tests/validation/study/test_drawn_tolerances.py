@@ -74,11 +74,11 @@ def test_numbers_on_the_page_of_a_drawn_study_equal_its_results(results):
         assert drawn["pose"][key] == worst[key]["bound"]
     text = verdict(found)
     begin = "For all parts within the drawing tolerances and all positions"
-    assert f"{begin} within the clearances its platform is at most" in text
+    assert f"{begin} within the clearances, the platform is at most" in text
     turn, shift = (1e3 * worst[key]["bound"] for key in ("rotation", "translation"))
     assert f"{turn:.3g} mrad and {shift:.3g} mm from the nominal pose" in text
     assert "Without these tolerances and for all positions within the clear" in text
-    assert "Of 4000 drawn machines 4000 assemble" in text
+    assert "Of 4000 randomly drawn machines, 4000 assemble." in text
 
 
 def test_study_of_fits_states_that_bounds_use_their_mean(tmp_path):
@@ -134,7 +134,8 @@ def test_bound_of_the_rotation_in_the_map_of_a_study_equals_hand_calculation(tmp
     assert over["rotation"] == bounds.values.max()
     assert over["points"] == 4
     turn, shift = (1e3 * over[key] for key in ("rotation", "translation"))
-    assert f"{turn:.3g} mrad and {shift:.3g} mm over the 4 poses" in verdict(found)
+    size = f"{turn:.3g} mrad and {shift:.3g} mm"
+    assert f"At all 4 poses of the map, it is at most {size}" in verdict(found)
     page = (tmp_path / "out" / "report.html").read_text()
     assert "largest rotation over all parts within tolerance" in page
     # a four-bar closes one loop; this one has no description
