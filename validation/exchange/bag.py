@@ -1,7 +1,8 @@
 """Read points, poses and transforms from ROS bags, using the package ``rosbags``.
 
-A bag is a rosbag2 folder (SQLite or MCAP) or a ROS 1 ``.bag``.  A reading is named
-after its topic and frame, and its time is the message stamp.  Lengths are in metres.
+A bag is a rosbag2 folder (SQLite or MCAP) or a ROS 1 ``.bag`` file.  The name of a
+reading consists of its topic and frame, and its time is the time stamp of the message.
+Lengths are in metres.
 """
 
 import os
@@ -23,7 +24,7 @@ _MESSAGES = {
 
 
 def is_bag(path: Path | str) -> bool:
-    """Return whether a path is a bag: a folder with ``metadata.yaml``, or ``.bag``."""
+    """Return whether a path is a ``.bag`` file or a folder with ``metadata.yaml``."""
     path = Path(path)
     return path.suffix.lower() == ".bag" or os.path.isfile(path / "metadata.yaml")
 
@@ -33,14 +34,14 @@ def read_bag(path: Path | str, oriented: bool = False) -> list[Reading]:
 
     Args:
         path: a rosbag2 folder or a ROS 1 bag.
-        oriented: whether to read orientations or ignore them.
+        oriented: whether to read orientations.
 
     Returns:
-        The readings in the recorded order.
+        The readings, in the order of the recording.
 
     Raises:
         BadInput: ``rosbags`` is not installed, the bag cannot be read, or it contains
-            no messages of these kinds.
+            no points, poses or transforms.
     """
     with naming_packages(f"{path}: a bag", "export its points as a table"):
         from rosbags.highlevel import AnyReader
@@ -62,7 +63,7 @@ def read_bag(path: Path | str, oriented: bool = False) -> list[Reading]:
                     )
     except BadInput:
         raise
-    except Exception as error:  # third-party readers may raise any exception
+    except Exception as error:  # the readers of rosbags may raise any exception
         reason = one_line(str(error), 120) or type(error).__name__
         raise BadInput(f"{path}: not a readable bag: {reason}") from None
     if not readings:
@@ -87,10 +88,10 @@ def _places(message: Any) -> Iterator[tuple[str, Any, Any, Any]]:
 def _reading(
     path: str, number: int, names: tuple[str, ...], header: Any, place: Any, turn: Any
 ) -> Reading:
-    """Return one point of a bag, whose ``line`` is the message number."""
+    """Return a reading of a bag, with the message number as its ``line``."""
     position = np.array([place.x, place.y, place.z], dtype=float)
     if np.isnan(position).any():
-        position[:] = np.nan  # the device saw no target
+        position[:] = np.nan  # the device did not detect the target
     elif not (np.abs(position) <= LARGEST).all():
         raise BadInput(
             f"{path}: message {number}: found {position.tolist()}, "

@@ -13,7 +13,7 @@ from forcefit.validation.exchange.device_frame import DeviceFrame
 from forcefit.validation.exchange.reading import Reading
 from forcefit.validation.exchange.targets_file import TargetsFile
 
-# A row of the campaign: index of its command, and its readings by target.
+# Rows of the campaign: the index of the command, and a mapping from target to reading.
 Rows = Sequence[tuple[int, Mapping[str, Reading]]]
 
 
@@ -67,7 +67,7 @@ def spreads(rows: Rows, frame: DeviceFrame, names: Sequence[str]) -> NDArray:
         names: names of the targets.
 
     Returns:
-        (R, T, 3) [m] standard deviations; NaN if not stated.
+        Standard deviations, (R, T, 3) [m]; NaN if the device file contains none.
     """
     sigma = np.full((len(rows), len(names), 3), np.nan)
     for i, (_, readings) in enumerate(rows):
@@ -78,7 +78,7 @@ def spreads(rows: Rows, frame: DeviceFrame, names: Sequence[str]) -> NDArray:
 
 
 def labels_of(commands: Commands, rows: Rows) -> list[str]:
-    """Label the rows by the command id, numbering repeats.
+    """Return unique labels of rows: the command's id, with a number for a repeat.
 
     Args:
         commands: the commands.
@@ -97,7 +97,7 @@ def labels_of(commands: Commands, rows: Rows) -> list[str]:
 
 
 def cell(value: float) -> str:
-    """Format a number with all its digits, or NaN as an empty text."""
+    """Format a number with all its digits; NaN becomes an empty string."""
     return repr(float(value)) if np.isfinite(value) else ""
 
 
@@ -109,16 +109,15 @@ def declaration(
     Args:
         declared: content of the targets file.
         folder: folder of the campaign.
-        spread: (..., 3) [m] standard deviations stated with the readings; NaN if
-            absent.
+        spread: (..., 3) [m] standard deviations in the device files; NaN if absent.
         turned: whether orientations were measured.
 
     Returns:
         The text of the file.
 
     Raises:
-        BadInput: the standard deviation of a reading is stated neither with the reading
-            nor in the targets file.
+        BadInput: neither the device file nor the targets file contains the standard
+            deviation of a reading.
     """
     name = declared.robot_name
     path = declared.file.parent / name
@@ -133,8 +132,8 @@ def declaration(
         lines.append(f"reference_point = {next(iter(places.values()))}")
     if not np.isfinite(spread).all() and declared.noise is None:
         raise BadInput(
-            f"{declared.file}: noise: missing; expected one standard deviation "
-            "[m], because some readings state none"
+            f"{declared.file}: missing key noise; expected a standard deviation [m], "
+            "because some readings have none"
         )
     if declared.noise is not None:
         lines += ["[noise]", f"position = {declared.noise!r}"]

@@ -25,7 +25,7 @@ class CellValues:
     Attributes:
         sheet: the table.
         header: columns of the table.
-        writing: declared format, for properties that the table does not state.
+        writing: declared format, used for properties that are not in the table.
     """
 
     sheet: Sheet
@@ -38,7 +38,7 @@ class CellValues:
         return self.number(line, name, cell) * self.unit(self.header.columns[k].unit)
 
     def unit(self, stated: str) -> float:
-        """Return the unit of a column, as stated, declared or given by the file."""
+        """Return the factor that converts the lengths of a column to metres."""
         path, declared, found = self.sheet.file, self.writing.unit, self.header.unit
         if not stated and declared and found:
             if LENGTHS[found] != LENGTHS[declared]:

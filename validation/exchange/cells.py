@@ -11,12 +11,13 @@ from pathlib import Path
 from forcefit.inputs.errors import BadInput
 from forcefit.inputs.table import read_bytes
 
-_MARKS = (";", "\t", ",")  # separators between cells, the most probable first
+_MARKS = (";", "\t", ",")  # possible separators between cells
 _BLANK = " "
 _QUOTED = re.compile(
     r"[-+]?\d*,\d+(?:[eE][-+]?\d+)?"
-)  # number in quotes, between commas
-# Largest number of characters in a cell; the search for units takes quadratic time.
+)  # matches a number with a decimal comma
+# Largest number of characters in a cell, because the search for units takes quadratic
+# time.
 _LONGEST = 1000
 _SAMPLE = 2000  # number of lines from which the separator is determined
 
@@ -28,8 +29,8 @@ class Sheet:
     Attributes:
         file: path of the file, for messages.
         decimal: decimal mark of the table.
-        rows: for each line its number and its cells, without quotes and surrounding
-            blanks.  Comments and blank lines are omitted.
+        rows: number and cells of each line.  Quotes and surrounding blanks are removed
+            from cells.  Comments and blank lines are omitted.
     """
 
     file: str
@@ -42,8 +43,8 @@ def read_sheet(path: Path | str, decimal: str = ".") -> Sheet:
 
     Args:
         path: a text file in UTF-8, UTF-16 or Latin-1.
-        decimal: declared decimal mark.  In a comma-separated table it is a point unless
-            a quoted number contains a comma.
+        decimal: declared decimal mark.  If commas separate the cells, a decimal comma
+            applies only if a quoted number contains one.
 
     Returns:
         The table.
@@ -87,7 +88,7 @@ def _with_names_of_words(
 
 
 def _text(path: Path | str) -> str:
-    """Return the text of a file in UTF-8, UTF-16 or Latin-1, with uniform line ends."""
+    """Return the text of a file in UTF-8, UTF-16 or Latin-1."""
     content = read_bytes(path)
     if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         encodings = ["utf-16"]
@@ -115,13 +116,13 @@ def _text(path: Path | str) -> str:
 
 
 def _mark(lines: Sequence[str], decimal: str) -> str:
-    """Return the separator that occurs in most lines, or the most frequent in a tie."""
+    """Return the separator that occurs in the largest number of lines."""
     for mark in _MARKS:
         if 2 * sum(mark in line for line in lines) < len(lines):
             continue
         blank = sum(len(line.split()) > 3 for line in lines)
         if mark == "," and decimal == "," and 2 * blank >= len(lines):
-            return _BLANK  # the commas are decimal marks
+            return _BLANK  # blanks separate the cells, and commas are decimal marks
         return mark
     return _BLANK
 
@@ -132,6 +133,6 @@ def _cells(line: str, mark: str) -> list[str]:
         line = re.sub(r"\s+(?=\[)", "", line.replace("\t", _BLANK).strip())  # X [mm]
     try:
         row = next(csv.reader([line], delimiter=mark, skipinitialspace=True))
-    except csv.Error:  # the line contains an unclosed quote
+    except csv.Error:  # a quote is not closed
         row = line.split(mark)
     return [cell.strip().strip('"').removeprefix("'").strip() for cell in row]

@@ -15,16 +15,19 @@ _CLOCK = re.compile(r"\d{1,2}:\d{2}:\d{2}(?:[.,]\d+)?(?: ?[APap][Mm])?")
 
 
 def parse_time(place: str, text: str, writing: Writing) -> float:
-    """Return a time [s] given in seconds, as time of day, ISO 8601, 14 digits, or date.
+    """Convert the text of a time to seconds.
+
+    Accepted forms are a number of seconds, a time of day, ISO 8601, 14 digits such as
+    20261122103000, and a date with a time of day.
 
     Args:
         place: file and line, for messages.
         text: content of the cell, or a date and a time.
-        writing: declared format: decimal mark, and order of day and month in dates with
-            slashes.
+        writing: declared format, which contains the decimal mark and the order of day
+            and month in dates with slashes.
 
     Returns:
-        Seconds on the clock of the file, of which only differences are meaningful.
+        The time [s].  Its origin is arbitrary.
 
     Raises:
         BadInput: the text has none of these forms.
@@ -42,9 +45,9 @@ def parse_time(place: str, text: str, writing: Writing) -> float:
             a, mark, b, year, rest = match.groups()
             if mark == "/" and writing.dates is None:
                 raise BadInput(
-                    f"{place}: found {describe(text)}, whose order of day and "
-                    'month is unknown; expected dates = "day_first" or '
-                    '"month_first" in the targets file'
+                    f"{place}: found {describe(text)} with an unknown order of day "
+                    'and month; expected dates = "day_first" or "month_first" in '
+                    "the targets file"
                 )
             swap = mark == "/" and writing.dates == "month_first"
             day, month = (b, a) if swap else (a, b)
@@ -61,18 +64,18 @@ def parse_time(place: str, text: str, writing: Writing) -> float:
 
 
 def _dated(year: str, month: str, day: str, clock: str) -> float:
-    """Return the time [s] of a date and a time such as 10:30:00.25 or 9:30:00 PM."""
+    """Return the time [s] of a date and a clock time such as 9:30:00 PM."""
     clock = clock.replace(",", ".")
     half = clock[-2:].upper() if clock[-1:] in {"M", "m"} else ""
     clock = clock[: len(clock) - len(half)].strip()
     style = ("%I:%M:%S" if half else "%H:%M:%S") + (".%f" if "." in clock else "")
     if "." in clock:
-        clock = clock[: clock.index(".") + 7]  # resolution of a microsecond
+        clock = clock[: clock.index(".") + 7]  # strptime accepts at most six decimals
     suffix = " %p" if half else ""
     text = f"{year}-{month}-{day} {clock} {half}".strip()
     return _seconds(text, f"%Y-%m-%d {style}{suffix}")
 
 
 def _seconds(text: str, style: str) -> float:
-    """Return the seconds since 1970 of a UTC time in a given style."""
+    """Return the seconds since 1970 of a UTC time in a ``strptime`` format."""
     return datetime.strptime(text, style).replace(tzinfo=UTC).timestamp()

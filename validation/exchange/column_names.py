@@ -18,11 +18,11 @@ _NUMBERED = re.compile("(?:quaternion|quat|q)([0-3])")
 _ANGLE = re.compile("(?:euler|rotation|rot|orientation|ori|angle|r)([xyz])")
 _NAMED_ANGLES = {
     "roll": "x", "pitch": "y", "yaw": "z", "omega": "x", "phi": "y", "kappa": "z",
-    "c": "x", "b": "y", "a": "z",  # KUKA's names of the angles
+    "c": "x", "b": "y", "a": "z",  # names of the angles on KUKA robots
 }  # fmt: skip
 _UNIT = re.compile(
     r"\[\s*([^\]]*?)\s*\]|\(\s*([^)\d][^)]*?)\s*\)"
-)  # does not match the 95 of U(95)
+)  # a unit in brackets; does not match the 95 in U(95)
 _UNIT_AFTER = re.compile(r"\s*[_ /]\s*(mm|um|cm|in|m|deg|mrad|rad)$", re.IGNORECASE)
 LENGTH_UNITS = ("mm", "m", "um", "cm", "in")
 _WORDS = {"meter": "m", "millimeter": "mm", "centimeter": "cm", "micrometer": "um",
@@ -49,7 +49,7 @@ class Column:
 
 
 def column_of(cell: str) -> Column:
-    """Return the meaning of a column, given only its name.
+    """Return the meaning of a column from its name.
 
     Args:
         cell: cell of the header.

@@ -35,7 +35,7 @@ class Commands:
     Attributes:
         file: path of the table, for messages.
         ids: unique labels of the commands.
-        times: (C,) [s] time of each command; NaN without a time.
+        times: (C,) [s] time of each command; NaN if the table contains no time.
         columns: mapping from the name of each column of the campaign to (C,) values in
             SI units.
         postures: postures of the declared robot, one for each command.
@@ -120,13 +120,13 @@ def _check_label(place: str, label: str, seen: Mapping[str, int]) -> None:
         raise BadInput(f"{place}: found an empty cell, expected a label")
     if label in seen:
         raise BadInput(
-            f"{place}: found {quoted(label)}, already the label of line "
+            f"{place}: found {quoted(label)}, which is already the label of line "
             f"{seen[label]}; expected a different label"
         )
 
 
 def _decimal_hint(cell: str, decimal: str) -> str:
-    """Return a hint if a cell contains the wrong decimal mark."""
+    """Return a hint for the message if a cell has the wrong decimal mark."""
     other = "," if decimal == "." else "."
     if not np.isfinite(parse_number(cell, other)):
         return ""
@@ -152,7 +152,7 @@ def _factor(path: Path | str, name: str, column: str, robot: Robot) -> float:
 
 
 def _units(name: str, robot: Robot) -> Mapping[str, float] | None:
-    """Return the accepted units of a column with factors, or None if any is allowed."""
+    """Return the factor of each accepted unit, or None if every unit is accepted."""
     lengths = UNITS["command_position"] | _INCHES
     if name in {"time", "cov.time"}:
         return UNITS["time"]

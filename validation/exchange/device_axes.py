@@ -1,9 +1,8 @@
 """Check the length unit and the axes of a device export.
 
-A wrong unit multiplies all distances by one factor, and left-handed axes mirror the
-readings, which no device pose can explain.  Such files are rejected rather than
-corrected, because the wrong device setting may also affect data that cannot be checked
-here.
+A wrong unit multiplies all distances by the same factor, and left-handed axes mirror
+the readings.  Such files are rejected.  They are not corrected, because a wrong device
+setting may also affect data that cannot be checked here.
 
 Sources:
     Umeyama (1991), Least-squares estimation of transformation parameters between two
@@ -22,18 +21,17 @@ from forcefit.validation.exchange.device_frame import robust_frame, scatter_of
 from forcefit.validation.exchange.reading import LENGTHS
 
 _UNITS = {**LENGTHS, "ft": 0.3048}
-# Corrected readings fit far better if they reduce the scatter below this fraction.
+# A correction is accepted if it reduces the scatter below this fraction.
 _FAR_BETTER = 0.25
 _SCALED = 0.02  # largest relative scatter of distance ratios for a wrong unit
-# Accepted relative error of the factor between two units, which errors of the robot
-# change.
+# Accepted relative error of the factor between two units.
 _UNIT = 0.05
-# Distances are computed from each reading to this number of following readings.
+# Number of following readings to which the distances from a reading are computed.
 _PAIRED = 10
 # Largest accepted difference between measured and declared distance of two targets,
 # relative to the declared distance.
 _APART = 0.1
-# Reversal of one axis; reversing a different axis differs only by a rotation.
+# Reversal of the y axis.  Reversing another axis differs from it only by a rotation.
 _MIRRORED = np.array([1.0, -1.0, 1.0])
 
 
@@ -46,11 +44,10 @@ def check_axes(
         file: the targets file, for messages.
         measured: (N, 3) [m] readings, device axes.
         nominal: (N, 3) [m] nominal positions, base axes.
-        known: whether the axes of the device equal the axes of the base.
+        known: whether the device axes equal the base axes.
 
     Raises:
-        BadInput: the readings fit far better in a different unit or with different
-            axes.
+        BadInput: the readings fit much better with another unit or other axes.
     """
     scatter = _scatter(measured, nominal, known)
     factor, meant = _units_of(_factor(measured, nominal, known))
@@ -60,7 +57,7 @@ def check_axes(
             raise BadInput(
                 f"{file}: unit: the readings fit much better if multiplied by "
                 f"{factor:.4g}, {meant} (scatter {rescaled:.2g} m instead of "
-                f"{scatter:.2g} m); declare the right unit"
+                f"{scatter:.2g} m); declare the correct unit"
             )
     if known:
         _check_known_axes(file, measured, nominal, scatter)
@@ -90,7 +87,7 @@ def check_targets(
         Remarks about pairs of targets whose measured and declared distances differ.
 
     Raises:
-        BadInput: all distances differ by a common factor.
+        BadInput: all distances differ by the same factor.
     """
     names, ratios, remarks = list(places), [], []
     for i, j in combinations(range(len(names)), 2):
@@ -120,7 +117,10 @@ def check_targets(
 
 
 def _units_of(factor: float) -> tuple[float, str]:
-    """Return the nearest factor between two units and its description, or 1 and ""."""
+    """Return the ratio of two units that is near a factor, and its description.
+
+    If there is no such ratio, 1 and an empty string are returned.
+    """
     found = [
         (_UNITS[b] / _UNITS[a], f"as {b} taken for {a}", a, b)
         for a, b in permutations(_UNITS, 2)
@@ -131,10 +131,10 @@ def _units_of(factor: float) -> tuple[float, str]:
 
 
 def _factor(measured: NDArray, nominal: NDArray, known: bool) -> float:
-    """Return a blunder-resistant ratio of nominal to measured distances."""
+    """Return the ratio of nominal to measured distances, insensitive to outliers."""
     if known:
         pairs = [(measured, nominal)]
-    # Distances between readings are independent of the device pose.
+    # Distances between readings do not depend on the device pose.
     else:
         shifts = range(1, min(len(measured), _PAIRED))
         pairs = [
@@ -148,7 +148,7 @@ def _factor(measured: NDArray, nominal: NDArray, known: bool) -> float:
 
 
 def _scatter(measured: NDArray, nominal: NDArray, known: bool) -> float:
-    """Return the scatter [m] about the best-fit frame or the known base frame."""
+    """Return the scatter [m] of the readings in the fitted or known device frame."""
     if known:
         return scatter_of(np.linalg.norm(measured - nominal, axis=1))
     return robust_frame(measured, nominal)[1]

@@ -7,12 +7,12 @@ from itertools import permutations
 import numpy as np
 from numpy.typing import NDArray
 
-# Deviations above this multiple of the scatter of all readings are not caused by a
-# machine.
+# Multiple of the scatter of all readings above which a deviation is an outlier.
 _GROSS = 20.0
-# Targets count as exchanged if exchanging them reduces the misfit below this fraction.
+# Targets are regarded as exchanged if their exchange reduces the residual below this
+# fraction.
 _BETTER = 0.25
-_MOST = 6  # largest number of targets for which all 720 orders are tried
+_MOST = 6  # largest number of targets for which all orders are tried, here 720
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,14 +33,14 @@ class DeviceFrame:
 
 
 def fit_frame(measured: NDArray, nominal: NDArray) -> DeviceFrame:
-    """Return the least-squares frame that fits measured to nominal points.
+    """Return the device frame that fits measured to nominal points in least squares.
 
     Args:
         measured: (N, 3) [m] points in device axes.
         nominal: (N, 3) [m] points in base axes.
 
     Returns:
-        The least-squares frame.
+        The frame.
     """
     a, b = measured.mean(axis=0), nominal.mean(axis=0)
     U, _, Vt = np.linalg.svd((measured - a).T @ (nominal - b))
@@ -50,20 +50,20 @@ def fit_frame(measured: NDArray, nominal: NDArray) -> DeviceFrame:
 
 
 def spans_a_plane(points: NDArray) -> bool:
-    """Return whether points (N, 3) determine a frame, that is, are not collinear."""
+    """Return whether points (N, 3) are not collinear and thus determine a frame."""
     sizes = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
     return len(points) > 2 and bool(sizes[1] > 1e-6 * sizes[0] > 0)
 
 
 def robust_frame(measured: NDArray, nominal: NDArray) -> tuple[DeviceFrame, float]:
-    """Fit the device frame, excluding gross errors; also return the scatter.
+    """Fit the device frame and estimate the scatter, excluding outliers.
 
     Args:
         measured: (N, 3) [m] points in device axes.
         nominal: (N, 3) [m] points in base axes.
 
     Returns:
-        The frame, and the standard deviation [m] of one component of the points.
+        The frame, and the standard deviation [m] of one coordinate of the points.
     """
     kept = np.ones(len(measured), dtype=bool)
     for _ in range(20):
@@ -78,9 +78,9 @@ def robust_frame(measured: NDArray, nominal: NDArray) -> tuple[DeviceFrame, floa
 
 
 def scatter_of(gaps: NDArray) -> float:
-    """Return a robust scatter [m] of distances (N,), at least the round-off."""
-    # The median length of a Gaussian vector in space is 1.538 times the sigma of one
-    # component.
+    """Return the scatter [m] estimated from the median of distances (N,)."""
+    # The median length of a Gaussian vector in three dimensions is 1.538 times the
+    # standard deviation of one component.
     return float(np.median(gaps)) / 1.538 + 1e-12
 
 
@@ -92,7 +92,7 @@ def is_gross(gap: float, scatter: float) -> bool:
 def exchanged_throughout(
     measured: Sequence[NDArray], nominal: Sequence[NDArray]
 ) -> tuple[int, ...] | None:
-    """Return a target order that fits far better than the given one, if there is one.
+    """Return the order of the targets if another order fits much better.
 
     Args:
         measured: for each target (R, 3) [m] positions in device axes; NaN if not
@@ -100,8 +100,8 @@ def exchanged_throughout(
         nominal: for each target (R, 3) [m] positions in base axes.
 
     Returns:
-        For each target, the index of the target that was actually measured; None if the
-        names are correct.
+        For each target, the index of the target that was measured under its name.  None
+        if the names are correct.
     """
     count = len(measured)
     if not 2 <= count <= _MOST:
@@ -122,7 +122,7 @@ def exchanged_throughout(
 def exchanged_here(measured: NDArray, nominal: NDArray, scatter: float) -> (
     tuple[int, ...] | None
 ):  # fmt: skip
-    """Find exchanged targets in one row.
+    """Return the order of the targets in one row if targets were exchanged.
 
     Args:
         measured: (k, 3) [m] points in base axes.
@@ -130,8 +130,8 @@ def exchanged_here(measured: NDArray, nominal: NDArray, scatter: float) -> (
         scatter: [m] scatter of all readings.
 
     Returns:
-        For each target, the index of the target that was actually measured; None if no
-        targets were exchanged.
+        For each target, the index of the target that was measured under its name.  None
+        if no targets were exchanged.
     """
     count = len(measured)
     own = np.linalg.norm(measured - nominal, axis=1).max(initial=0.0)

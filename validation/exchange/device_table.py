@@ -3,9 +3,8 @@
 The reader accepts SpatialAnalyzer text (``collection::group::point``), exports of
 Leica, FARO, API, Vicon and OptiTrack software, and plain tables.  The cells of a plain
 table are separated by blanks, tabs, semicolons or commas.  A header and a preamble are
-optional.  The reader does not guess: units must be stated in the table or in the
-targets file, and a decimal comma and the order of dates and angles must be declared in
-the targets file.
+optional.  The table or the targets file must contain the units.  A decimal comma, the
+order of day and month, and the order of angles must be declared in the targets file.
 """
 
 import re
@@ -42,12 +41,12 @@ def read_device_table(
 
     Args:
         path: the file.
-        writing: declared format, for properties that the file does not state.
+        writing: declared format, used for properties that are not in the file.
         targets: mapping from the name of each target to its position (3,) [m], platform
             axes.  A table may contain separate columns for each target.
 
     Returns:
-        The readings in file order.  A row with several targets yields several readings.
+        The readings in the order of the file.  A row contains one or several readings.
 
     Raises:
         BadInput: the file contains no coordinates or no unit, or a cell is neither a
@@ -74,7 +73,7 @@ def read_device_table(
 def _refuse_other_headings(
     path: Path | str, rows: Sequence[tuple[int, list[str]]]
 ) -> None:
-    """Raise BadInput if the row above the data names columns other than x, y, z."""
+    """Raise BadInput if the row above the data has headings other than x, y, z."""
     if len(rows) < 2:
         return
     (line, heads), (_, cells) = rows[-2:]
@@ -87,7 +86,7 @@ def _refuse_other_headings(
 
 
 def _lacking(cells: Sequence[str]) -> str:
-    """Return the first of x, y, z that is missing among the headings of a line."""
+    """Return the first coordinate (x, y or z) without a heading in a line."""
     words = " ".join(cells).lower().split()
     return next((axis for axis in "xyz" if axis not in words), "x")
 
@@ -99,12 +98,12 @@ def _is_data(cells: Sequence[str], decimal: str) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class _HeadedRows:
-    """Converts the rows below a header to readings."""
+    """Converter from the rows below a header to readings."""
 
     values: CellValues
 
     def readings(self, line: int, cells: list[str]) -> list[Reading]:
-        """Return the readings of a row, one for each target with columns."""
+        """Return the readings of a row, one for each target that has columns."""
         header = self.values.header
         place = f"{self.values.sheet.file}: line {line}"
         while len(cells) > len(header.cells) and not cells[-1]:
@@ -167,7 +166,7 @@ class _HeadedRows:
         return Reading(file, line, names, position, sigma, time, rotation)
 
     def _spread(self, line: int, k: int, value: float) -> float:
-        """Return a standard deviation [m]; NaN if the file rounds it to zero."""
+        """Return a standard deviation [m]; NaN if the file contains 0."""
         if value < 0:
             name = self.values.header.cells[k]
             place = f"{self.values.sheet.file}: line {line}, {name}"
@@ -175,7 +174,7 @@ class _HeadedRows:
         return value if value > 0 else np.nan
 
     def _rotation(self, line: int, cells: list[str], own: list[int]) -> NDArray | None:
-        """Return the target's axes in the device's axes; None if not measured."""
+        """Return the rotation of a target in device axes; None if not measured."""
         header, writing = self.values.header, self.values.writing
         place = f"{self.values.sheet.file}: line {line}"
         kind, at = orientation_columns(header.columns, own)

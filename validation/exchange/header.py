@@ -27,8 +27,8 @@ class Header:
         first: index of the first row of data among the rows of the table.
         cells: unchanged cells of the header; empty if there is no header.
         columns: meaning of each column.
-        unit: unit of lengths stated before the header; empty if there is none.
-        unit_line: number of the line with this unit, for messages.
+        unit: unit of lengths above the header; empty if there is none.
+        unit_line: number of the line that contains this unit, for messages.
     """
 
     first: int
@@ -41,7 +41,9 @@ class Header:
 def find_header(
     rows: Sequence[tuple[int, list[str]]], targets: Iterable[str]
 ) -> Header | None:
-    """Find the header of a table, which other lines may precede.
+    """Find the header of a table.
+
+    Other lines may precede the header.
 
     Args:
         rows: line number and cells of each row of the table.
@@ -76,7 +78,7 @@ def find_header(
 
 
 def without_header(rows: Sequence[tuple[int, list[str]]], decimal: str) -> Header:
-    """Find the first row of a headerless table, and the unit stated before it.
+    """Find the first row of data in a table without a header, and the unit above it.
 
     Args:
         rows: line number and cells of each row of the table.
@@ -95,11 +97,10 @@ def without_header(rows: Sequence[tuple[int, list[str]]], decimal: str) -> Heade
 def _by_target(
     cells: Sequence[str], before: Sequence[tuple[int, list[str]]], targets: list[str]
 ) -> list[Column]:
-    """Return the columns of a table with several targets per row, if it is one.
+    """Return the columns of a table with several targets per row.
 
-    Target names are part of the column headings or listed in a row above.  Without
-    names, columns are assigned to the targets in order, provided that there are as many
-    groups of columns as targets.
+    Target names are in the column headings or in a row above.  Without names, groups of
+    columns are assigned to the targets in order if their numbers are equal.
 
     Args:
         cells: cells of the header.
@@ -116,7 +117,7 @@ def _by_target(
     plain = [column_of(cell) for cell in cells]
     for _, above in reversed(before):
         labels = _filled(above, len(cells))
-        # Prefer a body's name to those of its markers, for example arm:1, arm:2.
+        # A body arm is preferred to its markers arm:1 and arm:2.
         exact = set(labels) & set(targets)
         found = [
             label if label in exact else _only(label, [*{*targets} - exact])
@@ -159,7 +160,7 @@ def _complete(columns: Sequence[Column], least: int = 1) -> bool:
 
 
 def _of_target(cell: str, targets: Sequence[str]) -> tuple[Column, str]:
-    """Return the meaning of a heading that names a target before or after the axis."""
+    """Return the column and target of a heading such as ``A x`` or ``x_A``."""
     for target in sorted(targets, key=len, reverse=True):
         name = re.escape(target)
         before = re.search(rf"(?:^|[^a-z0-9]){name}(?=[^a-z0-9]|[xyz]\b)", cell, re.I)
@@ -176,14 +177,14 @@ def _of_target(cell: str, targets: Sequence[str]) -> tuple[Column, str]:
 
 
 def _only(label: str, targets: Sequence[str]) -> str:
-    """Return the target named by a label such as arm:SMR1; empty if there is none."""
+    """Return the target in a label such as ``arm:SMR1``, or an empty string."""
     words = re.split(r"[:./|\s]+", label)
     found = [target for target in targets if target in words or target == label]
     return found[0] if len(found) == 1 else ""
 
 
 def _with_kinds(cells: list[str], above: Sequence[str]) -> list[str]:
-    """Return headings combined with the kind (Rotation, Position) in the line above."""
+    """Add the quantity in the line above (Rotation or Position) to each heading."""
     kinds = [word if word.lower() in _KINDS else "" for word in above]
     if not any(kinds) or len(above) > len(cells):
         return cells
@@ -192,7 +193,7 @@ def _with_kinds(cells: list[str], above: Sequence[str]) -> list[str]:
 
 
 def _filled(cells: Sequence[str], count: int) -> list[str]:
-    """Fill merged cells: an empty cell repeats the label before it."""
+    """Fill each empty cell with the label before it, as for merged cells."""
     labels: list[str] = []
     for cell in [*cells, *[""] * count][:count]:
         labels.append(cell or (labels[-1] if labels else ""))
@@ -200,12 +201,12 @@ def _filled(cells: Sequence[str], count: int) -> list[str]:
 
 
 def _stated(rows: Sequence[tuple[int, list[str]]]) -> tuple[int, str]:
-    """Return the line and unit of lengths stated before a header, or 0 and ""."""
+    """Return line number and unit of lengths found above a header, or 0 and ""."""
     for line, cells in rows:
         if match := _STATED.search(" ".join(cells)):
             words = re.findall(r"[A-Za-zµμ]+", match[1])[:4]
             units = [unit for w in words if (unit := unit_word(w)) in LENGTH_UNITS]
-            if units:  # "in" of "units in mm" does not mean inches
+            if units:  # in "units in mm", "in" does not mean inches
                 return line, next((u for u in units if u != "in"), "in")
     return 0, ""
 
@@ -216,7 +217,9 @@ def _is_number(cell: str, decimal: str = ".") -> bool:
 
 
 def by_target(columns: Sequence[Column]) -> Mapping[str, list[int]]:
-    """Group the columns by target; the key of columns without a target is empty.
+    """Group the columns by target.
+
+    The key of columns without a target is an empty string.
 
     Args:
         columns: columns of a table.

@@ -18,15 +18,16 @@ class Match:
 
     Attributes:
         how: method of the assignment: ``"name"``, ``"time"`` or ``"order"``.
-        rows: command and readings by target of each campaign row.  A second reading of
-            a target at the same command starts a new row.
+        rows: rows of the campaign: the index of the command, and a mapping from target
+            to reading.  A second reading of a target at the same command starts a new
+            row.
         strangers: readings of points that are not targets, for example ground points.
         unmatched: readings of targets to which no command was assigned.
         missing: readings without a position.
-        duplicates: readings that repeat an earlier one in the same file digit by digit;
-            they are omitted.
-        copies: readings that repeat one in a different file digit by digit.  Both are
-            used, because a device with few digits may measure equal values.
+        duplicates: readings with the same digits as an earlier one in the same file.
+            They are omitted.
+        copies: readings with the same digits as one in another file.  They are used,
+            because a device with few digits may measure equal values.
     """
 
     how: str
@@ -44,11 +45,11 @@ def match(
     targets: Iterable[str],
     window: float,
 ) -> Match:
-    """Assign readings to commands: by name, otherwise by time, otherwise by order.
+    """Assign readings to commands by name, by time or by order.
 
     Args:
         readings: readings in the order of measurement.
-        commands: commands in the order given.
+        commands: commands in the order of their table.
         targets: names of the targets.
         window: [s] largest time between a command and its readings.
 
@@ -56,8 +57,8 @@ def match(
         The assigned rows and the unassigned readings.
 
     Raises:
-        BadInput: no target was read, a reading names two targets, or the readings
-            cannot be assigned.
+        BadInput: no reading belongs to a target, a reading contains the names of two
+            targets, or the readings cannot be assigned to commands.
     """
     ours = _of_targets(readings, list(targets))
     lost = {id(reading) for reading, _ in ours}
@@ -92,8 +93,8 @@ def match(
             before.append(reading)
     if not table and missing:
         raise BadInput(
-            f"{missing[0].place}: found no coordinates in this reading or in "
-            "any other, expected numbers"
+            f"{missing[0].place}: found no coordinates, and none in any other reading; "
+            "expected numbers"
         )
     if not table:
         raise BadInput(
@@ -106,7 +107,7 @@ def match(
 
 
 def _repeated(readings: Sequence[Reading]) -> str:
-    """Return a hint about the first duplicate reading."""
+    """Return a hint for the message about the first duplicate reading."""
     seen: dict[object, Reading] = {}
     for reading in readings:
         digits = (reading.names, reading.position.tobytes(), str(reading.time))
@@ -117,7 +118,7 @@ def _repeated(readings: Sequence[Reading]) -> str:
 
 
 def _same(a: Reading, b: Reading) -> bool:
-    """Return whether two readings agree in digits, name and time."""
+    """Return whether two readings have the same digits, name and time."""
     timed = a.time == b.time or bool(np.isnan(a.time) and np.isnan(b.time))
     return timed and a.names == b.names and np.array_equal(a.position, b.position)
 
@@ -125,7 +126,7 @@ def _same(a: Reading, b: Reading) -> bool:
 def _of_targets(
     readings: Sequence[Reading], targets: list[str]
 ) -> list[tuple[Reading, str]]:
-    """Return the readings of targets; unnamed readings belong to a single target."""
+    """Return the readings of targets, each with the name of its target."""
     ours = []
     found = [
         [part for part in reading.names if part in targets] for reading in readings
@@ -155,7 +156,10 @@ def _of_targets(
 def _of_commands(
     ours: list[tuple[Reading, str]], found: list[list[str]], ids: Sequence[str]
 ) -> list[int]:
-    """Return the command index in each name, or -1; empty if few names have one."""
+    """Return the command index of each reading from its name; -1 if it has none.
+
+    An empty list is returned unless most names contain the id of one command.
+    """
     index = {label: i for i, label in enumerate(ids)}
     asked = [
         [index[label] for label in labels if label != target]
@@ -167,10 +171,10 @@ def _of_commands(
 
 
 def _within(readings: Sequence[Reading], labels: Sequence[str]) -> list[list[str]]:
-    """Return the labels contained in each name, such as SMR1 in ``p04_SMR1``.
+    """Return the labels in the name of each reading, such as SMR1 in ``p04_SMR1``.
 
-    A label must not be adjacent to a letter or digit.  Of overlapping labels, the
-    longest is returned.
+    A label must not be adjacent to a letter or digit.  If labels overlap, the longest
+    is returned.
     """
     longest = sorted(labels, key=len, reverse=True)
     words = "|".join(map(re.escape, longest))
@@ -179,7 +183,7 @@ def _within(readings: Sequence[Reading], labels: Sequence[str]) -> list[list[str
 
 
 def _nearest(reading: Reading, commands: Commands, window: float) -> int:
-    """Return the index of the command nearest in time, or -1 outside the window."""
+    """Return the index of the command nearest in time; -1 if none is in the window."""
     gaps = np.abs(commands.times - reading.time)
     return int(np.argmin(gaps)) if gaps.min() <= window else -1
 

@@ -17,25 +17,25 @@ from forcefit.validation.exchange.column_names import QUATERNION, Column
 
 ROTATION_VECTOR = "rotation_vector"
 ANGLES = {"rad": 1.0, "mrad": 1e-3, "deg": np.pi / 180}
-# Inverse rotations fit far better if they reduce the scatter below this fraction.
+# Inverse rotations fit much better if they reduce the scatter below this fraction.
 _FAR_BETTER = 0.25
-# [rad] scatter above which orientations are unrelated to the commands; orientations of
-# real machines scatter by less than 0.02 rad
+# [rad] Scatter above which orientations are regarded as unrelated to the commands.  The
+# scatter of real machines is below 0.02 rad.
 _UNRELATED = 0.2
-_GROSS = 20.0  # multiple of the scatter of readings excluded from the mean
-# Ratio of the median length of a Gaussian vector in space to the sigma of one
-# component.
+_GROSS = 20.0  # multiple of the scatter above which a reading is excluded from the mean
+# Ratio of the median length of a Gaussian vector in three dimensions to the standard
+# deviation of one component.
 _MEDIAN = 1.538
 _ROUNDING = 1e-12  # [rad] smallest scatter, due to round-off
-_UNIT_NORM = 0.01  # accepted error of the norm of rounded quaternions
+_UNIT_NORM = 0.01  # accepted difference of the norm of a rounded quaternion from 1
 
 
 def orders() -> tuple[str, ...]:
     """Return the accepted values of ``orientation`` in a targets file.
 
     Returns:
-        ``rotation_vector``, and the 24 orders of three angles: small letters for fixed
-        axes, capital letters for moving axes.
+        ``rotation_vector`` and the 24 orders of three angles.  Small letters denote
+        fixed axes, and capital letters denote moving axes.
     """
     axes = [a + b + c for a in "xyz" for b in "xyz" for c in "xyz" if a != b != c]
     return (ROTATION_VECTOR, *axes, *(axis.upper() for axis in axes))
@@ -44,18 +44,19 @@ def orders() -> tuple[str, ...]:
 def orientation_columns(
     columns: Sequence[Column], own: Sequence[int]
 ) -> tuple[str, dict[str, int]]:
-    """Return the columns of a target's orientation.
+    """Return the columns that contain a target's orientation.
 
     Args:
         columns: columns of the table.
         own: indices of the target's columns.
 
     Returns:
-        ``"quaternion"``, ``"angles"`` or empty, and the column of each component.
+        The representation (``"quaternion"``, ``"angles"`` or an empty string), and a
+        mapping from each component to its column.
     """
     w = {columns[k].axis: k for k in own if columns[k].kind == "quaternion"}
     angles = {columns[k].axis: k for k in own if columns[k].kind == "angle"}
-    # If there is a column W, then Rotation X, Y, Z are components of a quaternion.
+    # With a column W, the columns Rotation X, Y and Z are components of a quaternion.
     if "w" in w:
         w = angles | w
     if set(w) >= set(QUATERNION):
@@ -66,7 +67,7 @@ def orientation_columns(
 
 
 def from_quaternion(place: str, values: Sequence[float]) -> NDArray:
-    """Return the target axes (3, 3) in device axes, from a quaternion w x y z.
+    """Convert a quaternion to the rotation matrix from target axes to device axes.
 
     Args:
         place: file and line, for messages.
@@ -88,12 +89,12 @@ def from_quaternion(place: str, values: Sequence[float]) -> NDArray:
 def from_angles(
     place: str, angles: Mapping[str, float], order: str | None
 ) -> NDArray:  # fmt: skip
-    """Return the target axes (3, 3) in device axes, from three angles [rad].
+    """Convert three angles to the rotation matrix from target axes to device axes.
 
     Args:
         place: file and line, for messages.
-        angles: angles about each axis, in the order of the columns.
-        order: order declared in the targets file, or None.
+        angles: [rad] angles in the order of the columns.
+        order: order of the angles in the targets file, or None.
 
     Returns:
         The rotation matrix.
@@ -117,13 +118,13 @@ def from_angles(
 
 @dataclass(frozen=True, eq=False)
 class Turns:
-    """Orientations of one target, expressed as platform deviations.
+    """Orientations of one target, converted to rotations of the platform.
 
     Attributes:
         deviation: (R, 3) [rad] rotation vector from nominal to actual orientation, base
             axes; NaN if not measured.
-        mount: (3, 3) the target's axes in the platform's axes.
-        scatter: [rad] scatter of one component.
+        mount: (3, 3) rotation matrix from target axes to platform axes.
+        scatter: [rad] scatter of one component of the deviations.
     """
 
     deviation: NDArray
@@ -134,21 +135,23 @@ class Turns:
 def turns_of(
     file: Path, seen: NDArray, base: NDArray, nominal: NDArray, mount: NDArray | None
 ) -> Turns:
-    """Return the deviations of one target's orientations from their nominal values.
+    """Return the deviations of a target's orientations from their nominal values.
 
     Args:
         file: the targets file, for messages.
-        seen: (R, 3, 3) the target's axes in the device's axes; NaN if not measured.
-        base: (3, 3) the device's axes in the base's axes.
-        nominal: (R, 3, 3) the platform's axes for the declared robot.
-        mount: the target's axes in the platform's axes; None if they are to be fitted.
+        seen: (R, 3, 3) rotation matrices from target axes to device axes; NaN if not
+            measured.
+        base: (3, 3) rotation matrix from device axes to base axes.
+        nominal: (R, 3, 3) rotation matrices from platform axes to base axes for the
+            declared robot.
+        mount: rotation matrix from target axes to platform axes; None to fit it.
 
     Returns:
         The deviations.
 
     Raises:
-        BadInput: the inverse rotations fit far better, or the orientations do not
-            follow the commands.
+        BadInput: the inverse rotations fit much better, or the orientations do not
+            agree with the commands.
     """
     best = _turns(base @ seen, nominal, mount)
     other = _turns(base @ np.swapaxes(seen, 1, 2), nominal, mount)
@@ -170,7 +173,7 @@ def turns_of(
 
 
 def _turns(read: NDArray, nominal: NDArray, mount: NDArray | None) -> Turns:
-    """Return the deviations for a declared or fitted mount, unchecked."""
+    """Return the deviations for a declared or fitted mount."""
     taken = np.isfinite(read).all(axis=(1, 2))
     seen = Rotation.from_matrix(np.swapaxes(nominal[taken], 1, 2) @ read[taken])
     if mount is None:

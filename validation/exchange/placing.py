@@ -24,28 +24,28 @@ from forcefit.validation.exchange.orientation import turns_of
 from forcefit.validation.exchange.reading import Reading
 from forcefit.validation.exchange.targets_file import TargetsFile
 
-# Scatter above this fraction of the spread of the commands is not caused by the
+# Fraction of the spread of the commands above which the scatter is not caused by the
 # machine.
 _ASTRAY = 0.1
 _HERE = DeviceFrame(np.eye(3), np.zeros(3))
 
-# A row of the campaign: index of its command, and its readings by target.
+# Rows of the campaign: the index of the command, and a mapping from target to reading.
 Rows = Sequence[tuple[int, Mapping[str, Reading]]]
 
 
 @dataclass(frozen=True, eq=False)
 class Placed:
-    """Readings, converted to deviations from the declared robot.
+    """Deviations of the readings from the declared robot.
 
     Attributes:
         frame: pose of the device.
         scatter: [m] scatter of one component of all readings.
-        read: (R, T) bool, True for targets with a plausible reading.
+        read: (R, T) bool, whether the reading of a target is plausible.
         gaps: (R, T, 3) [m] deviation of each target, base axes; NaN if not measured.
         turns: (R, 3) [rad] rotation of the platform, base axes; NaN if not measured.
         mounts: mapping from each target with measured orientation to the rotation
             vector (3,) [rad] from platform axes to target axes.
-        left_out: descriptions of omitted, impossible readings.
+        left_out: descriptions of implausible readings, which are omitted.
         remarks: descriptions of other inconsistencies.
     """
 
@@ -68,11 +68,11 @@ def place(declared: TargetsFile, commands: Commands, rows: Rows) -> Placed:
         rows: readings by command.
 
     Returns:
-        The readings, converted to deviations from the declared robot.
+        The deviations of the readings from the declared robot.
 
     Raises:
-        BadInput: the readings do not determine the device pose, or fit far better in a
-            different unit, mirrored, or with exchanged targets.
+        BadInput: the readings do not determine the device pose, or fit much better in
+            another unit, mirrored, or with exchanged targets.
     """
     names = list(declared.places)
     T = np.array([commands.postures[command].platform for command, _ in rows])
@@ -114,28 +114,28 @@ def place(declared: TargetsFile, commands: Commands, rows: Rows) -> Placed:
 
 
 def _misfit(nominal: NDArray, measured: NDArray, scatter: float) -> list[str]:
-    """Return a remark on the likely cause if readings do not follow the commands."""
+    """Return a remark on the likely cause if readings disagree with the commands."""
     spread = np.linalg.norm(nominal - nominal.mean(axis=(0, 1)), axis=2)
     reach = float(np.sqrt(np.mean(spread**2)))
     if scatter < _ASTRAY * reach:
         return []
-    reason = "check whether the readings are joined to the right commands"
-    # Distances between targets are independent of the commands.
+    reason = "check whether the readings are joined to the correct commands"
+    # Distances between targets do not depend on the commands.
     apart = np.linalg.norm(measured - np.roll(measured, 1, axis=1), axis=2)
     known = apart[np.isfinite(apart).all(axis=1)]
     if len(known) and measured.shape[1] > 1 and np.ptp(known, axis=0).max() > scatter:
         reason = (
-            "the targets' distances differ from row to row, independently of "
-            "the commands: check columns and targets"
+            "the distances between targets differ from row to row; check the columns "
+            "and targets"
         )
     return [
-        f"the readings scatter by {scatter:.3g} m about commands {reach:.3g} m apart: "
-        f"{reason}"
+        f"the scatter of the readings is {scatter:.3g} m, and the spread of the "
+        f"commands is {reach:.3g} m: {reason}"
     ]
 
 
 def _mean(turns: NDArray) -> NDArray:
-    """Return the (R, 3) mean of (R, T, 3) over the measured targets, or NaN."""
+    """Return the mean over the measured targets, (R, 3); NaN without such targets."""
     read = np.isfinite(turns).all(axis=2)
     total = np.where(read[..., None], turns, 0.0).sum(axis=1)
     count = read.sum(axis=1)[:, None]
@@ -146,7 +146,7 @@ def _turns(
     declared: TargetsFile, commands: Commands, rows: Rows, nominal: NDArray,
     frame: DeviceFrame, name: str, left_out: list[str],
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
-    """Return deviations (R, 3) [rad] from a target's orientations, and its mount."""
+    """Return the rotations (R, 3) [rad] of the platform, and the target's mount."""
     seen = np.full((len(rows), 3, 3), np.nan)
     for i, (_, readings) in enumerate(rows):
         rotation = readings[name].rotation if name in readings else None
@@ -161,8 +161,8 @@ def _turns(
         if is_gross(float(sizes[i]), turns.scatter):
             label, at = commands.ids[rows[i][0]], rows[i][1][name].place
             reason = (
-                f"found an orientation {sizes[i]:.4g} rad off, the scatter of "
-                f"the others is {turns.scatter:.2g} rad"
+                f"found a deviation of {sizes[i]:.4g} rad, expected about "
+                f"{turns.scatter:.2g} rad as for the other readings"
             )
             left_out.append(f"{at}: orientation at {quoted(label)}: {reason}")
             deviation[i] = np.nan
@@ -180,9 +180,12 @@ def _suspects(
         gap = float(np.linalg.norm(base[k] - nominal[k]))
         if order is not None and order[place] != place:
             other = quoted(names[ks[order[place]]])
-            suspects.append((k, f"it is {other}, exchanged"))
+            suspects.append((k, f"this is target {other}; targets were exchanged"))
         elif is_gross(gap, scatter):
-            reason = f"{in_unit(gap, 'mm')} off, the others {in_unit(scatter, 'mm', 2)}"
+            reason = (
+                f"deviates by {in_unit(gap, 'mm')}, other readings by "
+                f"{in_unit(scatter, 'mm', 2)}"
+            )
             suspects.append((k, reason))
     return suspects
 
@@ -198,9 +201,9 @@ def _frame(
         return _HERE, scatter_of(gaps)
     if not spans_a_plane(nominal[read]):
         raise BadInput(
-            f"{declared.file}: found only points on one line, from which the "
-            "pose of the device cannot be computed; expected other points too, "
-            'or registration = "known"'
+            f"{declared.file}: found only collinear points, which do not determine the "
+            "pose of the device; expected points that are not collinear, or "
+            'registration = "known"'
         )
     check_axes(declared.file, measured[read], nominal[read], known=False)
     order = exchanged_throughout(

@@ -12,7 +12,7 @@ from forcefit.validation.exchange.reading import Reading
 
 # Largest number of columns before the coordinates, for example a counter or a time.
 _COUNTERS = 3
-# Largest relative scatter of distances between targets for the correct columns.
+# Largest relative scatter of the distances between targets in the correct columns.
 _ALIKE = 0.1
 
 
@@ -25,9 +25,9 @@ def read_plain_rows(
 
     Args:
         values: reader of the cells' values.
-        rows: line number and cells of each row.  A row contains a name and x, y, z, or
-            only numbers: those of one point, or of all targets in order.  Additional
-            cells are ignored.
+        rows: line number and cells of each row.  A row contains either a name and x, y,
+            z, or x, y, z of one point or of all targets in order.  Additional cells are
+            ignored.
         targets: mapping from the name of each target to its position (3,) [m], platform
             axes.
 
@@ -46,17 +46,17 @@ def read_plain_rows(
 
 
 def _nameless(cells: Sequence[str], decimal: str) -> bool:
-    """Return whether a row begins with a number, or with a missing reading."""
+    """Return whether a row begins with a number or a missing number."""
     return missing(cells[0]) or bool(np.isfinite(parse_number(cells[0], decimal)))
 
 
 def _first_column(
     rows: Sequence[Sequence[str]], decimal: str, targets: Mapping[str, NDArray]
 ) -> int:
-    """Return the index of the first coordinate in purely numeric rows.
+    """Return the column of the first coordinate in rows of numbers.
 
-    A counter or a time may precede the coordinates.  The correct columns are those for
-    which the distances between targets agree with the declared distances.
+    A counter or a time may precede the coordinates.  In the correct columns, distances
+    between targets agree with the declared distances.
 
     Args:
         rows: rows of cells.
@@ -85,7 +85,7 @@ def _first_column(
 
 
 def _of_one(values: CellValues, line: int, cells: list[str], counted: bool) -> Reading:
-    """Parse a row of name, x, y, z; the name may be an integer if ``counted``."""
+    """Parse a row of name, x, y, z.  If ``counted``, the name may be an integer."""
     names, cells = [], list(cells)
     decimal = values.sheet.decimal
     while cells and not np.isfinite(parse_number(cells[0], decimal)):
@@ -106,7 +106,7 @@ def _of_all(
     values: CellValues, line: int, cells: list[str], first: int,
     targets: Mapping[str, NDArray],
 ) -> list[Reading]:  # fmt: skip
-    """Parse a numeric row with x, y, z of each target in order."""
+    """Parse a row with x, y, z of each target in order."""
     found = len(cells) - first
     if found < 3 * len(targets):
         raise BadInput(
@@ -122,7 +122,7 @@ def _of_all(
 def _reading(
     values: CellValues, line: int, xyz: list[str], names: tuple[str, ...]
 ) -> Reading:
-    """Return the reading whose x, y and z are in three adjacent cells of a row."""
+    """Return the reading with x, y and z in three adjacent cells of a row."""
     position = nothing = np.full(3, np.nan)
     if not any(map(missing, xyz)):
         numbers = [values.number(line, a, c) for a, c in zip("xyz", xyz, strict=True)]

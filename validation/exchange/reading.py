@@ -12,19 +12,19 @@ LARGEST = 1e12  # largest accepted absolute value of a number in a table
 
 @dataclass(frozen=True)
 class Writing:
-    """Declared format properties that an export does not state itself.
+    """Declared format of device exports.
 
     Attributes:
-        unit: unit of lengths; None if the header states it.
+        unit: unit of lengths; None if the header contains it.
         decimal: decimal mark of exports.
         commands_decimal: decimal mark of the table of commands.
         dates: ``"day_first"`` or ``"month_first"`` for dates with slashes; None if
             undeclared.
-        coverage: ratio of a stated uncertainty (U95, U) to one standard deviation.
+        coverage: ratio of an uncertainty U or U95 to the standard deviation.
         orientation: order of three angles (:func:`.orientation.orders`); None if
             undeclared.
-        angle_unit: unit of angles; None if the header states it.
-        oriented: whether orientations are read; otherwise they are ignored.
+        angle_unit: unit of angles; None if the header contains it.
+        oriented: whether orientations are read.
     """
 
     unit: str | None = None
@@ -48,9 +48,10 @@ class Reading:
         position: (3,) [m] position in the device's axes; NaN if the device detected no
             target.
         sigma: (3,) [m] standard deviation of each coordinate; NaN if the file does not
-            state it.
+            contain it.
         time: [s] time on the clock of the file; NaN without a time.
-        rotation: (3, 3) the target's axes in the device's axes; None if not measured.
+        rotation: (3, 3) rotation matrix from target axes to device axes; None if not
+            measured.
     """
 
     file: str
@@ -63,5 +64,5 @@ class Reading:
 
     @property
     def place(self) -> str:
-        """File, line and name, for messages."""
+        """File, line and name of the reading, for messages."""
         return f"{self.file}: line {self.line} ({quoted('::'.join(self.names))})"

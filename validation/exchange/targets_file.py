@@ -30,14 +30,14 @@ class TargetsFile:
         robot_name: name of a built-in robot, or path relative to the targets file.
         places: mapping from the name of each target to its position (3,) [m], platform
             axes.
-        registration: ``"unknown"`` if the device's pose is unknown; ``"known"`` if its
-            axes are the base's axes.
+        registration: ``"unknown"`` if the device pose is unknown; ``"known"`` if the
+            device axes are the base axes.
         window: [s] largest time between a command and its readings.
-        noise: [m] standard deviation for readings without a stated one; None if
-            undeclared.
+        noise: [m] standard deviation of readings for which the export contains none;
+            None if undeclared.
         noise_rotation: [rad] standard deviation of an orientation; None if undeclared.
-        rotations: mapping from each target with a declared mount to its rotation vector
-            (3,) [rad] from platform axes to target axes; the other mounts are fitted.
+        rotations: mapping from target to the declared rotation vector (3,) [rad] from
+            platform axes to target axes.  The rotations of other targets are fitted.
         writing: format of the exports.
     """
 

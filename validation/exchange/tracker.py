@@ -38,14 +38,14 @@ class Import:
 
     Attributes:
         robot: name of the robot.
-        how: method by which readings were assigned to commands: ``"name"``, ``"time"``
-            or ``"order"``.
+        how: method of assigning readings to commands: ``"name"``, ``"time"`` or
+            ``"order"``.
         header: columns of the table.
         cells: rows of the table.
         declaration: text of ``campaign.toml``.
         frame: pose of the device.
-        scatter: [m] scatter of one component about the declared robot.
-        readings: number of used readings.
+        scatter: [m] scatter of one component of the deviations from the declared robot.
+        readings: number of readings used.
         left_out: descriptions of the readings that were not used, with the reasons.
         mounts: mapping from each target with measured orientation to the rotation
             vector (3,) [rad] from platform axes to target axes.
@@ -86,10 +86,11 @@ class Import:
         lines = [
             f"{self.robot}: {self.readings} readings in {len(self.cells)} rows, joined "
             f"to commands by {self.how}",
-            f"scatter about the declared robot {in_unit(self.scatter, 'um')}",
+            f"scatter about the declared robot: {in_unit(self.scatter, 'um')}",
         ]
         lines += [
-            f"axes of {name} on the platform: {np.round(turn, 7).tolist()} rad"
+            f"rotation of target {name} on the platform: "
+            f"{np.round(turn, 7).tolist()} rad"
             for name, turn in self.mounts.items()
         ]
         lines += [f"left out: {line}" for line in self.left_out]
@@ -107,15 +108,15 @@ def import_readings(
         targets: the targets file (:mod:`forcefit.validation.exchange.targets_file`).
         commands: the table of commands
             (:mod:`forcefit.validation.exchange.commands_table`).
-        folder: folder to write, which must be empty or not yet exist.
+        folder: folder to write.  It must be empty or not yet exist.
 
     Returns:
         The campaign that was written.
 
     Raises:
         BadInput: a file is invalid, too many readings would be omitted, or the readings
-            fit far better in a different unit, mirrored or with exchanged targets.  No
-            file is then written.
+            fit much better in another unit, mirrored or with exchanged targets.  Then,
+            no file is written.
     """
     folder = Path(folder)
     check_new_folder(folder)
@@ -143,7 +144,7 @@ def _read(file: Path | str, declared: TargetsFile) -> list[Reading]:
 def _campaign(
     declared: TargetsFile, commands: Commands, joined: Match, folder: Path, total: int
 ) -> Import:
-    """Return the two files of the campaign as text, and the omitted readings."""
+    """Return the campaign for readings that were assigned to commands."""
     names = list(declared.places)
     placed = place(declared, commands, joined.rows)
     left_out = _left_out(joined, placed, total)
@@ -183,9 +184,9 @@ def _left_out(joined: Match, placed: Placed, total: int) -> list[str]:
     total -= len(joined.strangers) + len(joined.missing)
     if len(left_out) > _MOST_LEFT_OUT * total:
         raise BadInput(
-            f"{left_out[0]}; and {len(left_out) - 1} more of {total} readings "
-            f"are left out, expected at most {_MOST_LEFT_OUT:.0%}; check "
-            "targets, commands and units"
+            f"{left_out[0]}; {len(left_out) - 1} more of {total} readings cannot be "
+            f"used either, expected at most {_MOST_LEFT_OUT:.0%}; check targets, "
+            "commands and units"
         )
     for readings, what in (
         (joined.missing, "without coordinates"), (joined.strangers, "of no target"),

@@ -61,8 +61,10 @@ def write_bag(path, plugin, transforms):
 
 @pytest.mark.parametrize("transforms", [False, True])
 @pytest.mark.parametrize("plugin", ["SQLITE3", "MCAP"])
-def test_ros_bag_is_joined_to_commands_by_time(tmp_path, run, plugin, transforms):
-    """Double precision is preserved, so deviations are round-off."""
+def test_ros_bag_readings_are_assigned_to_commands_by_time(
+    tmp_path, run, plugin, transforms
+):
+    """Bags contain double precision, so deviations are round-off."""
     pytest.importorskip("rosbags")
     lab = Lab(tmp_path)
     lab.commands([START + 60 * k for k in range(len(ANGLES))])
@@ -78,7 +80,7 @@ def test_ros_bag_is_joined_to_commands_by_time(tmp_path, run, plugin, transforms
     assert np.abs(campaign.measured[:, 3:]).max() < 1e-12
 
 
-def test_damaged_ros_bag_is_rejected_in_one_line(tmp_path):
+def test_damaged_ros_bag_raises_a_message_of_one_line(tmp_path):
     pytest.importorskip("rosbags")
     (tmp_path / "metadata.yaml").write_text("rosbag2_bagfile_information: {}\n")
     for path in (tmp_path, tmp_path / "no.bag"):
@@ -87,9 +89,7 @@ def test_damaged_ros_bag_is_rejected_in_one_line(tmp_path):
         assert "\n" not in str(error.value)
 
 
-def test_reading_a_ros_bag_without_rosbags_names_the_package_to_install(
-    tmp_path, monkeypatch
-):
+def test_ros_bag_without_rosbags_names_the_missing_package(tmp_path, monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "rosbags.highlevel", None)
     with pytest.raises(BadInput, match=r"install forcefit\[ros\], or export"):
         read_bag(tmp_path / "lab.bag")

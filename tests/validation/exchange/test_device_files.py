@@ -1,7 +1,7 @@
-"""Exports of device programs, all with the same exact readings.
+"""Tests of exports of device programs, all with the same exact readings.
 
-The readings come from the closed form of a planar arm, so campaigns imported from any
-of these files have deviations of the order of round-off.
+The readings are computed in closed form for a planar arm, so all deviations of the
+imported campaigns are round-off.
 """
 
 import json
@@ -31,7 +31,7 @@ def lab(tmp_path):
 
 
 def imported(lab, run, text, encoding="utf-8"):
-    """Import an export and return the command's JSON."""
+    """Import an export and return the JSON output of the command."""
     lab.folder.joinpath("export.txt").write_bytes(text.encode(encoding))
     status, out, err = run(*lab.words(), "--json", "-")
     assert status == 0, err
@@ -39,7 +39,7 @@ def imported(lab, run, text, encoding="utf-8"):
 
 
 def refused(lab, run, text):
-    """Return the line that refuses an export, and check that nothing is written."""
+    """Return the error message for an export, and check that nothing is written."""
     lab.export(text)
     status, out, err = run(*lab.words())
     assert (status, out) == (2, "")
@@ -48,7 +48,7 @@ def refused(lab, run, text):
 
 
 def assert_exact(lab, readings=None):
-    """Check the number of readings and that deviations are round-off."""
+    """Check the number of readings, and that all deviations are round-off."""
     campaign = read_campaign(lab.folder / "campaign")
     assert np.nanmax(np.abs(campaign.measured[:, 3:])) < 1e-9
     if readings is not None:
@@ -56,7 +56,7 @@ def assert_exact(lab, readings=None):
 
 
 def rows(names="ABC", mark=",", line=None):
-    """x, y, z [mm] of all targets, one line for each command."""
+    """Yield lines with x, y, z [mm] of all targets, one for each command."""
     for k, angles in enumerate(ANGLES):
         cells = [repr(float(x)) for n in names for x in 1e3 * seen(angles, n)]
         yield mark.join(([line.format(k=k)] if line else []) + cells)
@@ -73,8 +73,8 @@ LEICA_ROW = (
 
 
 @pytest.mark.parametrize("encoding", ["latin-1", "utf-8-sig", "utf-16"])
-def test_leica_export_with_a_zero_uncertainty_is_read(lab, run, encoding):
-    """U(95) is two standard deviations; one shown as 0 is the device's noise."""
+def test_leica_export_with_zero_uncertainty_uses_the_noise(lab, run, encoding):
+    """U(95) is two standard deviations.  An U(95) of 0 is replaced by the noise."""
     lab.targets("A", unit=None)
     body = list(points("A", LEICA_ROW))
     body[3] = body[3].replace(",0.002,", ",0,")
@@ -90,12 +90,12 @@ def test_leica_export_with_a_zero_uncertainty_is_read(lab, run, encoding):
 
 
 def with_commas(lines):
-    """Decimal commas, as in German exports; dates keep their points."""
+    """Return lines with decimal commas, as in German exports, except in dates."""
     return [line.replace(".", ",").replace("02,03,", "02.03.") for line in lines]
 
 
 def hidden(lines):
-    """A target that was hidden in the fifth line."""
+    """Return lines without the coordinates of target A in the fifth line."""
     cells = lines[4].split(",")
     cells[2:5] = "", "", ""
     return [*lines[:4], ",".join(cells), *lines[5:]]
@@ -119,7 +119,7 @@ FARO += "Name\tX\tY\tZ\tDeviation"
 FARO_ROWS = list(points(line="p{k}::{name}\t{x!r}\t{y!r}\t{z!r}\t0.0021"))
 BLANKS = list(points(line="p{k}::{name}   {x!r}  {y!r}  {z!r}"))
 STATED, COMMA = {"unit": None}, {"unit": None, "decimal": '","'}
-# head, body, keys of the targets file
+# header, rows, and keys of the targets file
 EXPORTS = {
     "prefix": (",".join(f"{n} {a} [mm]" for n in "ABC" for a in "XYZ"), rows(), {}),
     "dots": (",".join(f"arm.{n}.{a}" for n in "ABC" for a in "xyz"), rows(), {}),
@@ -131,7 +131,7 @@ EXPORTS = {
         "Point," + ",".join(f"{n} {a} [mm]" for n in "ABC" for a in "XYZ"),
         reversed(list(rows(line="p{k}"))), {},
     ),
-    # a target that was hidden is missing
+    # the coordinates of one hidden target are missing
     "Vicon": ("\n".join(VICON), hidden(list(rows(line="{k}00,0"))), STATED),
     "Motive": ("\n".join(MOTIVE), rows(line="{k},0.{k}"), STATED),
     "German": ("Punkt;X [mm];Y [mm];Z [mm];Datum;Uhrzeit", GERMAN, COMMA),
@@ -143,7 +143,7 @@ EXPORTS = {
     "blanks": ("Point Name    X          Y          Z", BLANKS, {}),
     "blanks, units": ("Point  X [mm]  Y [mm]  Z [mm]", BLANKS, {}),
     "blank, units": ("Point X [mm] Y [mm] Z [mm]", BLANKS, {}),
-    # the commands are separated by commas and have points
+    # the table of commands has commas as separators and decimal points
     "commas": ("Point;X [mm];Y [mm];Z [mm]",
                with_commas(points(line="p{k}::{name};{x!r};{y!r};{z!r}")), COMMA),
 }  # fmt: skip
@@ -153,7 +153,7 @@ EXPORTS = {
 
 
 @pytest.mark.parametrize("name", EXPORTS)
-def test_export_of_a_device_program_is_read_exactly(lab, run, name):
+def test_imported_export_of_a_device_program_has_no_deviations(lab, run, name):
     head, body, keys = EXPORTS[name]
     lab.targets(**keys)
     encoding = "utf-8-sig" if name == "commas" else "utf-8"
@@ -175,14 +175,14 @@ def test_export_of_a_device_program_is_read_exactly(lab, run, name):
 
 @pytest.mark.parametrize("before", [None, "{k}", "{k}.5"])
 def test_rows_without_names_are_assigned_to_targets_in_order(lab, run, before):
-    """A preceding counter or time is recognised by the distances between targets."""
+    """Distances between targets show whether a counter or a time comes first."""
     body = [row + ",35.1,-2.5,0.4" for row in rows(line=before)]
     assert imported(lab, run, "\n".join(body))["readings"] == 39
     assert_exact(lab, 39)
 
 
-def test_motive_rigid_body_is_read_without_its_markers(lab, run):
-    """Its rotation is a quaternion x, y, z, w; its markers also have its name."""
+def test_motive_rigid_body_is_imported_without_its_markers(lab, run):
+    """The rotation is a quaternion x, y, z, w.  The markers also have the name A."""
     lab.targets("A", unit=None, noise_rotation=1e-4)
     kinds = ["Rotation"] * 4 + ["Position"] * 6
     head = [
@@ -202,7 +202,7 @@ def test_motive_rigid_body_is_read_without_its_markers(lab, run):
     assert_exact(lab, 13)
 
 
-def test_numbers_with_decimal_comma_in_quotes_are_read_between_commas(lab, run):
+def test_quoted_numbers_with_decimal_comma_are_read(lab, run):
     lab.targets(decimal='{ export = ",", commands = "." }')
     line = 'p{k}::{name},"{x!r}","{y!r}","{z!r}"'
     body = [row.replace(".", ",") for row in points(line=line)]
@@ -210,7 +210,7 @@ def test_numbers_with_decimal_comma_in_quotes_are_read_between_commas(lab, run):
     assert_exact(lab, 39)
 
 
-def test_decimal_separator_is_declared_for_each_table(lab, run):
+def test_decimal_mark_is_declared_for_each_table(lab, run):
     text = (lab.folder / "commands.csv").read_text().replace(",", ";")
     (lab.folder / "commands.csv").write_text(text)
     body = [
@@ -223,8 +223,8 @@ def test_decimal_separator_is_declared_for_each_table(lab, run):
     assert_exact(lab, 39)
 
 
-def test_time_of_the_commands_reaches_the_campaign(lab, run):
-    """The export has no time; the table of commands has one, in minutes."""
+def test_campaign_contains_the_times_of_the_commands(lab, run):
+    """Only the table of commands contains times, in minutes."""
     lab.commands([str(0.5 * k) for k in range(13)], head="id,q.one,q.two")
     text = (lab.folder / "commands.csv").read_text().replace("time", "time [min]")
     (lab.folder / "commands.csv").write_text(text)
@@ -241,7 +241,7 @@ def test_time_of_the_commands_reaches_the_campaign(lab, run):
     ("cov.temperature [kg]", 'found the unit "kg"'),
     ("load.fx [mm]", 'found the unit "mm"'),
 ])  # fmt: skip
-def test_units_of_commands_must_match_their_quantity(lab, run, column, message):
+def test_unit_of_another_quantity_in_commands_is_rejected(lab, run, column, message):
     lab.commands(range(13))
     path = lab.folder / "commands.csv"
     path.write_text(path.read_text().replace("time", column), encoding="utf-8")
@@ -256,10 +256,8 @@ def test_units_of_commands_must_match_their_quantity(lab, run, column, message):
 
 
 @pytest.mark.parametrize("nothing", ["NaN", "", "-", "#N/A"])
-def test_reading_without_coordinates_is_missing_but_counts_in_the_order(
-    lab, run, nothing
-):
-    """Joined by order, later readings belong to later commands."""
+def test_reading_without_coordinates_is_omitted_from_the_campaign(lab, run, nothing):
+    """Readings are joined by order, so a missing reading must not shift the others."""
     lab.targets("A")
     body = list(points("A", "A;{x!r};{y!r};{z!r}"))
     body[6] = f"A;{nothing};{nothing};{nothing}"
@@ -270,7 +268,7 @@ def test_reading_without_coordinates_is_missing_but_counts_in_the_order(
     assert "p6" not in lab.table()["id"]
 
 
-def test_repeated_reading_is_left_out_and_reported(lab, run):
+def test_repeated_reading_is_omitted_and_reported(lab, run):
     body = list(points(line=SPATIAL_ANALYZER))
     table = imported(lab, run, "\n".join([*body, body[4]]))
     assert table["readings"] == 39
@@ -278,8 +276,8 @@ def test_repeated_reading_is_left_out_and_reported(lab, run):
     assert 'line 40 ("Main::p1::B"): this reading occurs twice' in line
 
 
-def test_surplus_reading_is_rejected_with_its_line(lab, run):
-    """Joined by order, a repeated line shifts all later readings."""
+def test_surplus_reading_is_reported_with_its_line(lab, run):
+    """Readings are joined by order, so a repeated line would shift the others."""
     body = list(points("A", "{name} {x!r} {y!r} {z!r}"))
     lab.targets("A")
     line = refused(lab, run, "\n".join([*body[:6], body[5], *body[6:]]))
@@ -292,17 +290,17 @@ def test_duplicate_commands_are_reported(lab, run):
     text = path.read_text()
     path.write_text(text.replace("p5", "p3"))
     body = "\n".join(points(line=SPATIAL_ANALYZER))
-    expected = 'line 7, id: found "p3", already the label of line 5'
+    expected = 'line 7, id: found "p3", which is already the label of line 5'
     assert expected in refused(lab, run, body)
     path.write_text(text.replace("q.two", "q.one"))
     assert 'found column "q.one" twice' in refused(lab, run, body)
 
 
-# -- lengths and axes with a wrong interpretation -------------------------------------
+# -- wrong units and wrong axes -------------------------------------------------------
 
 
 def changed(change):
-    """An export whose points, in mm, were changed."""
+    """Return an export with a change of every point, device axes."""
     return "\n".join(points(line=SPATIAL_ANALYZER, change=lambda k, n, p: change(p)))
 
 
@@ -312,13 +310,13 @@ def changed(change):
     (1e-3, "if multiplied by 1000, as m taken for mm"),
     (1 / 304.8, "if multiplied by 304.8, as ft taken for mm"),
 ])  # fmt: skip
-def test_lengths_in_a_wrong_unit_are_rejected_with_the_factor(lab, run, factor, words):
+def test_wrong_unit_of_lengths_is_rejected_with_the_factor(lab, run, factor, words):
     line = refused(lab, run, changed(lambda p: factor * p))
     assert f"unit: the readings fit much better {words}" in line
 
 
 @pytest.mark.parametrize("axis", range(3))
-def test_left_handed_coordinates_are_rejected(lab, run, axis):
+def test_left_handed_axes_are_rejected(lab, run, axis):
     mirror = np.ones(3)
     mirror[axis] = -1
     line = refused(lab, run, changed(lambda p: mirror * p))
@@ -329,8 +327,8 @@ def test_left_handed_coordinates_are_rejected(lab, run, axis):
     (lambda p: p * [1, -1, 1], "if y is the device's -y"),
     (lambda p: p[[1, 0, 2]], "if x is the device's y, y is the device's x"),
 ])  # fmt: skip
-def test_reversed_axis_of_a_known_registration_is_reported(lab, run, change, words):
-    """The base axes are known."""
+def test_wrong_axes_of_a_known_registration_are_reported(lab, run, change, words):
+    """The registration of the device is known."""
     lab.targets(registration='"known"')
 
     def base(k, name, p):
@@ -350,7 +348,7 @@ def test_targets_declared_in_millimetres_are_rejected_with_the_factor(lab, run):
 
 
 def moved_mount(k, name, p):
-    """B is mounted 60 mm from its declared place."""
+    """Return the position of a target, with target B moved by 60 mm."""
     turn = Rotation.from_euler("z", sum(ANGLES[k]))
     return p + (name == "B") * TURN.inv().apply(turn.apply([0, 0.06, 0]))
 
@@ -366,7 +364,7 @@ REMARKS = {
     "other order": ("A", SHUFFLED[::2] + SHUFFLED[1::2],
         "check whether the readings are joined"),
     "no targets": ("ABC", points(line=SPATIAL_ANALYZER, change=no_target),
-        "distances differ from row to row, independently"),
+        "the distances between targets differ from row to row"),
 }  # fmt: skip
 
 
@@ -381,7 +379,7 @@ def test_readings_that_do_not_match_targets_or_commands_are_reported(lab, run, c
 
 
 @pytest.mark.parametrize("piece", ["[", "(", " [", "0", "<body>"])
-def test_very_long_cell_is_rejected_with_its_line(lab, run, piece):
+def test_very_long_cell_is_reported_with_its_line(lab, run, piece):
     lines = list(points(line=SPATIAL_ANALYZER))
     lines[1] += piece * 200_000 + "x"
     line = refused(lab, run, "\n".join(lines))
@@ -390,17 +388,17 @@ def test_very_long_cell_is_rejected_with_its_line(lab, run, piece):
 
 # -- orientations ---------------------------------------------------------------------
 
-MOUNT = Rotation.from_rotvec([0.3, 0.2, -0.5])  # the target's axes on the platform
+MOUNT = Rotation.from_rotvec([0.3, 0.2, -0.5])  # rotation of the target on the platform
 
 
 def oriented(k, error=(0, 0, 0)):
-    """The target's axes seen from the device's, of the closed form."""
+    """Return the rotation of the target in device axes, in closed form."""
     turned = Rotation.from_rotvec(error) * Rotation.from_euler("z", sum(ANGLES[k]))
     return TURN.inv() * turned * MOUNT
 
 
 def oriented_rows(values, errors=((0, 0, 0),) * 13):
-    """Rows of target A with what an orientation is written as."""
+    """Yield rows with the position and orientation of target A."""
     for k, angles in enumerate(ANGLES):
         cells = [*(1e3 * seen(angles, "A")), *values(oriented(k, errors[k]))]
         yield ",".join(repr(float(x)) for x in cells)
@@ -429,8 +427,8 @@ ORIENTATIONS = {
 
 @pytest.mark.filterwarnings("ignore:Gimbal")
 @pytest.mark.parametrize("kind", ORIENTATIONS)
-def test_target_orientations_become_rotations_of_the_platform(lab, run, kind):
-    """The mount of the target is found from commanded poses."""
+def test_target_orientations_are_converted_to_platform_rotations(lab, run, kind):
+    """The rotation of the target on the platform is fitted."""
     head, values, keys = ORIENTATIONS[kind]
     lab.targets("A", noise_rotation=1e-4, **keys)
     text = "\n".join(["X,Y,Z," + head, *oriented_rows(values)])
@@ -441,7 +439,7 @@ def test_target_orientations_become_rotations_of_the_platform(lab, run, kind):
     assert (campaign.sigma[:, :3] == 1e-4).all()
 
 
-def test_rotations_relative_to_a_declared_mount_are_unchanged(lab, run, rng):
+def test_rotation_errors_are_recovered_with_a_declared_mount(lab, run, rng):
     head, values, _ = ORIENTATIONS["quaternion"]
     lab.targets("A", noise_rotation=1e-4)
     with (lab.folder / "smr.toml").open("a") as file:
@@ -473,15 +471,15 @@ def test_ambiguous_orientations_are_rejected(lab, run, head, values, keys, messa
     assert message in refused(lab, run, text)
 
 
-def test_orientations_without_stated_noise_are_ignored(lab, run):
+def test_orientations_without_declared_noise_are_ignored(lab, run):
     head, values, _ = ORIENTATIONS["quaternion"]
     lab.targets("A")
     imported(lab, run, "\n".join(["X,Y,Z," + head, *oriented_rows(values)]))
     assert not [name for name in lab.table() if name.startswith("meas.r")]
 
 
-def test_orientation_of_one_target_is_that_of_the_platform(lab, run):
-    """In a wide table A has a quaternion, B and C are points."""
+def test_platform_rotation_equals_orientation_of_one_target(lab, run):
+    """Each row contains a quaternion of A and points of B and C."""
     head = "A x,A y,A z,A qw,A qx,A qy,A qz,B x,B y,B z,C x,C y,C z"
     lab.targets(noise_rotation=1e-4)
     body = []

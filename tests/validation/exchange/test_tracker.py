@@ -1,4 +1,4 @@
-"""Import of tracker files as a campaign, with a known device frame."""
+"""Tests of the import of tracker files as a campaign, with a known device frame."""
 
 import csv
 import json
@@ -18,7 +18,7 @@ SHIFT = np.array([2.0, -3.0, 0.7])
 
 
 def attained(angles, place):
-    """(3,) [m] a target of the planar arm, from its closed form."""
+    """Return the position of a target on the planar arm, base axes, (3,) [m]."""
     one, two = angles
     turn = Rotation.from_euler("z", one + two)
     elbow = np.array([np.cos(one), np.sin(one), 0.0])
@@ -26,7 +26,7 @@ def attained(angles, place):
 
 
 def seen(angles, name):
-    """(3,) [m] the same in the device's axes."""
+    """Return the position of a target in device axes, (3,) [m]."""
     return TURN.inv().apply(attained(angles, TARGETS[name]) - SHIFT)
 
 
@@ -55,18 +55,18 @@ class Lab:
         (self.folder / "commands.csv").write_text("\n".join([head, *rows]) + "\n")
 
     def export(self, text, name="export.txt"):
-        """Write a device's file."""
+        """Write a file of the device."""
         (self.folder / name).write_text(text)
 
     def words(self, *files):
-        """The command's words."""
+        """Return the arguments of the import command."""
         f = self.folder
         paths = [f / name for name in files or ("export.txt",)]
         return ["validation", "import", *paths, "--targets", f / "smr.toml",
                 "--commands", f / "commands.csv", "-o", f / "campaign"]  # fmt: skip
 
     def table(self):
-        """Columns of the campaign that was written."""
+        """Return the columns of the imported campaign."""
         with (self.folder / "campaign" / "measurements.csv").open() as file:
             rows = list(csv.DictReader(file))
         return {k: [row[k] for row in rows] for k in rows[0]}
@@ -78,7 +78,7 @@ def lab(tmp_path):
 
 
 def points(names="ABC", line="{name}", change=lambda k, name, p: p):
-    """Lines of an export: one for each command and target; lengths in mm."""
+    """Yield the lines of an export, one for each command and target, in mm."""
     for k, angles in enumerate(ANGLES):
         for name in names:
             x, y, z = (1e3 * change(k, name, seen(angles, name))).tolist()
@@ -88,8 +88,8 @@ def points(names="ABC", line="{name}", change=lambda k, name, p: p):
 SPATIAL_ANALYZER = "Main::p{k}::{name}, {x!r}, {y!r}, {z!r}"
 
 
-def test_spatial_analyzer_text_is_joined_to_commands_by_name(lab, run):
-    """With exact readings, deviations are round-off and the device frame is found."""
+def test_spatial_analyzer_readings_are_assigned_to_commands_by_name(lab, run):
+    """For exact readings, deviations are round-off."""
     lab.export("// a comment\n" + "\n".join(points(line=SPATIAL_ANALYZER)))
     status, out, err = run(*lab.words(), "--json", "-")
     assert status == 0, err
@@ -110,7 +110,7 @@ def test_spatial_analyzer_text_is_joined_to_commands_by_name(lab, run):
 
 
 def test_import_with_diagnose_writes_a_report(lab, run):
-    """Readings of the declared arm with noise."""
+    """The readings of the declared arm contain only noise."""
     noise = np.random.default_rng(1).normal(size=(len(ANGLES), 3))
     lab.export("\n".join(points(
         "A", "p{k}, {x!r}, {y!r}, {z!r}", lambda k, name, p: p + 1e-5 * noise[k]
@@ -129,8 +129,8 @@ def test_import_with_diagnose_writes_a_report(lab, run):
     assert report.stat().st_size < 5e6
 
 
-def test_german_table_with_times_and_uncertainty_is_read(lab, run):
-    """Semicolons, decimal commas, dates with dots; U95 is two standard deviations."""
+def test_german_export_with_times_and_uncertainty_is_read(lab, run):
+    """U95 is two standard deviations."""
     lab.targets("A", unit=None, noise=None, decimal='","')
     lab.commands([f"22.11.2026 10:{k:02d}:00" for k in range(13)])
     text = (lab.folder / "commands.csv").read_text().replace(",", ";")
@@ -148,7 +148,7 @@ def test_german_table_with_times_and_uncertainty_is_read(lab, run):
     campaign = read_campaign(lab.folder / "campaign")
     assert campaign.reference_point == pytest.approx(TARGETS["A"])
     assert np.abs(campaign.measured[:, 3:]).max() < 1e-12
-    # a variance along a base axis: the device's, turned
+    # variances along the base axes, from those along the device axes
     variance = TURN.as_matrix() ** 2 @ (np.array([15e-6, 20e-6, 25e-6]) ** 2)
     assert campaign.sigma[:, 3:] == pytest.approx(
         np.tile(np.sqrt(variance), (13, 1)), rel=1e-9
@@ -156,7 +156,7 @@ def test_german_table_with_times_and_uncertainty_is_read(lab, run):
     assert campaign.covariates["time"] == pytest.approx(60.0 * np.arange(13))
 
 
-def test_deviations_with_a_known_registration_are_unchanged(lab, run):
+def test_deviations_are_recovered_with_a_known_registration(lab, run):
     lab.targets("B", registration='"known"', unit='"m"')
     lines = [
         "B\t{}\t{}\t{}".format(*(attained(a, TARGETS["B"]) + [1e-4, 2e-4, k * 1e-6]))
@@ -169,8 +169,8 @@ def test_deviations_with_a_known_registration_are_unchanged(lab, run):
     assert campaign.measured[:, 3:] == pytest.approx(np.array(expected), abs=1e-14)
 
 
-def test_exchanged_targets_and_outliers_are_left_out_and_reported(lab, run, rng):
-    """At p3 the targets A and B are exchanged, at p7 C is 30 mm off."""
+def test_exchanged_targets_and_outliers_are_omitted_and_reported(lab, run, rng):
+    """Targets A and B are exchanged at p3, and C deviates by 30 mm at p7."""
 
     def change(k, name, p):
         if k == 3 and name in "AB":
@@ -182,9 +182,9 @@ def test_exchanged_targets_and_outliers_are_left_out_and_reported(lab, run, rng)
     left_out = json.loads(out)["left_out"]
     assert status == 0
     assert len(left_out) == 3
-    assert '"Main::p3::A"): command "p3": it is "B", exchanged' in left_out[0]
-    assert 'command "p3": it is "A", exchanged' in left_out[1]
-    assert 'command "p7": 30 mm off' in left_out[2]
+    assert '"Main::p3::A"): command "p3": this is target "B"' in left_out[0]
+    assert 'command "p3": this is target "A"; targets were exch' in left_out[1]
+    assert 'command "p7": deviates by 30 mm, other readings by' in left_out[2]
     columns = lab.table()
     row = columns["id"].index("p3")
     assert columns["meas.A.tx"][row] == columns["meas.B.tx"][row] == ""
@@ -201,8 +201,8 @@ def test_targets_exchanged_in_every_row_are_rejected(lab, run):
     assert not (lab.folder / "campaign").exists()
 
 
-def test_readings_are_joined_by_order_and_repeated_files_become_repeats(lab, run):
-    """Names without commands are joined by order; two files have the same points."""
+def test_files_with_the_same_points_become_repeated_rows(lab, run):
+    """Names without a command are joined by order.  Two files have the same points."""
     lab.export("\n".join(points(line="{name} {x!r} {y!r} {z!r}")))
     assert run(*lab.words())[0] == 0
     lab.folder.joinpath("campaign/measurements.csv").unlink()
@@ -215,8 +215,8 @@ def test_readings_are_joined_by_order_and_repeated_files_become_repeats(lab, run
 
 
 @pytest.mark.parametrize("line", ["p{k}_{name}", "{name} p{k}", "run-p{k}.{name}"])
-def test_names_with_any_separator_are_assigned_to_targets_and_commands(line, lab, run):
-    """The rows are not in the order of the commands; p1 is not read from p10."""
+def test_names_with_any_separator_identify_target_and_command(line, lab, run):
+    """The rows are in reverse order, and p1 must not be found in p10."""
     rows = [
         ";".join([
             line.format(k=k, name=name),
@@ -286,7 +286,7 @@ def test_import_does_not_overwrite_a_campaign(lab, run):
     assert "expected a new folder" in err
 
 
-def test_import_reports_ground_points_and_unmatched_names(lab, run):
+def test_import_reports_ground_points_and_unknown_names(lab, run):
     lines = list(points(line=SPATIAL_ANALYZER))
     lines[5] = lines[5].replace("p1", "pl")
     lab.export("\n".join(["Ground::nest1, 1, 2, 3", *lines]))
@@ -323,5 +323,5 @@ def test_readings_far_from_any_command_are_reported(lab, run):
     ("10:30:00,25", 37800.25, None),
     ("1.1.1970 00:01:00.123456789", 60.123456, None),
 ])  # fmt: skip
-def test_times_of_every_notation_are_read(text, seconds, dates):
+def test_time_in_every_notation_is_converted_to_seconds(text, seconds, dates):
     assert parse_time("", text, Writing(dates=dates)) == seconds
