@@ -24,7 +24,7 @@ def beam_span(frame: Frame, link: BeamLink) -> tuple[float, NDArray]:
 
 
 def beam_axes(x: NDArray, up: Sequence[float] | None) -> NDArray:
-    """Return the axes of a beam as columns: along the beam, across, and up."""
+    """Return the axes of a beam as columns, in the order along, across and up."""
     x = x / np.linalg.norm(x)
     if up is None:
         up = (0.0, 0.0, 1.0) if math.hypot(x[0], x[2]) < 1e-9 else (0.0, 1.0, 0.0)
@@ -34,11 +34,11 @@ def beam_axes(x: NDArray, up: Sequence[float] | None) -> NDArray:
 
 
 def element_stiffness(link: BeamLink, step: float) -> NDArray:
-    """Return corrected EA, GA_y, GA_z, GJ, EI_y, EI_z for elements of a given length.
+    """Return EA, GA_y, GA_z, GJ, EI_y and EI_z of beam elements of a given length.
 
-    An element of constant strain neglects the deflection step^3 / 12 EI of its own
-    bending.  With the shear stiffness reduced accordingly, the tip deflection of a
-    cantilever is exact for any number of elements.
+    An element of constant strain lacks the bending deflection step^3 / 12 EI.  The
+    shear stiffness is reduced to include it.  The tip deflection of a cantilever is
+    then exact for any number of elements.
 
     Args:
         link: the beam.
@@ -50,7 +50,7 @@ def element_stiffness(link: BeamLink, step: float) -> NDArray:
     section = declared_section(link.section, link.poisson)
     E, G = link.young, link.young / (2 * (1 + link.poisson))
     bending = E * np.array([section.I_y, section.I_z])
-    shear = step**2 / (12 * bending[::-1])  # a force along y bends about z
+    shear = step**2 / (12 * bending[::-1])  # a force along y causes bending about z
     if link.theory == "timoshenko":
         shares = np.array([section.shear_y, section.shear_z])
         shear = shear + 1 / (G * section.area * shares)

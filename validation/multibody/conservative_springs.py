@@ -2,14 +2,12 @@
 
 The energy of a spring is s.K s / 2, where s is the logarithm of the motion between its
 ends.  Exudyn applies the wrench K s half-way between the ends.  This wrench equals the
-gradient only to first order in the deformation.  The resulting error in forces, and in
-the stiffness of a robot with deformed springs, is of second order in the rotation. This
-module computes the exact gradient with the inverse of the derivative of the exponential
-map.  A screw is a dual vector, so the translational part of this inverse is the
-derivative of its rotational part along the translation.
+gradient of the energy only to first order in the deformation.  This module computes the
+exact gradient with the inverse of the derivative of the exponential map.  A screw is a
+dual vector, so the translational part of this inverse is the derivative of its
+rotational part along the translation.
 
-Exudyn calls these functions about a hundred thousand times, so vectors are tuples,
-which are faster.
+Vectors are tuples for speed, because Exudyn calls these functions about 100 000 times.
 
 Sources:
     Selig (2005), Geometric fundamentals of robotics, section 4.5 (the series in
@@ -22,7 +20,7 @@ from collections.abc import Sequence
 _Vector = tuple[float, float, float]
 _BERNOULLI = (1 / 6, -1 / 30, 1 / 42, -1 / 30, 5 / 66, -691 / 2730, 7 / 6,
               -3617 / 510, 43867 / 798, -174611 / 330)  # fmt: skip
-# Coefficients of 1 - t/2 cot(t/2) over t^2, as a power series in t^2.  For rotations
+# Coefficients of the power series of (1 - t/2 cot(t/2)) / t^2 in t^2.  For rotations
 # below one radian, the error is below (1 / 2 pi)^22.
 _SERIES = tuple(
     abs(B) / math.factorial(2 * k) for k, B in enumerate(_BERNOULLI, 1)
@@ -38,10 +36,9 @@ def middle_wrench(K: Sequence[Sequence[float]], screw: Sequence[float]) -> list[
         screw: (6,) [rad, m] logarithm of the motion from the near end to the far end.
 
     Returns:
-        (6,) [N m, N] wrench, the gradient of screw.K screw / 2, in the mean axes of
-        both ends.  Exudyn applies the wrench at half of the screw's translation, along
-        these axes, from the near end.  At the far end, :func:`far_couple` must be
-        added.
+        Wrench in the mean axes of both ends, (6,) [N m, N], the gradient of screw.K
+        screw / 2.  Its point is the near end plus half of the screw's translation
+        along these axes.  At the far end, :func:`far_couple` must be added.
     """
     a, b, c, d, e, g = screw
     w, v = (a, b, c), (d, e, g)
@@ -72,10 +69,10 @@ def middle_wrench(K: Sequence[Sequence[float]], screw: Sequence[float]) -> list[
 def far_couple(screw: Sequence[float], force: Sequence[float]) -> list[float]:
     """Return the couple that Exudyn omits at the far end of a spring.
 
-    Exudyn applies the wrench at half of the screw's translation from either end.  These
-    two points coincide only without a rotation.  Perpendicular to the rotation axis, a
-    chord is shorter than its arc by the factor sin(t/2) / (t/2).  Therefore the
-    wrenches on the two ends are not exactly opposite.
+    For each end, Exudyn applies the wrench at a distance of half of the screw's
+    translation.  If the ends rotate by t relative to each other, these two points
+    differ, because the chord of an arc is shorter than the arc by the factor sin(t/2) /
+    (t/2).  This difference causes a couple.
 
     Args:
         screw: (6,) [rad, m] logarithm of the motion from the near end to the far end.
@@ -89,8 +86,7 @@ def far_couple(screw: Sequence[float], force: Sequence[float]) -> list[float]:
     turn = math.hypot(*w)
     if not turn:
         return [0.0] * 3
-    # For x below about half a radian, sin x / x - 1 is computed by its series to avoid
-    # cancellation.
+    # For small x, sin x / x - 1 is computed by its series to avoid cancellation.
     x = turn * turn / 4
     short = -x / 6 * (1 - x / 20 * (1 - x / 42 * (1 - x / 72 * (1 - x / 110))))
     along = sum(p * q for p, q in zip(w, v, strict=True)) / (turn * turn)
@@ -100,7 +96,7 @@ def far_couple(screw: Sequence[float], force: Sequence[float]) -> list[float]:
 
 
 def _power_series(factors: Sequence[float], x: float) -> float:
-    """Return the sum of factors times increasing powers of x."""
+    """Return the value of a polynomial in x with given coefficients."""
     value = 0.0
     for factor in reversed(factors):
         value = factor + x * value
@@ -108,7 +104,7 @@ def _power_series(factors: Sequence[float], x: float) -> float:
 
 
 def _turned_back(w: _Vector, turn: float, vector: _Vector) -> _Vector:
-    """Return a vector in axes that are rotated by half of w."""
+    """Return the components of a vector in axes rotated by half of w."""
     half = turn / 2
     first = math.sin(half) / turn if turn else 0.5
     second = 2 * (math.sin(half / 2) / turn) ** 2 if turn else 0.125

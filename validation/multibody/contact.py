@@ -1,15 +1,14 @@
 """Model joint clearances as smooth, conservative contacts.
 
-Joints move freely within bounds, called cones.  (TX, TY) and (RX, RY) are bounded by
-discs, and TZ and RZ by intervals.  Alternatively, (TX, TY, TZ) is bounded by a ball.
-At distance r from the middle of a cone of size c,
+Joints move freely within bounds, called cones.  The bounds are discs for (TX, TY) and
+(RX, RY), and intervals for TZ and RZ.  Alternatively, the bound for (TX, TY, TZ) is a
+ball.  At distance r from the middle of a cone of size c,
 
     x = (r^2 - c^2) / 2c,   P = (x + sqrt(x^2 + w^2)) / 2,   energy = k P^2 / 2,
 
-so the force is k P P' r / c.  The force is nearly zero inside, is that of a stiff
-spring outside, and is smooth everywhere.  Smoothing r - c instead would be singular at
-the middle.  The width w, relative to c, starts at 3, which weakly centres the joint,
-and is then reduced to 3e-4.
+where k is the stiffness of the contact.  The force k P P' r / c is smooth.  It is
+nearly zero inside the cone, and that of a stiff spring outside.  The width w of the
+smoothing, relative to c, is reduced from 3 to 3e-4 during the solution.
 
 A pin in two bushes has contacts at z = +h and z = -h.  At each contact, a disc bounds
 the position of the pin's axis, (TX + h RY, TY - h RX).  The two discs replace the
@@ -24,9 +23,9 @@ from forcefit.assembly.model.robot import Clearance, Frame
 
 TURN_STIFFNESS = 1e9  # [N m/rad] rotational stiffness of the contact
 SHIFT_STIFFNESS = 1e12  # [N/m] translational stiffness of the contact
-# [-] First and last width of the smoothing, relative to the size of the cone.
+# [-] Initial and final width of the smoothing, relative to the size of the cone.
 WIDE, NARROW = 3.0, 3e-4
-_UNBOUNDED = 0.5  # [rad, m] larger bounds are checked after the solution
+_UNBOUNDED = 0.5  # [rad, m] bound above which a motion is modelled as unbounded
 _CONES = (
     ("tilt", (0, 1)), ("spin", (2,)), ("radial", (3, 4)), ("axial", (5,)),
     ("ball", (3, 4, 5)),
@@ -38,7 +37,7 @@ class ClearanceCone:
     """A disc, an interval or a ball that bounds components of a screw.
 
     Attributes:
-        rows: rows of the screw that the cone bounds together.
+        rows: indices of the screw components that the cone bounds.
         size: [rad or m] bound, > 0.
         stiffness: [N m/rad or N/m] stiffness of the contact.
         arm: [m] distance along z from the middle of the joint to the contact, for
@@ -65,8 +64,8 @@ class JointClearance:
     """Motions of a joint that do not deform its springs.
 
     Attributes:
-        cones: the bounds on the motions.
-        free: rows of the screw that are not bounded.
+        cones: bounds on the motions.
+        free: indices of the screw components without a bound.
     """
 
     cones: tuple[ClearanceCone, ...]
@@ -79,7 +78,7 @@ class JointClearance:
 
     @property
     def unlocked(self) -> tuple[int, ...]:
-        """Rows of the screw that are not locked."""
+        """Indices of the screw components that are not locked."""
         bounded = {row for cone in self.cones for row in cone.rows}
         tilting = {row for cone in self.cones if cone.arm for row in (0, 1)}
         return tuple(sorted(bounded | tilting | {*self.free}))
@@ -88,18 +87,17 @@ class JointClearance:
 def joint_clearance(
     frame: Frame, scale: float = 1.0, bushes: bool = False
 ) -> JointClearance:
-    """Return the clearances of a frame's joint, and its motion if it is unsprung.
+    """Return the clearances of a frame's joint and its free motion.
 
     Args:
         frame: frame of a robot.
         scale: factor on the clearances.
-        bushes: whether a joint with both radial clearance and tilt is modelled as a pin
-            in two bushes.  Each bush has the radial clearance, and the distance of the
-            bushes follows from the tilt.
+        bushes: whether a joint with radial clearance and tilt is modelled as a pin in
+            two bushes.  Each bush has the radial clearance, and the distance between
+            the bushes is computed from the tilt.
 
     Returns:
-        The clearance, with every row locked if the joint has neither clearance nor free
-        motion.
+        The clearance.  Without clearance and free motion, every component is locked.
     """
     given = frame.clearance or Clearance()
     moves = frame.passive and not frame.compliant
@@ -131,8 +129,8 @@ def cone_forces(
         width: [-] width of the smoothing, relative to the size of the cone.
 
     Yields:
-        Rows of the screw, and the components [N m or N] of the contact force along
-        these rows.  The force is the gradient of the energy.
+        Indices of the bounded screw components, and the contact force [N m or N] along
+        them, which is the gradient of the energy.
     """
     offsets = cone.offsets(screw)
     P, root = _overlap(cone, offsets, width)
@@ -152,11 +150,10 @@ def cone_energy(cone: ClearanceCone, screw: Sequence[float], width: float) -> fl
 def _overlap(
     cone: ClearanceCone, offsets: list[float], width: float
 ) -> tuple[float, float]:
-    """Return P and sqrt(x^2 + w^2) as defined in the module's docstring."""
+    """Return P and sqrt(x^2 + w^2), which the module's docstring defines."""
     squared = sum(u * u for u in offsets)
     x = (squared - cone.size**2) / (2 * cone.size)
     w = width * cone.size
     root = math.hypot(x, w)
-    # (x + root) / 2, rearranged to avoid cancellation for x << 0, that is, inside the
-    # clearance.
+    # (x + root) / 2 is rearranged for x < 0 to avoid cancellation.
     return (x + root if x > 0 else w * w / (root - x)) / 2, root

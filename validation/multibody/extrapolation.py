@@ -1,10 +1,9 @@
 """Extrapolate central differences to zero step and estimate the uncertainty.
 
-The error of a central difference consists of a truncation error, proportional to the
-square of the step, and of round-off, proportional to its inverse.  Each pair of
-neighbouring steps is extrapolated to zero step.  The result is the extrapolated value
-that differs least from the preceding one, and this difference is the estimated
-uncertainty.
+The truncation error of a central difference is proportional to the square of the step,
+and its round-off error to the inverse of the step.  Each pair of consecutive steps is
+extrapolated to zero step.  The result is the extrapolated value with the smallest
+difference from the preceding one.  This difference is the estimated uncertainty.
 
 Sources:
     Ridders (1982), Accurate computation of F'(x) and F'(x) F''(x).
@@ -20,14 +19,14 @@ from numpy.typing import NDArray
 def without_squares(
     steps: Sequence[float], differences: Sequence[NDArray]
 ) -> list[NDArray]:
-    """Return neighbouring differences extrapolated to zero step.
+    """Extrapolate pairs of consecutive central differences to zero step.
 
     Args:
         steps: k decreasing steps.
         differences: central differences of equal shape, one for each step.
 
     Returns:
-        k - 1 arrays, free of the error term proportional to the square of the step.
+        k - 1 arrays without the error term proportional to the square of the step.
     """
     squares = [(one / two) ** 2 for one, two in pairwise(steps)]
     pairs = zip(squares, pairwise(differences), strict=True)

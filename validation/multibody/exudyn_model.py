@@ -1,10 +1,8 @@
 """Build an Exudyn model of bodies, springs, contacts, closures and loads.
 
-Bodies are massless for the static solver.  A place is a coordinate frame fixed to a
-body.  Elastic parts and locked joints connect two places.  Exudyn orders screws and
-wrenches as [T R].  Arguments and results of this module are [R T] as in the whole
-library.  :mod:`forcefit.validation.multibody.exudyn_solver` solves the model,
-:mod:`forcefit.validation.multibody.exudyn_reading` evaluates it.
+Bodies are massless for the static solver.  A ``Place`` is a coordinate frame fixed to a
+body.  Elastic parts and locked joints connect two such frames.  Screws and wrenches of
+this module are ordered [R T], although Exudyn orders them as [T R].
 """
 
 import math
@@ -31,21 +29,22 @@ _SWAP = np.r_[3:6, 0:3]  # swaps [R T] and Exudyn's order [T R]
 IDLE_STIFFNESS = 1e-6  # [N m/rad, N/m] residual stiffness of free motions
 # [N m/rad, N/m] Stiffness of free motions while the loops are closed.
 HOLDING_STIFFNESS = 1e-2
-# [N/m] Stiffness that centres clearances.  Its rotational value is 1e-3 times as large
-# [N m/rad], and 1e-6 times about the axis of the joint.
+# [N/m] Stiffness of the springs that centre joints within their clearances.  The
+# rotational stiffness [N m/rad] is 1e-3 times this value, and 1e-6 times about the
+# joint axis.
 _CENTRING = 1e3
 
 
 @dataclass(frozen=True)
 class Regularisation:
-    """Springs and tolerances that belong to the simulation, not to a robot.
+    """Springs and tolerances of the simulation that are not data of a robot.
 
     Attributes:
         closing: [N m/rad, N/m] stiffness of the connectors that close the loops.
-            ``inf`` replaces them by rigid joints, for a robot that is built closed.
+            ``inf`` denotes rigid joints, for a robot with closed loops from the start.
         idle: [N m/rad, N/m] residual stiffness of free motions.
-        narrow: [-] last smoothing width of contacts, which also centres clearances.
-        tolerance: [m, rad, -] increment of Newton's method at which the iteration ends.
+        narrow: [-] final smoothing width of contacts, relative to their clearances.
+        tolerance: [m, rad, -] increment at which Newton's iteration ends.
         contact: factor on the stiffness of contacts.
         conservative: whether spring wrenches are energy gradients instead of Exudyn's
             approximation.
@@ -64,16 +63,16 @@ class Model:
 
     Attributes:
         robot: name of the robot, for messages.
-        regularisation: springs and tolerances that are not data of a robot.
+        regularisation: springs and tolerances of the simulation.
         ground: Exudyn's number of the base.
-        width: [-] width of the contacts' smoothing, relative to the size of their
-            cones.
+        width: [-] smoothing width of contacts, relative to their clearances.
         deadline: [s] value of ``time.monotonic`` after which the solver stops.
-        callback_error: exception raised by a user function, stored because Exudyn
-            reports only that an error occurred.
+        callback_error: exception raised by a user function.  Exudyn does not report
+            this exception.
         idle: Exudyn's numbers of the springs on free motions, and their axes.
-        recorded: places whose motion is recorded while the loops are closed.
-        history: (places, 4, 4) poses of these places at each step.
+        recorded: frames on bodies, of which the motion is recorded while the loops are
+            closed.
+        history: poses of these frames at each step, (frames, 4, 4) each.
     """
 
     def __init__(
@@ -97,13 +96,13 @@ class Model:
         self.history: list[NDArray] = []
 
     def discard(self) -> None:
-        """Release the memory of the model, which Exudyn does not do by itself."""
+        """Release the memory of the model."""
         self.mbs.SetPreStepUserFunction(0)
         self.mbs.Reset()
         self.container.Reset()
 
     def add_body(self, T: NDArray) -> Place:
-        """Return a rigid body with initial pose ``T``; its mass has no effect."""
+        """Add a rigid body with initial pose ``T``."""
         x, y, z, w = Rotation.from_matrix(T[:3, :3]).as_quat()
         node = self.item.NodeRigidBodyEP(referenceCoordinates=[*T[:3, 3], w, x, y, z])
         body = self.item.ObjectRigidBody(
@@ -112,14 +111,14 @@ class Model:
         return Place(int(self.mbs.AddObject(body)), T, np.eye(4))
 
     def add_marker(self, place: Place) -> int:
-        """Return a marker at a place."""
+        """Add a marker at a place on a body."""
         marker = self.item.MarkerBodyRigid(
             bodyNumber=place.body, localHT=self.transform(place.local)
         )
         return int(self.mbs.AddMarker(marker))
 
     def add_spring(self, place: Place, K: NDArray) -> Elastic:
-        """Add a body that a spring holds at the place; ``inf`` locks an axis."""
+        """Add a body that a spring connects to a place; ``inf`` locks a component."""
         far = self.add_body(place.built)
         markers = [self.add_marker(place), self.add_marker(far)]
         soft = np.isfinite(np.diag(K))
@@ -129,13 +128,13 @@ class Model:
             self.mbs.AddObject(joint)
         K = np.where(np.outer(soft, soft), K, 0.0)
         spring = self._connect(markers, K)
-        # For a single elastic axis, Exudyn's own wrench is already the gradient.
+        # With a single elastic axis, Exudyn's wrench is already the gradient.
         if self.regularisation.conservative and soft.sum() > 1:
             self._follow_energy(spring, markers[1], K)
         return Elastic(place, far, (spring,))
 
     def add_idle(self, place: Place, axis: int) -> Elastic:
-        """Return a body that moves along one axis of a place, on a weak spring."""
+        """Add a body that moves along or about one axis of a place on a weak spring."""
         K = np.diag(np.where(np.arange(6) == axis, HOLDING_STIFFNESS, np.inf))
         spring = self.add_spring(place, K)
         self.idle.append((spring.parts[0], axis))
@@ -148,13 +147,13 @@ class Model:
             self.mbs.SetObjectParameter(part, "stiffness", K[np.ix_(_SWAP, _SWAP)])
 
     def rest_idle(self, motions: NDArray) -> None:
-        """Set the rest coordinates (j,) [rad or m] of the springs on free motions."""
+        """Set the coordinates (j,) [rad or m] at which the weak springs are relaxed."""
         for (part, axis), motion in zip(self.idle, motions, strict=True):
             rest = np.where(np.arange(6) == axis, motion, 0.0)
             self.mbs.SetObjectParameter(part, "offset", rest[_SWAP].tolist())
 
     def add_contact(self, place: Place, clearance: JointClearance) -> Contact:
-        """Add a body that moves within a clearance and is centred by a weak spring."""
+        """Add a body that moves within a clearance on a weak centring spring."""
         clearance = clearance.softened(self.regularisation.contact)
         rows = np.array(clearance.unlocked, dtype=int)
         centring = np.full(6, np.inf)
@@ -178,8 +177,8 @@ class Model:
 
         Args:
             connector: Exudyn's number of the connector.
-            law: function that returns the resisting wrench (6,) [R T] half-way between
-                the ends, for the screw between the ends.
+            law: function from the screw between the ends to the resisting wrench (6,)
+                [R T] half-way between them.
         """
 
         def wrench(
@@ -200,18 +199,18 @@ class Model:
         self, base: Place, length: float, K: NDArray, elements: int,
         inertia: NDArray,
     ) -> tuple[tuple[int, ...], tuple[Place, ...]]:  # fmt: skip
-        """Add a beam along the x axis of its base place, to which it is clamped.
+        """Add a beam along the x axis of the place at which it is clamped.
 
         Args:
-            base: place of the beam's start.
+            base: place at which the beam is clamped.
             length: [m] length of the beam.
             K: (6, 6) [N, N m^2] stiffness of the section.
             elements: number of elements.
             inertia: (3,) mass per length [kg/m] and its second moments about y and z
-                [kg m], which only vibrations require.
+                [kg m].  Only vibrations require them.
 
         Returns:
-            Exudyn's numbers of the elements, and the places between them.
+            Exudyn's numbers of the elements, and the places of the nodes.
         """
         section = self.exu.BeamSection()
         section.stiffnessMatrix = K
@@ -247,7 +246,7 @@ class Model:
         return Closure(first, second, marker, connector, closed)
 
     def add_load(self, place: Place, wrench: NDArray) -> None:
-        """Add a wrench at a place, in base axes, whose direction is constant."""
+        """Add a wrench of constant direction at a place, in base axes."""
         torque = self.item.LoadTorqueVector(
             markerNumber=self.add_marker(place), loadVector=wrench[:3].tolist()
         )
@@ -255,7 +254,7 @@ class Model:
         self.add_force(place, wrench[3:])
 
     def add_following_load(self, place: Place, wrench: NDArray) -> None:
-        """Add a wrench at a place, in its axes, that rotates with its body."""
+        """Add a wrench that rotates with its body, in the axes of a place."""
         marker = self.add_marker(place)
         for load, vector in (
             (self.item.LoadTorqueVector, wrench[:3]),
@@ -266,7 +265,7 @@ class Model:
             )
 
     def add_force(self, place: Place, force: NDArray) -> None:
-        """Add a force (3,) [N] at a place, in base axes, of constant direction."""
+        """Add a force (3,) [N] of constant direction at a place, in base axes."""
         load = self.item.LoadForceVector(
             markerNumber=self.add_marker(place), loadVector=force.tolist()
         )
@@ -278,7 +277,7 @@ class Model:
             raise TimeoutError
 
     def node(self, place: Place) -> Any:
-        """Return Exudyn's number of the node of a place's body."""
+        """Return Exudyn's node number of the body of a place."""
         return self.mbs.GetObjectParameter(place.body, "nodeNumber")
 
     def transform(self, T: NDArray) -> Any:
@@ -294,8 +293,8 @@ class Model:
             lacking[:] = far_couple(screw, wrench[3:])
             return wrench
 
-        # Exudyn evaluates connectors before loads.  When Exudyn differentiates loads,
-        # it moves only the far end, so the couple must stay constant.
+        # Exudyn evaluates connectors before loads.  It differentiates loads with
+        # respect to the far end alone, so the couple must be constant there.
         load = self.item.LoadTorqueVector(
             markerNumber=far, bodyFixed=True,
             loadVectorUserFunction=lambda mbs, t, load: lacking,

@@ -1,4 +1,4 @@
-"""Define the parts of a simulation model: places on bodies, and elements between them.
+"""Define the places on bodies of a simulation model, and the elements between them.
 
 Numbers of objects are those of Exudyn.  Screws and wrenches are ordered [R T] as in the
 whole library.
@@ -46,7 +46,7 @@ class Place:
 
     @property
     def built(self) -> NDArray:
-        """(4, 4) initial pose of the place in the base frame."""
+        """Initial pose of the place in the base frame, (4, 4)."""
         return self.start @ self.local
 
     def moved(self, T: NDArray) -> "Place":
@@ -56,15 +56,15 @@ class Place:
 
 @dataclass(frozen=True, eq=False)
 class Elastic:
-    """An elastic part between two places that coincide when unstressed.
+    """An elastic body between two places that coincide in the unstressed state.
 
     Attributes:
         near: place on the inner body.
         far: place on the outer body.
-        parts: Exudyn's numbers of one connector, or of the elements of a beam.
-        beam: whether the part is a beam.
+        parts: Exudyn's numbers of a connector, or of the elements of a beam.
+        beam: whether the elastic body is a beam.
         nodes: places along a beam from base to tip, at equal distances.
-        modes: interface modes of a meshed body; None for other parts.
+        modes: interface modes of a meshed body; None for other elastic bodies.
     """
 
     near: Place
@@ -77,13 +77,13 @@ class Elastic:
 
 @dataclass(frozen=True, eq=False)
 class MeshedSolid:
-    """A link as finite elements with two rigid interfaces, in the axes of its mesh.
+    """A link of finite elements with two rigid interfaces, in the axes of its mesh.
 
     Attributes:
         nodes: (n, 3) [m] positions of the nodes.
-        stiffness: (3n, 3n) [N/m] sparse; row 3 i + k is direction k of node i.
-        base: (k,) indices of the nodes of the interface on the parent's side.
-        tip: (m,) indices of the nodes of the interface on the frame's side.
+        stiffness: (3n, 3n) [N/m] sparse matrix; row 3 i + k is direction k of node i.
+        base: (k,) indices of the nodes of the interface to the parent frame.
+        tip: (m,) indices of the nodes of the interface to the frame.
         centers: (2, 3) [m] reference points of base and tip.
     """
 
@@ -99,8 +99,8 @@ class MeshBody:
     """A meshed solid and its orientation in a robot.
 
     Attributes:
-        solid: the solid, which links of equal shape share and which is condensed once.
-        turn: (3, 3) the mesh's axes in the frame's axes.
+        solid: the solid.  Links of equal shape share one solid.
+        turn: (3, 3) rotation matrix from mesh axes to frame axes.
     """
 
     solid: MeshedSolid
@@ -112,10 +112,10 @@ class Modes:
     """Interface modes of a meshed body, relative to its base.
 
     Attributes:
-        node: Exudyn's number of the node of the modes' coordinates.
-        stiffness: (6, 6) stiffness reduced to the modes.
-        wrench: (6, 6) map from mode coordinates to the wrench at the tip, in the
-            frame's axes.
+        node: Exudyn's number of the node with the mode coordinates.
+        stiffness: (6, 6) modal stiffness.
+        wrench: (6, 6) matrix from mode coordinates to the wrench at the tip, frame
+            axes.
     """
 
     node: int
@@ -130,11 +130,11 @@ class Closure:
     Attributes:
         first: place on the first chain.
         second: place on the second chain.
-        marker: Exudyn's number of the connector's end on the first chain, which is
+        marker: Exudyn's number of the connector's end on the first chain.  This end is
             moved to close the loop.
         connector: Exudyn's number of the connector.
-        closed: (4, 4) nominal pose of the second place relative to the first if the
-            loop is closed.
+        closed: (4, 4) nominal pose of the second place relative to the first in the
+            closed loop.
     """
 
     first: Place
@@ -151,7 +151,7 @@ class Contact:
     Attributes:
         near: place on the inner body.
         far: place on the outer body.
-        clearance: bounds of the motions of the joint.
+        clearance: bounds on the motions of the joint.
     """
 
     near: Place

@@ -19,18 +19,18 @@ from forcefit.validation.multibody.motion import matrix, shifted
 
 
 def add_mesh(model: Model, place: Place, body: MeshBody) -> Elastic:
-    """Add a meshed body in a floating frame, clamped so that its tip is at the place.
+    """Add a meshed body in a floating frame, with its unstressed tip at a place.
 
     The modes of the body are the static modes of its rigid interfaces
     (Hurty-Craig-Bampton).  Exudyn computes them from the full stiffness matrix.
 
     Args:
         model: model to which the body is added.
-        place: place of the frame while the body is free of stress.
+        place: place of the tip while the body is unstressed.
         body: the solid.
 
     Returns:
-        The elastic part from the place to the tip.
+        The elastic body from the place to the tip.
     """
     solid = body.solid
     floating = _floating(model.fem, solid)
@@ -57,11 +57,10 @@ def add_mesh(model: Model, place: Place, body: MeshBody) -> Elastic:
 
 
 def _interface(model: Model, number: int, solid: MeshedSolid, side: int) -> int:
-    """Return a marker that moves with an interface: 0 is the base, 1 the tip."""
+    """Return a marker that moves with the base (0) or the tip (1)."""
     nodes = (solid.base, solid.tip)[side]
     arms = solid.nodes[nodes] - solid.centers[side]
-    # The weighted mean of the nodes is the reference point, because an offset would not
-    # rotate with the nodes.
+    # The weighted mean of the nodes equals the reference point.
     rows = np.vstack([np.ones(len(arms)), arms.T / np.abs(arms).max()])
     weights = np.linalg.lstsq(rows, np.array([1.0, 0.0, 0.0, 0.0]))[0]
     marker = model.item.MarkerSuperElementRigid(
@@ -71,7 +70,7 @@ def _interface(model: Model, number: int, solid: MeshedSolid, side: int) -> int:
 
 
 def _tip_wrenches(body: MeshBody, basis: NDArray, K: NDArray) -> NDArray:
-    """Return the (6, 6) tip wrenches of unit modes, in the frame's axes."""
+    """Return the tip wrenches of unit modes, frame axes, (6, 6)."""
     solid = body.solid
     arms = solid.nodes[solid.tip] - solid.centers[1]
     rigid = np.zeros((len(arms), 3, 6))
@@ -88,7 +87,7 @@ _CONDENSED: WeakKeyDictionary[MeshedSolid, Any] = WeakKeyDictionary()
 
 
 def _floating(fem: Any, solid: MeshedSolid) -> Any:
-    """Return the floating body of a solid, condensed at its first use."""
+    """Return the condensed solid with a floating frame."""
     if solid not in _CONDENSED:
         link = fem.FEMinterface()
         link.nodes = {"Position": solid.nodes}

@@ -1,12 +1,11 @@
 """Solve an Exudyn model statically, in stages from open robot to equilibrium.
 
-First, the loops are closed while the loads increase.  Then contacts, if any, are
-stiffened and free motions are released.  Finally, the target of each closure is
-corrected by its closure residual until all residuals vanish.
+First, the loops are closed while the loads increase.  Then contacts are stiffened and
+free motions are released.  Finally, the target of each closure is corrected by its
+closure error until all closure errors vanish.
 
-The time limit is enforced in two ways.  Exudyn measures processor time and stops
-between two steps, and the user functions check the clock.  Exceptions in user
-functions, including Ctrl-C, are raised again.
+Exudyn stops between two steps when its processor time reaches the time limit, and the
+user functions check the clock.  Exceptions in user functions are raised again.
 """
 
 import time
@@ -31,18 +30,17 @@ from forcefit.validation.multibody.exudyn_reading import (
 )
 from forcefit.validation.multibody.motion import exponential, inverse, logarithm
 
-_CLOSED = 1e-12  # [rad, m] closure residuals below this value count as zero
+_CLOSED = 1e-12  # [rad, m] largest accepted closure error
 _LOAD_STEPS = 4
 # Number of steps in which the springs on free motions are weakened.
 _RELEASING_STEPS = 4
-# Number of steps, geometrically spaced, in which the smoothing of the contacts is
-# reduced.
+# Number of steps in which the smoothing of contacts is reduced by equal factors.
 _NARROWING_STEPS = 30
 _CLOSING_STEPS = 30
-# Largest number of steps, each of which reduces the residual by a factor of a million.
+# Largest number of iterations that relax the weak springs.
 _RELAXING_STEPS = 4
-_RESTS = 1e-10  # [rad, m] change below which free motions count as at rest
-NO_EQUILIBRIUM = "no equilibrium"  # begins the status of a solution that fails
+_RESTS = 1e-10  # [rad, m] change of free motions at which the iteration ends
+NO_EQUILIBRIUM = "no equilibrium"  # first words of the status of a failed solution
 _STAGES = (
     "closures are closed and loads increase",
     "contacts stiffen and free motions are released",
@@ -53,23 +51,22 @@ _STAGES = (
 def solve(
     model: Model, closures: list[Closure], narrow: bool = False, steps: int = 0
 ) -> NDArray:
-    """Close the loops in steps, then correct the targets until the errors vanish.
+    """Close the loops in steps, then remove the remaining closure errors.
 
     Args:
-        model: complete model, which is in equilibrium after the call.
+        model: complete model.  After the call, it is in equilibrium.
         closures: closures to be closed.
-        narrow: whether the model contains contacts, whose smoothing is reduced after
-            the first stage.
+        narrow: whether to reduce the smoothing of contacts after the first stage.
         steps: smallest number of steps for closing the loops.
 
     Returns:
-        The target shifts, with which :func:`close` continues if loads change.
+        Shifts of the closure targets, which are an argument of :func:`close`.
 
     Raises:
-        SimulationFailed: no equilibrium was found; :class:`OutOfTime` if the model's
-            deadline has passed.
+        SimulationFailed: no equilibrium was found.
+        OutOfTime: the deadline of the model has passed.
     """
-    shift = np.zeros((2, len(closures), 6))  # shifts of the targets at 2 times
+    shift = np.zeros((2, len(closures), 6))  # at the start and end of a stage
     model.mbs.SetPreStepUserFunction(_before_step(model, closures, shift))
     model.mbs.Assemble()
     equilibrate(model, 0.0, max(_LOAD_STEPS, steps))
@@ -99,7 +96,7 @@ def close(model: Model, closures: list[Closure], shift: NDArray) -> None:
         equilibrate(model, 2.0, 1)
     raise SimulationFailed(
         model.robot,
-        f"a closure stays open by {largest_gap(model, closures):.2g} rad or m: "
+        f"a closure error of {largest_gap(model, closures):.2g} rad or m remains: "
         "the rigid parts do not fit together",
     )
 
@@ -107,14 +104,13 @@ def close(model: Model, closures: list[Closure], shift: NDArray) -> None:
 def relax(
     model: Model, closures: list[Closure], idle: Mapping[str, Elastic], shift: NDArray
 ) -> None:
-    """Set the rest positions of the weak springs on free motions to the present state.
+    """Relax the weak springs on free motions in the present state of the model.
 
-    Otherwise these springs would displace the equilibrium and thereby change the
-    stiffness of a robot that deforms during such motions.
+    Otherwise, the forces of these springs would displace the equilibrium.
 
     Args:
         model: model in equilibrium.
-        closures: closures to be kept closed.
+        closures: closures of the model.
         idle: springs on free motions.
         shift: (2, closures, 6) [rad, m] shifts of the targets, changed in place.
 
@@ -133,7 +129,7 @@ def relax(
 def _before_step(
     model: Model, closures: list[Closure], shift: NDArray
 ) -> Callable[[Any, float], bool]:
-    """Return a function that moves targets and narrows contacts before each step."""
+    """Return a function that moves targets and stiffens contacts before each step."""
     opened = [
         logarithm(inverse(c.first.built @ c.closed) @ c.second.built) for c in closures
     ]
@@ -161,13 +157,13 @@ def _before_step(
 
 
 def equilibrate(model: Model, start: float, steps: int) -> None:
-    """Run Exudyn's static solver from the last state over one unit of its time.
+    """Run one stage of Exudyn's static solver from the last state.
 
     Args:
         model: the assembled model.
-        start: start time, which selects the stage. 0: loops are closed and loads
-            increase. 1: contacts stiffen. 2: targets of the closures are corrected.
-        steps: initial number of steps; a step that fails is divided.
+        start: stage, which is Exudyn's start time.  0: loops are closed and loads
+            increase.  1: contacts stiffen.  2: closure targets are corrected.
+        steps: initial number of steps.  A step that fails is divided.
 
     Raises:
         SimulationFailed: the shortest step fails, or the deadline has passed.
@@ -192,7 +188,7 @@ def equilibrate(model: Model, start: float, steps: int) -> None:
 
 
 def raise_callback_error(model: Model, stage: str) -> None:
-    """Raise the stored exception of a user function, if there is one.
+    """Raise the exception that a user function of a model has stored.
 
     Args:
         model: model to which the function belongs.
@@ -222,7 +218,7 @@ def static_settings(model: Model, start: float, steps: int) -> Any:
     static.useLoadFactor = start == 0.0
     static.minimumStepSize = 1e-3
     newton = static.newton
-    # Convergence is judged by increments, because weak springs make residuals small.
+    # Weak springs make residuals small, so increments determine the convergence.
     newton.residualMode = 1
     newton.absoluteTolerance = newton.relativeTolerance = model.regularisation.tolerance
     newton.maxIterations = 25
@@ -237,6 +233,6 @@ def _record(model: Model) -> None:
 
 
 def largest_gap(model: Model, closures: list[Closure]) -> float:
-    """Return the [rad, m] largest component of the closure errors."""
+    """Return the largest component [rad, m] of the closure errors."""
     gaps = [np.abs(closure_error(model, closure)).max() for closure in closures]
     return float(max(gaps, default=0.0))

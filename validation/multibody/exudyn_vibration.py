@@ -2,10 +2,8 @@
 
 Exudyn linearises the model by forward differences and projects it onto the motions that
 its joints allow.  Differences with two step sizes are combined so that the first-order
-error cancels; without this, the frequencies of a stiff robot have errors of 1e-6 to
-1e-2.  The mass matrix is singular, because only bodies with a given mass or given
-moments of inertia contribute.  Degrees of freedom without inertia are therefore
-condensed statically.
+error cancels.  Only bodies with a given mass or given moments of inertia contribute to
+the mass matrix.  Degrees of freedom without inertia are condensed statically.
 """
 
 import numpy as np
@@ -16,7 +14,7 @@ from forcefit.validation.multibody.exudyn_parts import Place
 
 _SIX = (np.array([0, 1, 2, 1, 0, 0]), np.array([0, 1, 2, 2, 2, 1]))  # Exudyn's order
 _STEP = 1e-5  # [-] step of differences; 1e-4 to 1e-7 agree within 1e-8
-_NOTHING = 1e-12  # inertias below this fraction of the largest are zero
+_NOTHING = 1e-12  # fraction of the largest inertia below which inertias are set to 0
 
 
 def set_masses(model: Model, bodies: list[tuple[Place, float, NDArray]]) -> None:
@@ -24,8 +22,8 @@ def set_masses(model: Model, bodies: list[tuple[Place, float, NDArray]]) -> None
 
     Args:
         model: solved model.
-        bodies: for each body the place of its centre of mass, its mass [kg], and its
-            inertia tensor (3, 3) [kg m^2] about this centre in the axes of the place.
+        bodies: place of the centre of mass, mass [kg], and inertia tensor (3, 3) [kg
+            m^2] about this centre in the axes of the place, for each body.
     """
     for item in range(model.mbs.systemData.NumberOfObjects()):
         if model.mbs.GetObject(item)["objectType"] == "RigidBody":
@@ -35,7 +33,7 @@ def set_masses(model: Model, bodies: list[tuple[Place, float, NDArray]]) -> None
 def _set_mass(
     model: Model, body: int, parts: list[tuple[Place, float, NDArray]]
 ) -> None:
-    """Set mass, centre and inertia about the reference point of one body."""
+    """Set the mass, the centre of mass and the inertia tensor of a body."""
     mass, moment, inertia = 0.0, np.zeros(3), np.zeros((3, 3))
     for place, m, J in parts:
         c, R = place.local[:3, 3], place.local[:3, :3]
@@ -48,7 +46,7 @@ def _set_mass(
 
 
 def natural_frequencies(model: Model) -> NDArray:
-    """Return the (k,) [Hz] natural frequencies of a model, lowest first.
+    """Return the natural frequencies of a model, lowest first, (k,) [Hz].
 
     Args:
         model: model in its equilibrium.
@@ -69,7 +67,7 @@ def natural_frequencies(model: Model) -> NDArray:
 
 
 def _linearised(model: Model, step: float) -> tuple[NDArray, NDArray]:
-    """Return mass and stiffness of the motions that the joints allow."""
+    """Return mass and stiffness matrices for the motions that the joints allow."""
     settings = model.exu.SimulationSettings()
     newton = settings.staticSolver.newton
     newton.numericalDifferentiation.relativeEpsilon = step

@@ -1,14 +1,14 @@
 """Compute the platform compliance from the linearised simulation.
 
-Exudyn's residual is differentiated at the equilibrium, while loads and the reactions of
-joints and closures are held constant.  The derivatives are computed along motions that
-joints and closures allow, so that stiff directions add no noise.  These motions are
-modes of Exudyn's own Jacobian, which separate compliant from stiff directions.  The
+Exudyn's residual is differentiated at the equilibrium, with constant loads and constant
+reactions of joints and closures.  The derivatives are computed along motions that
+joints and closures allow.  These motions are modes of Exudyn's Jacobian.  The
 differences are extrapolated to zero step.
 
-Weak springs of stiffness k hold free motions so that the model can be solved.  Their
-effect is removed by adding k X (1 - k B)^-1 X' to the compliance (Woodbury identity). X
-and B are the responses of the platform and of the free joints to loads on these joints.
+Weak springs of stiffness k act on free motions so that the model can be solved.  Their
+effect is removed by adding k X (1 - k B)^-1 X' to the compliance (Woodbury identity).
+The matrices X and B are the responses of the platform and of the free joints to loads
+on these joints.
 """
 
 from collections.abc import Callable
@@ -35,17 +35,14 @@ from forcefit.validation.multibody.exudyn_solver import (
 from forcefit.validation.multibody.motion import turned
 from forcefit.validation.multibody.open_robot import OpenTree
 
-# Steps in Exudyn's coordinates, in which rotations are parameters of size 1.  The steps
-# for contacts are smaller than the penetration and the width of the smoothing, which
-# are some nm.
+# Steps in Exudyn's coordinates.  The steps for contacts are smaller than the
+# penetration and the smoothing width, which are a few nm.
 _STEPS, _CONTACT_STEPS = (2e-4, 1e-4, 5e-5), (1e-8, 3e-9, 1e-9, 3e-10)
 _GAP_STEP = 1e-5
-_RANK = 1e-7  # relative size below which a derivative of a closure error counts as zero
-# [-] Relative stiffness of a joint's motion, below which only the weak spring of the
-# joint resists the motion.
+_RANK = 1e-7  # relative tolerance for the rank of the derivatives of closure errors
+# [-] Relative stiffness of a free motion below which only its weak spring resists it.
 _ROLLS = 1e-4
-# Number of Newton steps at the end, because rounding errors of closures move compliant
-# robots.
+# Number of final Newton steps, which remove the effect of rounding errors of closures.
 _POLISH = 2
 
 
@@ -60,9 +57,9 @@ def linearised_compliance(
         platform: name of the platform's frame.
 
     Returns:
-        (6, 6) [rad/(N m) .. m/N] compliance for small motions at the platform's present
-        origin, base axes; its uncertainty, for entries over sqrt(C_ii C_jj); and
-        whether the equilibrium is stable.
+        Compliance for small motions at the platform's present origin, base axes, (6, 6)
+        [rad/(N m) .. m/N]; the largest uncertainty of its entries divided by sqrt(C_ii
+        C_jj); and whether the equilibrium is stable.
 
     Raises:
         OutOfTime: the model's deadline has passed.
@@ -89,9 +86,8 @@ _LAW = "springForceTorqueUserFunction"
 def _freeze(model: Model, closure: Closure) -> None:
     """Replace the connector of a closed loop by a constant wrench.
 
-    The connector acts half-way between the closed place and its target.  Both differ by
-    the deformation of the connector, about 1 mm under 1e5 N. The constant wrench is
-    computed at the closed place.
+    The connector acts half-way between the closed place and its target, which differ by
+    the deformation of the connector.  The constant wrench acts at the closed place.
     """
     wrench = connector_wrench(model, closure.connector)
     screw = wrench / model.regularisation.closing
@@ -105,7 +101,7 @@ def _freeze(model: Model, closure: Closure) -> None:
 def _compliance(
     model: Model, motion: Callable[[NDArray, NDArray, float], NDArray], tree: OpenTree
 ) -> tuple[NDArray, float, bool]:
-    """Return V Z (Z'KZ)^-1 Z'V' over the motions Z allowed by joints and closures."""
+    """Return V Z (Z'KZ)^-1 Z'V' for the motions Z that joints and closures allow."""
     solver, settings = model.exu.MainSolverStatic(), static_settings(model, 2.0, 1)
     solver.InitializeSolver(model.mbs, settings)
     count = solver.GetODE2size()
@@ -119,7 +115,7 @@ def _compliance(
         ahead, back = ([forces(q + sign * step * z) for z in Z.T] for sign in (1, -1))
         return Z.T @ (np.array(ahead) - np.array(back)).T / (2 * step)
 
-    # Contact forces depend on the penetration, so no Newton steps follow.
+    # Models with contacts need smaller steps and no Newton steps.
     steps, polish = (_CONTACT_STEPS, 0) if tree.contacts else (_STEPS, _POLISH)
     q = np.array(model.mbs.systemData.GetODE2Coordinates())
     forces(q)
@@ -153,8 +149,8 @@ def _compliance(
 
 def _is_stable(model: Model, K: NDArray, V: NDArray) -> bool:
     """Return whether the equilibrium is stable within the uncertainty of K."""
-    # The computed curvature of free motions is a rounding error and may have either
-    # sign.
+    # The computed stiffness of free motions is a rounding error of either sign, so a
+    # small stiffness is added.
     K = K + 1e3 * model.regularisation.idle * V[6:].T @ V[6:]
     size = 1.0 / np.sqrt(np.abs(np.diag(K)))
     scaled = (K + K.T) / 2 * np.outer(size, size)
@@ -162,7 +158,7 @@ def _is_stable(model: Model, K: NDArray, V: NDArray) -> bool:
 
 
 def _held(model: Model, K: NDArray, V: NDArray) -> NDArray:
-    """Return the modal stiffness including the weak springs."""
+    """Return the modal stiffness with the weak springs."""
     return K + model.regularisation.idle * V[6:].T @ V[6:]
 
 
@@ -172,7 +168,7 @@ def _by_modes(model: Model, K: NDArray, V: NDArray) -> NDArray:
     k, coupled = model.regularisation.idle, whole[:6, 6:]
     held, ways = np.linalg.eigh(np.eye(len(whole) - 6) - k * whole[6:, 6:])
     # Motions that only weak springs resist, such as the rotation of a rod about its
-    # axis, move no other body.
+    # axis, do not move the platform.
     ways, held = ways[:, held > _ROLLS], held[held > _ROLLS]
     ways = coupled @ ways / np.sqrt(held)
     return whole[:6, :6] + k * ways @ ways.T
@@ -189,7 +185,7 @@ def _solve(K: NDArray, right: NDArray) -> NDArray:
 def _motion(
     model: Model, tree: OpenTree, platform: str, q: NDArray, Z: NDArray, step: float
 ) -> NDArray:
-    """Return derivatives along Z of closure errors, platform pose and free joints."""
+    """Return derivatives of closure errors, platform pose and free joints along Z."""
     system, place = model.mbs.systemData, tree.before[platform]
 
     def read(q: NDArray) -> tuple[NDArray, NDArray, NDArray]:

@@ -1,10 +1,9 @@
 """Compute the platform compliance from small load steps, with its uncertainty.
 
-At the equilibrium, small loads are applied to the platform along each axis in both
-directions, with decreasing steps.  The compliance is half the difference of the
-platform's motions divided by the load.  Its error is proportional to the square of the
-step.  Its size depends on internal motions, because a joint may rotate a hundred times
-as much as the platform, so the differences are extrapolated to zero step.
+At the equilibrium, small loads of decreasing size are applied to the platform along
+each axis in both directions.  The compliance is half the difference between the two
+motions of the platform, divided by the load.  Its error is proportional to the square
+of the load, so the differences are extrapolated to zero load.
 """
 
 from functools import partial
@@ -20,12 +19,12 @@ from forcefit.validation.multibody.exudyn_reading import idle_motions, pose
 from forcefit.validation.multibody.exudyn_solver import close, equilibrate
 from forcefit.validation.multibody.open_robot import OpenTree
 
-# [rad, m] Largest step of the platform; ratio of consecutive steps, and their number.
+# Largest motion of the platform [rad, m], ratio of consecutive loads, number of loads.
 _LARGEST, _RATIO, _SIZES = 4e-3, 5.0, 4
 
 
 def add_step_loads(model: Model, tree: OpenTree, platform: str) -> tuple[int, int]:
-    """Add a moment and a force on the platform, which are zero before the solution."""
+    """Add a moment and a force on the platform, initially zero."""
     marker = model.add_marker(tree.before[platform])
     item = model.item
     moment = item.LoadTorqueVector(markerNumber=marker, loadVector=[0.0] * 3)
@@ -46,16 +45,16 @@ def stepped_compliance(
         loads: loads from :func:`add_step_loads`.
         shift: shifts of the targets from
             :func:`forcefit.validation.multibody.exudyn_solver.solve`.
-        sizes: (6,) [rad or m per N m or N] approximate largest motion under each unit
-            load.
+        sizes: (6,) approximate largest motion [rad or m] under each unit load.
 
     Returns:
-        (6, 6) [rad/(N m) .. m/N] compliance for small motions at the platform's present
-        origin, base axes; and its uncertainty, for entries over sqrt(C_ii C_jj).
+        Compliance for small motions at the platform's present origin, base axes, (6, 6)
+        [rad/(N m) .. m/N]; and the largest uncertainty of its entries divided by
+        sqrt(C_ii C_jj).
 
     Raises:
-        SimulationFailed: there is no equilibrium nearby, even under the smallest loads.
-        OutOfTime: the model's deadline has passed; a :class:`SimulationFailed`.
+        SimulationFailed: no equilibrium was found under the smallest loads.
+        OutOfTime: the deadline of the model has passed.
     """
     system, initial = model.mbs.systemData, model.exu.ConfigurationType.Initial
     start, first = system.GetSystemState(), shift.copy()
@@ -63,8 +62,7 @@ def stepped_compliance(
     def moved(step: float, unit: NDArray, drift: NDArray) -> tuple[NDArray, ...]:
         for number, part in zip(loads, np.split(step * unit, 2), strict=True):
             model.mbs.SetLoadParameter(number, "loadVector", part.tolist())
-        # Targets move in proportion to the load, so the motion of the last step is a
-        # good start value.
+        # The targets move in proportion to the load, approximately.
         shift[:] = first[1] + step * drift
         system.SetSystemState(start, configuration=initial)
         equilibrate(model, 2.0, 1)
@@ -88,7 +86,7 @@ def stepped_compliance(
             except OutOfTime:
                 raise
             except SimulationFailed:
-                # There may be no equilibrium under a large step.
+                # A large load may have no equilibrium.
                 if step <= _LARGEST / size / _RATIO ** (_SIZES - 3):
                     raise
                 slopes.clear()
@@ -111,5 +109,5 @@ def stepped_compliance(
 
 
 def _relative(sizes: NDArray, change: NDArray) -> float:
-    """Return the largest change of the platform's motion, relative to this motion."""
+    """Return the largest relative change of the platform's motion."""
     return float((change[:6] / sizes).max())

@@ -1,4 +1,4 @@
-"""Build the unstressed robot with its loops cut open and its geometric errors.
+"""Build the unstressed robot with open loops and geometric errors.
 
 At each frame, three motions are applied in the order of the paper: the geometric error,
 the deformation of the link, and the motion of the joint.  Rotation vector and
@@ -39,7 +39,7 @@ class PostureLike(Protocol):
 
     @property
     def coordinates(self) -> NDArray:
-        """(n,) [rad or m] joint coordinates that close the nominal loops."""
+        """Joint coordinates that close the nominal loops, (n,) [rad or m]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,12 +49,13 @@ class Case:
     Attributes:
         posture: the robot and its joint coordinates.
         scale: factor on geometric errors and clearances.
-        springs: mapping from frame to K_E, for links that are springs; see
+        springs: mapping from frame to K_E for links that are springs; see
             :func:`link_springs`.
-        meshes: mapping from frame to meshed body, for links that are solids.
-        elements: number of elements of each beam; all other links are beams.
+        meshes: mapping from frame to meshed body for links that are solids.
+        elements: number of elements of each beam.  Links that are neither springs nor
+            solids are beams.
         clearances: whether joints have their clearances.
-        bushes: whether pins are held in two bushes.
+        bushes: whether pins are in two bushes.
         load: (6,) [N m, N] load on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] gravity in base axes.
         couple: (3,) [N m] additional couple of dead forces on the platform, base axes.
@@ -78,13 +79,13 @@ def link_springs(
     given: Mapping[str, NDArray],
     meshes: Mapping[str, MeshBody],
 ) -> dict[str, NDArray]:
-    """Return the stiffness of every link that is neither a beam nor a mesh.
+    """Return the stiffness of the links that are neither beams nor solids.
 
     Args:
         robot: robot of the simulation.
         links: ``"beam"`` or ``"spring"``.
-        given: mapping from frame to K_E (6, 6) [N m/rad .. N/m], for links whose K_E is
-            missing in the robot.
+        given: mapping from frame to K_E (6, 6) [N m/rad .. N/m] for links of which the
+            robot contains no K_E.
         meshes: mapping from frame to solid.
 
     Returns:
@@ -113,16 +114,18 @@ def link_springs(
 
 @dataclass(frozen=True, eq=False)
 class OpenTree:
-    """Parts of a complete model, by frame name.
+    """Elements of a complete model.
+
+    Each mapping has the names of frames as keys.
 
     Attributes:
         platform: (4, 4) nominal pose of the platform in the base frame.
         bodies: places of the frames on their bodies, before clearances and springs.
         before: places of the frames before the motion of their joints.
-        links: elastic bodies by frame.
-        joints: joint springs by frame.
-        idle: the springs of free motions by frame.
-        contacts: joints with clearance by frame.
+        links: elastic links.
+        joints: joint springs.
+        idle: weak springs of free motions.
+        contacts: joints with clearance.
         closures: closures in the order of the robot.
     """
 
@@ -137,14 +140,14 @@ class OpenTree:
 
 
 def build(model: Model, case: Case) -> OpenTree:
-    """Build the unstressed open robot and add its errors, closures and loads.
+    """Build the unstressed open robot with its errors, closures and loads.
 
     Args:
         model: empty model.
         case: description of the robot and its loads.
 
     Returns:
-        The parts of the model.
+        The elements of the model.
 
     Raises:
         BadInput: the robot contains a helical joint.
@@ -158,7 +161,7 @@ def build(model: Model, case: Case) -> OpenTree:
         place = _add_frame(model, case, frame, after[frame.parent], tree)
         after[frame.name] = place.moved(_own_motion(frame, q))
     for a, b in robot.closures:
-        # Closure errors that are caused by rounding in files are not geometric errors.
+        # Closure errors due to rounding of file values are not geometric errors.
         closed = inverse(nominal[a]) @ nominal[b]
         closure = model.add_closure(tree.before[a], tree.before[b], closed)
         tree.closures.append(closure)
@@ -172,7 +175,7 @@ def build(model: Model, case: Case) -> OpenTree:
 
 
 def refuse_helical(robot: Robot) -> None:
-    """Raise BadInput if a robot contains a helical joint, which is not supported."""
+    """Raise BadInput if a robot contains a helical joint."""
     for frame in robot.frames:
         if frame.pitch:
             raise BadInput(
@@ -219,7 +222,7 @@ def _add_frame(
 
 
 def _nominal(posture: PostureLike) -> dict[str, NDArray]:
-    """Return (4, 4) nominal poses of all frames, before the motion of their joints."""
+    """Return nominal poses (4, 4) of the frames, before the motion of their joints."""
     T: dict[str, NDArray] = {}
     after = {BASE: np.eye(4)}
     for frame, q in zip(posture.robot.frames, posture.coordinates, strict=True):
@@ -230,14 +233,14 @@ def _nominal(posture: PostureLike) -> dict[str, NDArray]:
 
 
 def _own_motion(frame: Frame, q: float) -> NDArray:
-    """Return the (4, 4) motion of the joint about or along its z axis."""
+    """Return the motion (4, 4) of the joint about or along its z axis."""
     if frame.joint == "prismatic":
         return shifted([0.0, 0.0, q])
     return placement([0.0, 0.0, q if frame.joint == "revolute" else 0.0], np.zeros(3))
 
 
 def _add_beam(model: Model, place: Place, frame: Frame, elements: int) -> Elastic:
-    """Add a straight beam that is clamped to a body and ends at the place."""
+    """Add a straight beam from a body, to which it is clamped, to a place."""
     link = frame.link
     assert isinstance(link, BeamLink)
     length, x = beam_span(frame, link)
@@ -252,7 +255,7 @@ def _add_beam(model: Model, place: Place, frame: Frame, elements: int) -> Elasti
 
 
 def _add_couple(model: Model, place: Place, nominal: NDArray, couple: NDArray) -> None:
-    """Add a couple as two forces m x axis / 2 on an arm of 1 m along each axis."""
+    """Add a couple m as pairs of forces m x axis / 2 on arms of 1 m along each axis."""
     for axis, arm in zip(nominal[:3, :3].T, np.eye(3), strict=True):
         force = np.cross(couple, axis) / 2
         model.add_force(place.moved(shifted(arm)), force)
@@ -264,8 +267,8 @@ def _add_weights(model: Model, robot: Robot, tree: OpenTree, gravity: NDArray) -
 
     The weight of a beam acts at its nodes, with the end moments of a clamped beam under
     uniform load.  The tip deflection of a cantilever is then exact for any number of
-    nodes.  The moments are pairs of forces on arms that rotate with the ends; like
-    weight, these forces have a constant direction and a potential.
+    nodes.  Each moment is a pair of forces of constant direction on arms that rotate
+    with the node, so the moments have a potential.
     """
     for frame in robot.frames:
         if frame.mass:

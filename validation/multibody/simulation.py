@@ -2,15 +2,14 @@
 
 In the open robot, every body is placed unstressed with its full geometric error.
 Forces then close the loops, and Exudyn computes the static equilibrium with finite
-rotations. Only the robot data and the joint coordinates are shared with the
-virtual-joint model; placement, beams and equilibrium are computed independently.
+rotations.  The simulation and the virtual-joint model share only the robot data and the
+joint coordinates.
 
 At each frame, three motions are applied in the order of the paper: the geometric error,
 the deformation of the link, and the motion of the joint.  Rotation vector and
 translation of an error are both in the frame's axes.  Without clearances, passive
 joints move freely about or along their z axis.  A connector closes each loop.  The
-target of the connector is corrected until the closure error vanishes, so
-overconstrained rigid loops such as parallelograms need no special treatment.
+target of the connector is corrected until the closure error vanishes.
 
 Sources:
     Gerstmayr (2023), "Exudyn - a C++-based Python package for flexible multibody
@@ -75,20 +74,18 @@ from forcefit.validation.multibody.open_robot import (
 )
 
 LINKS = ("beam", "spring")
-# [s] Largest time of a simulation; the slowest known one took 26 s on an idle core.
+# [s] Largest time of a simulation.
 TIME_LIMIT = 600.0
-_FINEST = 1e-10  # [m, rad, -] smallest tolerance of Newton's last increment
-# Regularisations, tried in turn.  With contacts, connectors must not be much more
-# compliant than contacts.  A rod between two spherical joints may rotate by radians
-# about its axis under its weight unless this motion is held.
+_FINEST = 1e-10  # [m, rad, -] smallest tolerance of the last Newton increment
+# Regularisations in the order in which they are tried.  The second prevents a rod
+# between two spherical joints from rotating by radians about its axis.
 _TIGHT = (
     Regularisation(1e10, IDLE_STIFFNESS),
     Regularisation(1e10, HOLDING_STIFFNESS),
 )
-# The position of a joint within its clearance is undetermined without contact.
-# Rounding of forces moves the joint by 1e-3 m with the first regularisation, and by
-# 1e-7 m with the third, which smooths more.  At small scales, the clearances are as
-# small as these motions.  Softer contacts reduce the rounding of forces.
+# Without contact, the position of a joint within its clearance depends on round-off.
+# Softer contacts and more smoothing reduce this effect.  The connectors of closures
+# must not be much more compliant than the contacts.
 WITH_CLEARANCES = (
     Regularisation(1e12, IDLE_STIFFNESS),
     Regularisation(1e10, IDLE_STIFFNESS, contact=0.1),
@@ -100,24 +97,23 @@ WITH_CLEARANCES = (
 
 @dataclass(frozen=True, eq=False)
 class SimulationModel:
-    """Options for the model of links and joints.
+    """Options of the simulation model of links and joints.
 
     Attributes:
         links: model of the links.  ``"beam"``: links with a cross-section are
             geometrically exact beams, and other links are 6 by 6 springs.
             ``"spring"``: all links are springs.
         stiffness: mapping from frame to K_E (6, 6) [N m/rad .. N/m], at the frame in
-            its axes, for links that are springs and whose matrix is missing in the
-            robot.
-        meshes: mapping from frame to meshed body, for links that are solids of finite
+            its axes, for links that are springs and of which the robot contains no
+            matrix.
+        meshes: mapping from frame to meshed body for links that are solids of finite
             elements in a floating frame.
         elements: number of elements of each beam.
         clearances: whether joints have clearances, which are scaled like the errors.
-        bushes: whether joints with radial clearance and tilt are pins in two bushes
-            instead of a disc and a cone, see
-            :func:`forcefit.validation.multibody.contact.joint_clearance`.
-        hold: whether free motions are held from the start; otherwise they are held only
-            if no equilibrium is found.
+        bushes: whether joints with radial clearance and tilt are pins in two bushes;
+            see :func:`forcefit.validation.multibody.contact.joint_clearance`.
+        hold: whether springs act on free motions from the start.  Otherwise, springs
+            are added only if no equilibrium is found.
     """
 
     links: str = "beam"
@@ -148,8 +144,8 @@ _UNDETERMINED = (
 class MultibodyAssembly:
     """A robot assembled by the simulation.
 
-    Rows are frames in the robot's order.  Screws and wrenches are at the frame, in its
-    axes, and zero for frames without the corresponding spring.
+    Rows of arrays are frames in the order of the robot.  Screws and wrenches are at the
+    frame in its axes.  They are zero for frames without the corresponding spring.
 
     Attributes:
         platform_screw: (6,) [rad, m] rotation vector of R_actual R_nominal^T, and
@@ -157,9 +153,9 @@ class MultibodyAssembly:
         energy: [J] energy of all links and joint springs.
         link_screws: (n, 6) [rad, m] deformations of the links: logarithms of the
             relative motion.
-        link_wrenches: (n, 6) [N m, N] wrenches on the tips of the links from outside.
+        link_wrenches: (n, 6) [N m, N] wrenches on the tips of the links.
         joint_screws: (n, 6) [rad, m] deformations of the joint springs.
-        joint_wrenches: (n, 6) [N m, N] wrenches on the outer side of the joint springs.
+        joint_wrenches: (n, 6) [N m, N] wrenches on the outer ends of the joint springs.
         clearance_screws: (n, 6) [rad, m] motions of joints within clearances, and free
             motions of passive joints.
         closure_wrenches: (closures, 6) [N m, N] wrenches that the second chain of each
@@ -167,11 +163,10 @@ class MultibodyAssembly:
         transforms: (n, 4, 4) frames in the base frame, before the motion of their
             joints.
         gap: [rad, m] largest component of a closure error.
-        idle_energy: [J] energy in the weak springs on free motions, which should be
-            nearly zero.
-        contact_energy: [J] energy in the compliance of contacts.
-        held: whether springs of 0.01 N m/rad or N/m hold free motions, because no
-            equilibrium was found without them.
+        idle_energy: [J] energy of the weak springs on free motions, nearly zero.
+        contact_energy: [J] energy of the elastic contacts.
+        held: whether springs of 0.01 N m/rad or N/m act on free motions.  They are
+            added if no equilibrium is found without them.
         seconds: [s] computing time.
     """
 
@@ -194,7 +189,7 @@ class MultibodyAssembly:
 
     @property
     def rigid_energy(self) -> float:
-        """[J] energy for rigid contacts, to first order in the contacts' compliance."""
+        """Energy [J] with rigid contacts, to first order in the contact compliance."""
         return self.energy + 2 * self.contact_energy
 
 
@@ -211,16 +206,16 @@ def simulate_assembly(
     """Simulate the forced assembly of a robot in Exudyn.
 
     Args:
-        posture: the robot and its joint coordinates; actuated joints are locked there.
+        posture: the robot and its joint coordinates.  Actuated joints are locked.
         scale: factor on the robot's geometric errors and on the forces of its drives.
         model: options for links and joints.
         load: (6,) [N m, N] load of constant direction on the platform at its origin,
             base axes.
         gravity: (3,) [m/s^2] gravity in base axes.  Only bodies with a mass and beams
-            with a density have weight, because the mass of other links is unknown.
-        couple: (3,) [N m] additional couple on the platform, base axes.  The couple
-            consists of dead forces on arms that rotate with the platform.  Unlike a
-            moment about fixed axes, such a couple has a potential.
+            with a density have weight.
+        couple: (3,) [N m] additional couple on the platform, base axes.  It consists of
+            forces of constant direction on arms that rotate with the platform, so it
+            has a potential.
         time_limit: [s] time after which the simulation fails.
 
     Returns:
@@ -229,8 +224,7 @@ def simulate_assembly(
     Raises:
         BadInput: the stiffness of a spring is missing.
         SimulationFailed: no equilibrium was found.
-        OutOfTime: no solution was found within the time limit; a
-            :class:`SimulationFailed`.
+        OutOfTime: the time limit was reached.
     """
     started = time.monotonic()
     given = {name: np.asarray(K, dtype=float) for name, K in model.stiffness.items()}
@@ -284,8 +278,7 @@ def _simulate(
 ) -> MultibodyAssembly:
     """Build and solve a model, read its results, and release its memory."""
     robot = case.posture.robot
-    # The tolerance is proportional to the scale, so that it is constant relative to the
-    # clearances.
+    # The tolerance is proportional to the scale, as the clearances are.
     tolerance = max(regularisation.tolerance * min(case.scale, 1.0), _FINEST)
     regularisation = replace(regularisation, tolerance=tolerance)
     model = Model(*import_exudyn(), robot.name, regularisation)
@@ -304,15 +297,15 @@ def simulated_frequencies(
     """Return the natural frequencies of a robot in Exudyn at its nominal pose.
 
     Args:
-        posture: the robot and its joint coordinates; drives are locked.  Links with a
-            cross-section are beams with consistent masses.  Other links must be given
-            by a matrix and have no mass.
+        posture: the robot and its joint coordinates.  Drives are locked.  Links with a
+            cross-section are beams with consistent masses.  Other links must have a
+            stiffness matrix, and have no mass.
         count: largest number of frequencies.
         elements: number of elements of each beam.
 
     Returns:
-        (k,) [Hz] frequencies, lowest first.  Springs of 1e-6 N m/rad or N/m hold free
-        motions.
+        Frequencies, lowest first, (k,) [Hz].  Springs of 1e-6 N m/rad or N/m act on
+        free motions.
 
     Raises:
         BadInput: the stiffness of a link is unknown.
@@ -325,7 +318,7 @@ def simulated_frequencies(
         meshes={}, elements=elements, clearances=False, bushes=False,
         load=np.zeros(6), gravity=np.zeros(3), couple=np.zeros(3),
     )  # fmt: skip
-    # The unloaded robot is built with closed loops, so it is in equilibrium.
+    # The unloaded robot is built with closed loops and is thus in equilibrium.
     model = Model(
         *import_exudyn(), robot.name, Regularisation(math.inf, IDLE_STIFFNESS)
     )
@@ -350,19 +343,20 @@ def closing_sequence(
     scale: float = 1.0,
     load: ArrayLike | None = None,
 ) -> NDArray:
-    """Return the frames of a robot without clearances while its loops are closed.
+    """Return the frame poses of a robot without clearances while its loops are closed.
 
     Args:
         posture: the robot and its joint coordinates.  Links with a cross-section are
-            beams.  Other links must be given by a matrix.
+            beams.  Other links must have a stiffness matrix.
         steps: number of steps for closing the loops, at least 4.
         scale: factor on the geometric errors.
         load: (6,) [N m, N] load on the platform, which increases while the loops are
             closed.
 
     Returns:
-        (k, n, 4, 4) poses of the frames in the base frame.  The first state is open and
-        unstressed, and the last state is closed. k is at least ``steps + 1``.
+        Poses of the n frames in the base frame at k steps, (k, n, 4, 4), with k at
+        least ``steps + 1``.  The robot is open and unstressed at the first step, and
+        closed at the last.
 
     Raises:
         BadInput: the stiffness of a link is unknown.
@@ -400,9 +394,9 @@ def without_clearance(robot: Robot) -> Robot:
         robot: robot with or without clearances.
 
     Returns:
-        The robot, whose passive joints move about or along their z axis without bounds.
-        Closures between parallel contacts are omitted, because they are rigid without
-        clearance.
+        The robot without clearances.  Its passive joints move about or along their z
+        axis without bounds.  Closures between parallel contacts are omitted, because
+        they are rigid without clearance.
     """
     frames = tuple(replace(frame, clearance=None) for frame in robot.frames)
     return replace(robot, frames=frames, closures=loops(robot))
@@ -452,7 +446,7 @@ def _read(
 
 
 def import_exudyn() -> tuple[Any, Any, Any]:
-    """Import Exudyn without windows and console output."""
+    """Import Exudyn without its windows and console output."""
     with contextlib.redirect_stdout(io.StringIO()):
         import exudyn
         from exudyn import FEM, itemInterface

@@ -1,7 +1,7 @@
 """Compute the platform compliance in the simulation by two methods.
 
 Errors, loads and weight act as in :func:`.simulation.simulate_assembly`.  The wrench of
-a spring is the gradient of its energy, so that the tangent stiffness is symmetric.
+a spring is the gradient of its energy, so the tangent stiffness is symmetric.
 """
 
 import time
@@ -31,28 +31,29 @@ from forcefit.validation.multibody.simulation import (
     import_exudyn,
 )
 
-# Round-off of the closure forces is 1e-16 of their stiffness, enough to move compliant
-# robots.
+# Regularisations in the order in which they are tried.  Soft closures reduce the
+# round-off of closure forces.
 _REGULARISATIONS = (
     Regularisation(1e8, 1e-8), Regularisation(1e8, 1e-6), Regularisation(1e10, 1e-6)
 )  # fmt: skip
 
-# Numbers of load steps that are tried if the equilibrium is unstable.  A large step may
-# cross a bifurcation and end at an unstable equilibrium.
+# Numbers of load steps that are tried if the equilibrium is unstable, because a large
+# step may pass a bifurcation.
 _SMALLER_STEPS = (16, 64)
 
 
 @dataclass(frozen=True, eq=False)
 class SimulatedTangent:
-    """Compliance of the platform computed by two methods in one simulation.
+    """Platform compliance from two methods in the same simulation.
 
     Attributes:
         linearised: (6, 6) [rad/(N m) .. m/N] compliance from the linearised system, for
             small motions at the platform's present origin, base axes.
         stepped: (6, 6) compliance from small loads; NaN if it was not requested.
-        linearised_error: [-] uncertainty of ``linearised``, for entries over sqrt(C_ii
-            C_jj).
-        stepped_error: [-] uncertainty of ``stepped``, for entries over sqrt(C_ii C_jj).
+        linearised_error: [-] largest uncertainty of the entries of ``linearised``,
+            divided by sqrt(C_ii C_jj).
+        stepped_error: [-] largest uncertainty of the entries of ``stepped``, divided by
+            sqrt(C_ii C_jj).
         platform: (4, 4) present pose of the platform in the base frame.
         stable: whether the equilibrium is stable.
         seconds: [s] computing time.
@@ -77,33 +78,30 @@ def simulated_tangent(
     steps: bool = True,
     time_limit: float = TIME_LIMIT,
 ) -> SimulatedTangent:
-    """Return the platform's compliance at the equilibrium of errors, load and weight.
+    """Return the platform compliance at the equilibrium under errors, load and weight.
 
     Args:
         posture: the robot's configuration, with its geometric errors.
-        model: model of the links.  If it includes clearances, they are smoothed
-            contacts of 1e12 N/m, and no load steps are computed.
-        load: (6,) [N m, N] load on the platform at its origin, base axes.  The force is
-            a dead force, and the moment is a couple of dead forces.
+        model: model of links and joints.  Clearances are smoothed contacts of 1e12 N/m,
+            with which no load steps are computed.
+        load: (6,) [N m, N] load on the platform at its origin, base axes.  The force
+            has a constant direction, and the moment is a couple of such forces.
         gravity: (3,) [m/s^2] gravity in base axes.
-        steps: whether to apply load steps as well.
-        time_limit: [s] largest time of the whole computation.
+        steps: whether to compute the compliance by load steps, too.
+        time_limit: [s] largest time of the computation.
 
     Returns:
-        Both compliances.  If the equilibrium is unstable, the solution is repeated with
-        smaller load steps, and reported as unstable only if these also lead to an
-        unstable equilibrium.
+        The compliances.  If the equilibrium is unstable, the solution is repeated with
+        smaller load steps.
 
     Raises:
         BadInput: the stiffness of a spring is missing.
         SimulationFailed: no equilibrium was found.
-        OutOfTime: no solution was found within the time limit; a
-            :class:`SimulationFailed`.
+        OutOfTime: the time limit was reached.
     """
     started = time.monotonic()
     case = _case(posture, model, load, gravity)
-    # If no spring deforms, its nonlinear law is irrelevant, and Exudyn's own law is
-    # faster.
+    # Exudyn's own springs are faster, and exact if no spring deforms.
     bent = is_bent(posture.robot.errors, load, gravity)
     hard = tuple(r for r in WITH_CLEARANCES if r.contact == 1.0)
     tried = hard[:2] if model.clearances else _REGULARISATIONS
@@ -142,7 +140,7 @@ def _case(
     posture: PostureLike, model: SimulationModel,
     load: ArrayLike | None, gravity: ArrayLike | None,
 ) -> Case:  # fmt: skip
-    """Return the description of the model to be built."""
+    """Return the description of the model to build."""
     given = {name: np.asarray(K, dtype=float) for name, K in model.stiffness.items()}
     solids = dict(model.meshes)
     wrench = np.zeros(6) if load is None else np.asarray(load, dtype=float)

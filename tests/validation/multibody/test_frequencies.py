@@ -1,4 +1,4 @@
-"""Natural frequencies against Exudyn's own linearised system."""
+"""Tests of natural frequencies against Exudyn."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -18,7 +18,7 @@ ROOT = Path(__file__).parents[3]
 
 
 def extrapolated(posture, count, elements):
-    """Errors of the simulation's beams fall with the square of their number."""
+    """Return frequencies from Exudyn, extrapolated to infinitely many beam elements."""
     coarse, fine = (
         simulated_frequencies(posture, count, n) for n in (elements, 2 * elements)
     )
@@ -26,7 +26,7 @@ def extrapolated(posture, count, elements):
 
 
 def in_pieces(posture, pieces):
-    """Cut every beam into pieces."""
+    """Return the posture with every beam divided into elements."""
     robot = posture.robot
     links = {
         f.name: replace(f.link, pieces=pieces)
@@ -35,8 +35,8 @@ def in_pieces(posture, pieces):
     return replace(posture, robot=robot.with_links(links))
 
 
-def test_frequencies_of_a_beam_with_a_tip_mass_agree_with_exudyns_beam_elements():
-    """Bending in both planes, three modes each, the highest to 1e-4."""
+def test_frequencies_of_a_beam_with_tip_mass_agree_with_exudyn():
+    """The six modes are bending modes, three in each plane."""
     link = BeamLink({"width": 0.02, "height": 0.03}, 70e9, 0.3, 2700.0)
     tip = Frame("tip", translation=[1.0, 0, 0], link=link, mass=0.2,
                 centre_of_mass=[0.05, 0.0, 0.0])  # fmt: skip
@@ -47,15 +47,15 @@ def test_frequencies_of_a_beam_with_a_tip_mass_agree_with_exudyns_beam_elements(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["four_bar", "orthoglide"])
-def test_frequencies_of_robots_agree_with_the_simulation(name):
-    """Closed loops of beams and joint springs, six modes."""
+def test_frequencies_of_robots_agree_with_exudyn(name):
+    """The robots have closed loops of beams and joint springs."""
     posture = home_posture(load_robot(name))
     ours = natural_modes(in_pieces(posture, 4), 6).frequencies
     np.testing.assert_allclose(ours, extrapolated(posture, 6, 8), rtol=2e-3)
 
 
 def with_inertias(robot, rng):
-    """The robot with a body of kilograms and moments on each of its frames."""
+    """Return the robot with a random mass and inertia tensor on each frame."""
 
     def moments():
         arm = 0.1 * rng.normal(size=3)
@@ -70,7 +70,7 @@ def with_inertias(robot, rng):
 
 @pytest.mark.parametrize("moment", [0.0, 2e-4, 1e-2])
 def test_frequencies_of_a_spherical_wrist_agree_with_exudyn(moment):
-    """Three curved legs over-constrain it; Exudyn's differences leave 3e-9."""
+    """The three curved legs over-constrain the wrist."""
     robot = load_robot(ROOT / "examples" / "drawn" / "agile_eye.toml")
     J = moment * np.array([[1.0, 0.2, 0], [0.2, 0.9, -0.1], [0, -0.1, 0.8]])
     frames = (replace(f, inertia=J) if f.name == "camera" else f for f in robot.frames)
@@ -81,7 +81,7 @@ def test_frequencies_of_a_spherical_wrist_agree_with_exudyn(moment):
 
 @pytest.mark.parametrize("name", ["exechon", "arm6"])
 def test_frequencies_of_robots_with_moments_of_inertia_agree_with_exudyn(name):
-    """Bodies on every frame, beams as springs without mass."""
+    """Every frame has a mass, and beams are springs without mass."""
     path = ROOT / "tests" / "validation" / "multibody" / "exechon.toml"
     robot = with_inertias(load_robot(path if name == "exechon" else name),
                           np.random.default_rng(3))  # fmt: skip

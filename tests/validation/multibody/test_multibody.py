@@ -1,5 +1,4 @@
-"""The simulation compared with closed forms: misfits, cantilevers, chains, a
-four-bar."""
+"""Tests of the simulation against closed-form solutions."""
 
 import math
 from dataclasses import replace
@@ -42,22 +41,24 @@ def cantilever(link, length=0.5, **more):
 @pytest.mark.parametrize(
     ("row", "stiffness"), [(0, G * 2 * SECOND / 0.8), (3, E * AREA / 0.8)]
 )
-def test_an_axial_or_twist_misfit_stores_half_g_squared_k(row, stiffness):
-    """E = g^2 EA / (2 (2 L)), with GJ for a twist: exact for any size of g."""
+def test_energy_of_axial_or_twist_misfit_equals_closed_form(row, stiffness):
+    """The energy is g^2 EA / (2 (2 L)), with GJ in place of EA for a twist."""
     error = np.zeros(6)
     error[row] = 1e-3
     assembly = simulate_assembly(coaxial(error))
     assert assembly.energy == pytest.approx(1e-6 * stiffness / 2, rel=1e-9)
-    # the misfit is shared: a moves back by half of it, pressed by k g
+    # each beam deforms by half of the misfit, under the force k g
     assert assembly.platform_screw[row] == pytest.approx(0.5e-3, rel=1e-9)
     assert assembly.link_wrenches[0, row] == pytest.approx(-1e-3 * stiffness, rel=1e-9)
     assert assembly.link_wrenches[2, row] == pytest.approx(1e-3 * stiffness, rel=1e-9)
 
 
-def test_a_small_general_misfit_stores_the_series_energy(rng):
-    """E = g (C1 + C2)^-1 g / 2, with C of a cantilever at the meeting point. What large
-    misfits add is linear in their size: extrapolated to none, second order and the
-    solver's floor of about 1e-12 m are left, 1e-8 of it each."""
+def test_energy_of_a_general_misfit_equals_two_cantilevers_in_series(rng):
+    """The energy is g (C1 + C2)^-1 g / 2, with C of a cantilever where the beams meet.
+
+    The effect of finite rotations is proportional to the misfit, so the energy is
+    extrapolated to a misfit of zero.
+    """
     L = 0.4
     error = 1e-4 * rng.uniform(-1, 1, 6) * UNIT[::-1]
     shear = 6 * (1 + NU) / (7 + 6 * NU)
@@ -65,7 +66,7 @@ def test_a_small_general_misfit_stores_the_series_energy(rng):
     C = np.diag([L / (G * 2 * SECOND), b * L, b * L, L / (E * AREA), 0, 0])
     C[4, 4] = C[5, 5] = b * L**3 / 3 + L / (G * AREA * shear)
     C1, C2 = C.copy(), C.copy()
-    # fy turns the tip of the beam along +x about +z, that of the one along -x about -z
+    # fy rotates the tip of beam 1 (along +x) about +z, and that of beam 2 about -z
     C1[2, 4] = C1[4, 2] = C2[1, 5] = C2[5, 1] = b * L**2 / 2
     C1[1, 5] = C1[5, 1] = C2[2, 4] = C2[4, 2] = -b * L**2 / 2
     expected = error @ np.linalg.solve(C1 + C2, error) / 2
@@ -78,7 +79,7 @@ def test_a_small_general_misfit_stores_the_series_energy(rng):
 @pytest.mark.parametrize("elements", [1, 2, 5])
 @pytest.mark.parametrize("theory", ["timoshenko", "euler"])
 def test_corrected_beam_element_has_the_exact_bending_deflection(elements, theory):
-    """P L^3 / 3EI + P L / GA for any number of elements; up is y, the height 0.05 m."""
+    """The deflection is P L^3 / 3EI + P L / GA for any number of elements."""
     L, P = 0.5, 1e-3
     posture = cantilever(replace(FLAT, theory=theory))
     along, across = 0.05**3 * 0.02 / 12, 0.02**3 * 0.05 / 12
@@ -92,9 +93,8 @@ def test_corrected_beam_element_has_the_exact_bending_deflection(elements, theor
         assert assembly.energy == pytest.approx(P * expected / 2, rel=1e-8)
 
 
-def test_an_end_moment_bends_a_beam_to_an_arc():
-    """The curvature M / EI is constant:
-    the tip is at (sin a, 1 - cos a) L / a, with a = 1."""
+def test_beam_under_an_end_moment_is_a_circular_arc():
+    """The curvature M / EI is constant, so the tip is at (sin a, 1 - cos a) L / a."""
     L = 0.5
     moment = E * SECOND / L
     assembly = simulate_assembly(cantilever(ROUND), load=[0, 0, moment, 0, 0, 0])
@@ -103,10 +103,12 @@ def test_an_end_moment_bends_a_beam_to_an_arc():
 
 
 @pytest.mark.parametrize("kind", ["link", "joint_stiffness"])
-def test_body_with_a_full_stiffness_matrix_deforms_by_its_inverse(rng, kind):
-    """screw = K^-1 w and E = w K^-1 w / 2, for a link and for a joint."""
+def test_deformation_of_a_full_stiffness_matrix_equals_its_inverse_times_load(
+    rng, kind
+):
+    """The screw is K^-1 w, and the energy is w K^-1 w / 2."""
     K = random_stiffness(rng)
-    wrench = 1e-3 * rng.normal(size=6)  # turns by 4e-8 rad: linear to 1e-7
+    wrench = 1e-3 * rng.normal(size=6)  # small, so the response is linear
     turn = np.array([0.3, -0.4, 0.5])
     more = {"link": MatrixLink(K)} if kind == "link" else {"joint_stiffness": K}
     frame = Frame("tip", translation=[0.1, 0.2, 0.3], rotation=turn, **more)
@@ -126,9 +128,11 @@ def test_body_with_a_full_stiffness_matrix_deforms_by_its_inverse(rng, kind):
 
 @pytest.mark.parametrize("links", ["beam", "spring"])
 @pytest.mark.parametrize("elements", [1, 3])
-def test_sag_of_a_heavy_cantilever_equals_its_closed_form(links, elements):
-    """q L^4 / 8EI + q L^2 / 2GA, for elements and for a 6 by 6 spring. Scaled down to
-    1e-4 m/s^2, where the sag is linear to 1e-9."""
+def test_sag_of_a_heavy_cantilever_equals_closed_form(links, elements):
+    """The sag is q L^4 / 8EI + q L^2 / 2GA, plus that of a mass at the tip.
+
+    Gravity is 1e-4 m/s^2, so that the sag is linear.
+    """
     L, g, rho, offset = 0.5, 1e-4, 2700.0, 0.1
     posture = cantilever(
         replace(FLAT, density=rho), mass=2.0, centre_of_mass=[offset, 0, 0]
@@ -147,8 +151,10 @@ def test_sag_of_a_heavy_cantilever_equals_its_closed_form(links, elements):
 
 
 def test_deflection_of_a_heavy_beam_converges_with_the_fourth_order():
-    """Weight between nodes acts as on a cubic; with moments of constant direction the
-    order would be 2. A steel wire of 1 m and 8 mm under 3 g turns by 0.05 rad."""
+    """The error of the tip pose decreases with the fourth power of the element length.
+
+    The beam is a steel wire of 1 m length and 8 mm diameter under three times gravity.
+    """
     wire = BeamLink({"radius": 0.004}, 200e9, 0.3, density=7800.0)
     posture = home_posture(
         Robot("wire", "tip", (Frame("tip", translation=[1.0, 0, 0], link=wire),))
@@ -166,8 +172,8 @@ def test_deflection_of_a_heavy_beam_converges_with_the_fourth_order():
         assert np.log2(left[1] / left[2]) == pytest.approx(4, abs=0.1)
 
 
-def test_couple_of_dead_forces_acts_with_the_cosine_of_the_angle():
-    """A spring of 2 N m/rad about z and a couple of 1 N m: 2 angle = cos(angle)."""
+def test_couple_of_dead_forces_decreases_with_cosine_of_the_angle():
+    """For a spring of 2 N m/rad and a couple of 1 N m, 2 angle = cos(angle)."""
     frames = (
         Frame(
             "tip", translation=[0.3, 0, 0], rotation=[0.4, -0.3, 0.7], joint="revolute",
@@ -184,9 +190,11 @@ def test_couple_of_dead_forces_acts_with_the_cosine_of_the_angle():
 
 
 @pytest.mark.parametrize("clearance", [None, Clearance(radial=1e-5)])
-def test_bearing_is_free_about_its_axis_and_elastic_in_other_directions(clearance):
-    """A bar between a bearing and a wall that is misaligned by up to 3e-3 rad and 0.2
-    mm. Finite rotations change 1e-3 of it, contacts yield 1e-3 of their size."""
+def test_bearing_is_free_about_its_axis_and_otherwise_elastic(clearance):
+    """A bar connects a bearing with a misaligned wall.
+
+    Finite rotations and contact compliance change the results by about 1e-3.
+    """
     K = np.diag([2e4, 2e4, 0.0, 1.2e8, 1.2e8, 6e7])
     error = [0, 1e-4, 3e-3, 0, 0, 2e-4]
     frames = (
@@ -213,9 +221,8 @@ def test_bearing_is_free_about_its_axis_and_elastic_in_other_directions(clearanc
     assert assembly.clearance_screws[0][2] == pytest.approx(turned, rel=1e-3)
 
 
-def test_serial_chain_composes_its_errors_exactly():
-    """Placement, error and own motion, frame by frame;
-    the errors of 0.3 rad are not small."""
+def test_pose_of_a_serial_chain_is_the_product_of_its_motions():
+    """The pose of each frame is the product of finite motions, with large errors."""
     error = np.array([0.3, -0.2, 0.1, 0.01, 0.02, -0.03])
     frames = (
         Frame("turn", translation=[0, 0, 1], rotation=[0.2, 0, 0], joint="revolute",
@@ -241,9 +248,12 @@ def test_serial_chain_composes_its_errors_exactly():
         np.testing.assert_allclose(T, expected.as_matrix(), rtol=0, atol=1e-14)
 
 
-def test_four_bar_with_a_long_coupler_closes_at_the_intersection_of_two_circles():
-    """Rigid bars, free pins: crank 1 at 90 deg, coupler 2 + 0.02, rocker 2, base 2. The
-    rocker's end is where circles about (0, 1) and (2, 0) meet."""
+def test_rocker_of_a_four_bar_with_a_long_coupler_equals_closed_form():
+    """The end of the rocker is at the intersection of circles about (0, 1) and (2, 0).
+
+    The crank of length 1 is at 90 degrees.  Coupler, rocker and base have length 2, and
+    the coupler is too long by 0.02.
+    """
 
     def meeting(coupler):
         chord = math.sqrt(5)

@@ -1,4 +1,4 @@
-"""Properties of the simulation: equilibrium, objectivity, failures and memory."""
+"""Tests of equilibrium, objectivity, failures and memory of the simulation."""
 
 import math
 from dataclasses import replace
@@ -36,7 +36,7 @@ pytestmark = pytest.mark.exudyn
 
 
 def overconstrained(rng, errors):
-    """A table on three legs: clamped beams, joint springs and a free slide."""
+    """Return a platform on three legs, each with two beams and a joint spring."""
     legs, closures = [], []
     for k, angle in enumerate((0.0, 2.1, 4.2)):
         spot = [0.3 * math.cos(angle), 0.3 * math.sin(angle), 0]
@@ -54,9 +54,8 @@ def overconstrained(rng, errors):
     return home_posture(Robot("table", "leg0.tip", tuple(legs), tuple(closures)))
 
 
-def test_wrench_of_every_spring_balances_the_closures_beyond_it(rng):
-    """Statics at the deformed pose:
-    a wrench is the sum of the closure wrenches beyond it."""
+def test_spring_wrenches_balance_closure_wrenches(rng):
+    """Equilibrium is checked in the deformed state."""
     posture = overconstrained(rng, rng.uniform(-2e-3, 2e-3, (3, 6)))
     load = np.array([3.0, -2.0, 5.0, 40.0, 30.0, -100.0])
     assembly = simulate_assembly(posture, load=load)
@@ -70,7 +69,7 @@ def test_wrench_of_every_spring_balances_the_closures_beyond_it(rng):
         w = on_leg[leg]
         own = np.concatenate([R.T @ (w[:3] - np.cross(p - P, w[3:])), R.T @ w[3:]])
         if frame.joint_stiffness is not None:
-            # Exudyn reads a spring half-way between its ends: 1e-3 rad of turning
+            # Exudyn evaluates springs in mean axes, rotated by about 1e-3 rad
             np.testing.assert_allclose(
                 assembly.joint_wrenches[row], own, rtol=0, atol=3e-3 * np.abs(own).max()
             )
@@ -80,8 +79,8 @@ def test_wrench_of_every_spring_balances_the_closures_beyond_it(rng):
             )
 
 
-def test_rotating_the_whole_robot_rotates_its_results(rng):
-    """Objectivity: results do not depend on the orientation of the ground."""
+def test_results_rotate_with_the_robot(rng):
+    """The simulation is objective."""
     errors = rng.uniform(-2e-3, 2e-3, (3, 6))
     posture = overconstrained(rng, errors)
     turn = np.array([1.0, -2.0, 1.5])
@@ -110,21 +109,21 @@ def test_repeated_simulations_are_bit_identical(rng):
     assert first.energy == second.energy
 
 
-def test_simulation_fails_with_the_robots_name_if_rigid_parts_do_not_fit():
+def test_simulation_of_rigid_parts_that_do_not_fit_fails():
     frames = (
         Frame("a", translation=[1, 0, 0]),
         Frame("b", translation=[1, 0, 0], geometric_error=[0, 0, 0, 1e-4, 0, 0]),
     )
     posture = home_posture(Robot("block", "a", frames, (("a", "b"),)))
     with pytest.raises(
-        SimulationFailed, match="stays open by 0.0001 rad or m"
+        SimulationFailed, match="a closure error of 0.0001 rad or m remains"
     ) as error:
         simulate_assembly(posture)
     assert error.value.robot == "block"
 
 
 def test_simulation_fails_for_an_unresisted_load():
-    """A free pin under 10 N m."""
+    """A moment of 10 N m acts about the axis of a free pin."""
     frames = (Frame("pin", joint="revolute"), Frame("tip", "pin"))
     posture = home_posture(Robot("pendulum", "tip", frames))
     with pytest.raises(SimulationFailed, match="no equilibrium while closures are clo"):
@@ -144,7 +143,7 @@ def test_spring_link_without_matrix_is_rejected():
 
 
 def test_logarithm_inverts_the_exponential_map(rng):
-    """Also near the angle 1e-3, below which the series is used."""
+    """A series is used below an angle of 1e-3."""
     for size in (0.0, 1e-9, 0.999e-3, 1.001e-3, 0.1, 3.0):
         direction = rng.normal(size=3)
         turn = size * direction / np.linalg.norm(direction)
@@ -156,7 +155,7 @@ def test_logarithm_inverts_the_exponential_map(rng):
 
 
 def test_closing_sequence_reduces_gaps_evenly(rng):
-    """From the open robot with errors to the assembly, in even steps."""
+    """The gaps decrease in equal steps from the open robot to the assembly."""
     posture = overconstrained(rng, rng.uniform(-2e-3, 2e-3, (3, 6)))
     robot = posture.robot
     sequence = closing_sequence(posture, steps=5)
@@ -167,7 +166,7 @@ def test_closing_sequence_reduces_gaps_evenly(rng):
     ]
     gaps = np.reshape(gaps, (len(robot.closures), -1))
     assert len(sequence) >= 6
-    # The remaining gap is the deformation of the connectors, one per cent.
+    # Deformation of the connectors changes the gaps by about one per cent.
     expected = gaps[:, :1] * np.linspace(1, 0, 6)
     np.testing.assert_allclose(gaps[:, :6], expected, atol=0.02 * gaps.max())
     assert gaps[:, -1].max() < 1e-11
@@ -176,7 +175,7 @@ def test_closing_sequence_reduces_gaps_evenly(rng):
 
 
 def resident():
-    """[MiB] memory of this process."""
+    """Return the resident memory of this process in MiB."""
     status = Path("/proc/self/status").read_text(encoding="ascii").splitlines()
     (line,) = (line for line in status if line.startswith("VmRSS"))
     return int(line.split()[1]) / 1024
@@ -184,8 +183,7 @@ def resident():
 
 @pytest.mark.slow
 def test_repeated_simulations_do_not_leak_memory(rng):
-    """Resident memory in MiB after the first fifty simulations;
-    a leaked model takes half a MiB."""
+    """A model that is not released occupies half a MiB."""
     posture = overconstrained(rng, rng.uniform(-2e-3, 2e-3, (3, 6)))
     for _ in range(50):
         simulate_assembly(posture)
@@ -196,9 +194,11 @@ def test_repeated_simulations_do_not_leak_memory(rng):
 
 
 @pytest.mark.slow
-def test_simulations_with_contacts_and_failures_do_not_leak_memory():
-    """User functions of Exudyn hold their model until it is released. Every other one
-    runs out of time; a leaked model is half a MiB."""
+def test_simulations_with_contacts_or_failures_do_not_leak_memory():
+    """A model that is not released occupies half a MiB.
+
+    Every second simulation fails because of its time limit.
+    """
     clearance = Clearance(axial=3e-5, radial=1e-5)
     frames = list(coaxial([0, 0, 0, 1e-5, 0, 1e-4]).robot.frames)
     frames[0] = replace(frames[0], clearance=clearance)
@@ -220,14 +220,14 @@ def test_simulations_with_contacts_and_failures_do_not_leak_memory():
 
 
 def relax(model, start, _steps):
-    """Instead of the static solver: 60 s of damped motion from the last state."""
+    """Simulate 60 s of damped motion from the last state, as a static solver."""
     settings = model.exu.SimulationSettings()
     settings.linearSolver.solverType = model.exu.LinearSolverType.EigenSparse
     settings.solution.file.write = False
     run = settings.timeIntegration
     run.startTime, run.endTime, run.numberOfSteps = start, start + 60.0, 600
     run.verboseMode = 0
-    run.generalizedAlpha.spectralRadius = 0.1  # kills what oscillates
+    run.generalizedAlpha.spectralRadius = 0.1  # damps oscillations
     run.generalizedAlpha.computeInitialAccelerations = False
     run.newton.useModifiedNewton = False
     run.newton.relativeTolerance = run.newton.absoluteTolerance = 1e-6
@@ -238,7 +238,7 @@ def relax(model, start, _steps):
 @pytest.mark.slow
 @pytest.mark.parametrize("case", ["coaxial beams", "table on three legs", "irsbot2"])
 def test_dynamic_relaxation_reaches_the_same_equilibrium(case, rng, monkeypatch):
-    """Another solver of the same model: time steps until all parts are at rest."""
+    """The same model is simulated in time until all bodies are at rest."""
     if case == "irsbot2":
         robot = load_robot("irsbot2")
         errors = np.zeros((len(robot.frames), 6))

@@ -1,4 +1,4 @@
-"""Clearances of a micrometre under load have an equilibrium at small scales too."""
+"""Tests of the simulation of clearances of a few micrometres under load."""
 
 from pathlib import Path
 
@@ -18,9 +18,8 @@ POSE = {"tz": 0.8, "rx": 0.32, "ry": 0.22}
 @pytest.mark.slow
 @pytest.mark.exudyn
 @pytest.mark.parametrize("scale", [0.25, 0.125])
-def test_tripod_with_clearances_of_a_micrometre_has_the_linear_energy(scale):
-    """Exechon, overconstrained twice;
-    clearances of 8 um, a quarter and an eighth of it."""
+def test_energy_with_small_clearances_agrees_with_linear_model(scale):
+    """The Exechon is overconstrained twice and has clearances of 2 and 1 um."""
     posture = place_robot(read_robot(EXECHON), pose=POSE)
     load = scale * np.array([0, 0, 0, 0, 0, -200.0])
     found = simulate_assembly(
@@ -34,8 +33,7 @@ def test_tripod_with_clearances_of_a_micrometre_has_the_linear_energy(scale):
 @pytest.mark.slow
 @pytest.mark.exudyn
 def test_contact_energy_is_small_at_every_scale():
-    """The model is self-similar:
-    with load, errors and clearances times s, the energies scale with s^2."""
+    """Load, errors and clearances are multiplied by the same scale."""
     pose = {"tz": 0.7714, "rx": 0.3964, "ry": 0.2341}
     posture = place_robot(read_robot(EXECHON), pose=pose)
     for scale in (1.0, 0.5, 0.125):

@@ -1,4 +1,4 @@
-"""Assembly steps compared with a sequence of simulations with finite motions."""
+"""Tests of assembly steps against a sequence of simulations with finite motions."""
 
 import numpy as np
 import pytest
@@ -40,7 +40,7 @@ def three_beams(errors, closed=(), shim=None):
 
 
 def by_simulation(errors, load):
-    """C is bolted while the platform is loaded, then B is forced, then unloaded."""
+    """Simulate bolting C under the load, forcing B, and removing the load."""
     open_ = three_beams(errors)
     loaded = simulate_assembly(open_, load=load)
     rows = {frame.name: i for i, frame in enumerate(open_.robot.frames)}
@@ -49,8 +49,8 @@ def by_simulation(errors, load):
     return simulate_assembly(three_beams(errors, ("c", "b"), shim))
 
 
-def test_small_motions_of_joined_parts_differ_from_finite_ones_by_second_order():
-    """Halving errors and loads divides the difference by four."""
+def test_linear_assembly_steps_differ_from_finite_ones_by_second_order():
+    """If errors and loads are halved, the difference decreases by a factor of four."""
     errors = {
         "b": np.array([2e-3, -1e-3, 1e-3, 4e-4, -3e-4, 5e-4]),
         "c": np.array([-1e-3, 2e-3, 1e-3, -2e-4, 4e-4, 3e-4]),

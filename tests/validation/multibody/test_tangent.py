@@ -1,4 +1,4 @@
-"""The platform's compliance at an equilibrium of the simulation, by two methods."""
+"""Tests of the platform compliance in the simulation, by two methods."""
 
 import numpy as np
 import pytest
@@ -41,8 +41,8 @@ def test_tangent_without_load_is_the_nominal_compliance(name, links):
 
 
 @pytest.mark.parametrize("share", [-0.8, 0.5, 0.9])
-def test_loaded_bar_on_a_torsion_spring_has_stiffness_k_minus_force(share):
-    """A rigid bar of 1 m in tension or compression: 1 / C_yy = k - F."""
+def test_stiffness_of_a_loaded_bar_is_reduced_by_the_force(share):
+    """For a rigid bar of 1 m under the axial force F, 1 / C_yy = k - F."""
     k = 50.0
     link = MatrixLink(np.diag([1e9, 1e9, k, 1e9, 1e9, 1e9]))
     frames = (Frame("foot", link=link), Frame("tip", "foot", [1.0, 0, 0]))
@@ -51,13 +51,13 @@ def test_loaded_bar_on_a_torsion_spring_has_stiffness_k_minus_force(share):
     answer = simulated_tangent(posture, SimulationModel("spring"), load)
     expected = 1 / (k - share * k)
     for C in (answer.linearised, answer.stepped):
-        # The other springs deform by 1e-9.
+        # the other springs are stiff, with relative deformations of 1e-9
         assert C[4, 4] == pytest.approx(expected, rel=3e-7)
 
 
 @pytest.mark.parametrize("size", [1e-3, 0.05, 0.3])
 def test_wrench_of_a_bent_spring_is_the_gradient_of_its_energy(size):
-    """At both ends, along six twists of the far end."""
+    """The gradient is computed by differences along six twists of the far end."""
     rng = np.random.default_rng(3)
     B = rng.normal(size=(6, 6))
     K = B @ B.T + np.eye(6)
@@ -65,7 +65,7 @@ def test_wrench_of_a_bent_spring_is_the_gradient_of_its_energy(size):
     T, half = exponential(screw), turned(screw[:3] / 2)
     wrench = np.array(middle_wrench(K.tolist(), screw.tolist()))
     moment, force = np.split(wrench.reshape(2, 3) @ half.T, 2)
-    # as Exudyn applies it: half the shift from either end
+    # Exudyn applies the wrench at half of the translation from each end
     arm = half @ screw[3:] / 2
     near = np.concatenate([moment[0] + np.cross(arm, force[0]), force[0]])
     couple = T[:3, :3] @ far_couple(screw.tolist(), wrench[3:].tolist())
@@ -79,9 +79,8 @@ def test_wrench_of_a_bent_spring_is_the_gradient_of_its_energy(size):
     np.testing.assert_allclose(far, near, atol=1e-14 * np.abs(near).max())
 
 
-def test_tangent_of_a_spring_rotated_by_half_a_radian_follows_from_its_energy():
-    """The force times the spring's shift across the rotation is a couple,
-    which Exudyn omits."""
+def test_tangent_of_a_spring_with_large_rotation_equals_exact_tangent():
+    """The reference is the tangent at the exact equilibrium."""
     K = np.diag([40.0, 50.0, 60.0, 300.0, 400.0, 500.0])
     frames = (
         Frame("foot", translation=[0.5, 0, 0], link=MatrixLink(K)),
@@ -98,7 +97,7 @@ def test_tangent_of_a_spring_rotated_by_half_a_radian_follows_from_its_energy():
 
 
 def soft_four_bar():
-    """Four bars on soft springs, forced together from 0.2 rad and 0.2 m apart."""
+    """Return a four-bar on soft springs with errors of 0.2 rad and 0.2 m."""
     K = np.diag([10.0, 10.0, 10.0, 300.0, 400.0, 500.0])
     frames = (
         Frame("crank", joint="revolute"),
@@ -116,20 +115,22 @@ def soft_four_bar():
 
 
 def test_weak_springs_of_free_joints_do_not_change_the_tangent(monkeypatch):
-    """Joints turn by radians,
-    and springs of 1e-4 N m/rad would bend the robot elsewhere."""
+    """Joints rotate by radians against springs of 1e-4 N m/rad."""
     weak = (Regularisation(1e8, 1e-4),)
     monkeypatch.setattr(tangent, "_REGULARISATIONS", weak)
     posture = soft_four_bar()
     expected = exact_tangent(solve_exact(posture)).compliance
     simulated = simulated_tangent(posture, link_models(posture.robot, "spring"))
-    # Without the correction: 2e-5 and 1e-4.
+    # without the correction, the differences would be 2e-5 and 1e-4
     assert relative(expected, simulated.linearised) < 1e-8
     assert relative(expected, simulated.stepped) < 1e-7
 
 
 def loaded_orthoglide(share):
-    """Orthoglide and a load under which its platform tilts, from two thirds on."""
+    """Return the Orthoglide at equilibrium under a load, and the load.
+
+    The platform tilts if the factor ``share`` exceeds two thirds.
+    """
     robot = without_play(load_robot("orthoglide"))
     errors = np.random.default_rng(4).uniform(-1, 1, (len(robot.frames), 6))
     robot = robot.with_errors(errors * np.repeat([1e-3, 1e-4], 3))
@@ -140,8 +141,8 @@ def loaded_orthoglide(share):
     return solve_exact(posture, load * [0, 0, 0, 1, 1, 1], bodies=couples), load
 
 
-def test_closure_of_finite_stiffness_preserves_its_wrench():
-    """The closure deforms by a millimetre under 1e5 N."""
+def test_compliance_does_not_depend_on_closure_stiffness():
+    """The connector of the closure deforms by a millimetre under 1e5 N."""
     equilibrium, load = loaded_orthoglide(0.5)
     posture = equilibrium.posture
     model = link_models(posture.robot, "spring")
@@ -151,8 +152,8 @@ def test_closure_of_finite_stiffness_preserves_its_wrench():
 
 
 @pytest.mark.slow
-def test_smaller_load_steps_lead_to_the_stable_equilibrium(monkeypatch):
-    """Beyond a bifurcation large steps stay on the unstable branch."""
+def test_smaller_load_steps_find_the_stable_equilibrium(monkeypatch):
+    """Large steps beyond a bifurcation lead to an unstable equilibrium."""
     equilibrium, load = loaded_orthoglide(1.0)
     assert equilibrium.least_curvature > 0
     posture = equilibrium.posture

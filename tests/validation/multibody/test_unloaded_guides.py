@@ -1,4 +1,4 @@
-"""Simulation of a rigid stage of guides whose errors are inside its clearances."""
+"""Tests of the simulation of a stage on guides with errors within its clearances."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ CLEARANCES = SimulationModel(clearances=True)
 
 @pytest.fixture
 def stages(tmp_path, rng):
-    """Three stages with errors of about 0.03 mrad and 3 um of every rigid part."""
+    """Return three stages with errors of about 0.03 mrad and 3 um on every frame."""
     path = tmp_path / "stage.toml"
     path.write_text(STAGE)
     robot = read_robot(path)
@@ -29,7 +29,7 @@ def stages(tmp_path, rng):
     return [home_posture(robot.with_errors(errors)) for errors in draws]
 
 
-def test_stages_under_a_load_reach_the_equilibrium_of_the_linear_model(stages):
+def test_loaded_stage_agrees_with_the_linear_model(stages):
     """Elastic contacts and finite rotations change the clearances by about 1e-3."""
     load = [0, 0, 0, 60.0, 50.0, -100.0]
     for stage in stages:
@@ -39,14 +39,14 @@ def test_stages_under_a_load_reach_the_equilibrium_of_the_linear_model(stages):
         assert found.platform_screw @ load == pytest.approx(work, rel=5e-3)
 
 
-def test_failures_without_a_load_state_that_positions_are_undetermined(stages):
+def test_failure_without_a_load_reports_undetermined_positions(stages):
     failures = []
     for stage in stages:
         try:
             found = simulate_assembly(stage, model=CLEARANCES)
         except SimulationFailed as error:
             failures.append(str(error))
-        else:  # where the solver succeeds, the stage stores no energy
+        else:  # the stage fits within its clearances and stores no energy
             assert found.rigid_energy < 1e-6
     for message in failures:
         assert "no equilibrium" in message
