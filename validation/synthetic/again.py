@@ -1,8 +1,7 @@
-"""Measure how far a simulated machine is from its target poses.
+"""Compute the distance of a simulated machine from its target poses.
 
-The distance refers to the true pose, without noise and without device errors.  It
-therefore tests corrected commands independently of the readings from which they were
-computed.
+The true poses are used, without noise and device errors.  The distance therefore tests
+corrected commands independently of the readings from which they were computed.
 """
 
 from collections.abc import Sequence
@@ -34,15 +33,15 @@ def distances(
 
     Args:
         robot: the declared robot.
-        effects: effects of the machine; those that change only the readings are
+        effects: effects of the machine.  Effects that change only the readings are
             ignored.
         targets: commands at which the nominal robot reaches the target poses.
         coordinates: (R, n) [rad or m] nominal coordinates of the commands.
         program: name of the simulation program.
 
     Returns:
-        (R, 2) distance between actual and target reference point [m], and angle between
-        actual and target orientation [rad].
+        Distance between actual and target reference point [m], and angle between actual
+        and target orientation [rad], (R, 2).
     """
     names = [frame.name for frame in robot.frames]
 

@@ -8,20 +8,22 @@ from forcefit.validation.synthetic.effects import Row
 
 
 def behind(time_constant: float) -> str:
-    """Return the name of the temperature [K] that lags by a time constant [s]."""
+    """Return the name of the covariate with a temperature that lags."""
     return f"behind {time_constant!r}"
 
 
 def with_delays(rows: Sequence[Row], time_constants: Iterable[float]) -> list[Row]:
-    """Add lagged temperatures to the rows, assuming linear variation between rows.
+    """Add lagged temperatures to the rows.
+
+    The recorded temperature varies linearly between rows.
 
     Args:
         rows: rows in the order of time.
         time_constants: [s] time constant of each lagged temperature.
 
     Returns:
-        The rows with one lagged temperature per time constant.  In the first row, all
-        lagged temperatures equal the recorded one.
+        The rows with one lagged temperature per time constant.  In the first row, the
+        lagged temperatures equal the recorded temperature.
     """
     rows = list(rows)
     for late in dict.fromkeys(time_constants):

@@ -33,23 +33,22 @@ class CampaignDesign:
 
     Attributes:
         configurations: number of distinct configurations.
-        rows: number of measurements; the configurations alternate during the session.
+        rows: number of measurements, in which the configurations alternate.
         reach: [rad] largest change of a revolute drive from its home position; for a
             prismatic drive it is multiplied by ``size``.
         size: [m] length by which ``reach`` is multiplied.
         load: [N] largest force applied to the platform.
-        levels: levels of the load: ``"many"`` for many magnitudes and directions;
-            ``"one"`` for the same force in every row.
-        temperature: ``"swing"``: -0.5 ... 6.5 K; ``"around"``: -4 ... 4 K;
-            ``"constant"``: 6 K.
+        levels: ``"many"`` for loads of many magnitudes and directions, or ``"one"`` for
+            the same force in every row.
+        temperature: range of the temperature: ``"swing"`` for -0.5 to 6.5 K,
+            ``"around"`` for -4 to 4 K, or ``"constant"`` for 6 K.
         command: form of the commands in the file, ``"joints"`` or ``"pose"``.
         humidity: whether the covariate ``humidity`` [%] is recorded.
         tilt: [rad] magnitude of the covariate ``tilt``; 0 if it is not recorded.
-        gravity: [m/s^2] magnitude of the recorded gravity, which points vertically
-            down.
+        gravity: [m/s^2] magnitude of the recorded gravity, which acts along -z.
         reference_point: [m] measured point, at which loads act, platform axes.
-        corners: whether half of the configurations have every drive at an end of its
-            reach.
+        corners: whether every drive is at an end of its range in half of the
+            configurations.
     """
 
     configurations: int = 24
@@ -91,14 +90,14 @@ class CampaignDesign:
 
 
 def varied_for(design: CampaignDesign, names: Iterable[str]) -> CampaignDesign:
-    """Extend a design so that it varies the covariates on which effects depend.
+    """Return a design that varies the covariates on which effects depend.
 
     Args:
         design: initial design.
         names: names of the effects.
 
     Returns:
-        The design, with additional varying conditions where the effects require them.
+        The design with the additional conditions.
     """
     given = {key: v for n in names for key, v in _VARIED_FOR.get(n, {}).items()}
     return replace(design, **given)
@@ -111,7 +110,7 @@ class CampaignPlan:
     Attributes:
         rows: rows in measuring order.
         configuration: (rows,) index of the configuration of each row.
-        commands: (rows, m) values written to the file.
+        commands: (rows, m) commands in the file.
         columns: names of the m columns.
     """
 
@@ -135,7 +134,7 @@ def plan_campaign(
         The plan.
 
     Raises:
-        BadInput: the loops can be closed in hardly any configuration within the reach.
+        BadInput: the loops can be closed in too few configurations within the reach.
     """
     coordinates = _configurations(robot, design, rng)
     commands, columns, coordinates = _commands(robot, design, coordinates)
@@ -172,7 +171,7 @@ def plan_campaign(
 def _configurations(
     robot: Robot, design: CampaignDesign, rng: np.random.Generator
 ) -> NDArray:
-    """Return joint coordinates (k, n) that close the loops of the nominal robot."""
+    """Return joint coordinates that close the loops of the nominal robot, (k, n)."""
     home = home_posture(robot)
     spans = np.array([
         0.0 if not f.actuated
@@ -193,7 +192,7 @@ def _configurations(
         if len(reachable) >= design.configurations:
             return np.array(reachable[: design.configurations])
     raise BadInput(
-        f"{robot.name}: the loops can be closed in hardly any configuration within "
+        f"{robot.name}: the loops can be closed in too few configurations within "
         f"{design.reach:g} rad of the home position; expected a smaller reach"
     )
 
@@ -220,14 +219,17 @@ def _commands(
 
 
 def _interleaved(design: CampaignDesign, rng: np.random.Generator) -> NDArray:
-    """Return the configuration of each row; each pass visits all in a new order."""
+    """Return the configuration of each row.
+
+    Each pass visits all configurations in a new random order.
+    """
     passes = -(-design.rows // design.configurations)
     orders = [rng.permutation(design.configurations) for _ in range(passes)]
     return np.concatenate(orders)[: design.rows]
 
 
 def _loads(design: CampaignDesign, order: NDArray, rng: np.random.Generator) -> NDArray:
-    """Return loads (rows, 6) [N m, N]; each configuration repeats two of its loads."""
+    """Return loads of all rows, with repeated loads, (rows, 6) [N m, N]."""
     loads = np.zeros((design.rows, 6))
     if design.levels == "one":
         loads[:, 3:] = (design.load * _direction(rng)).round(3)
@@ -245,7 +247,7 @@ def _loads(design: CampaignDesign, order: NDArray, rng: np.random.Generator) -> 
 
 
 def _load(largest: float, rng: np.random.Generator) -> NDArray:
-    """Return a force (3,) [N], full or half, along an axis or in a random direction."""
+    """Return a random force (3,) [N]."""
     if rng.random() < 0.5:
         axis = np.zeros(3)
         axis[rng.integers(3)] = rng.choice([-1.0, -0.5, 0.5, 1.0])
@@ -254,7 +256,7 @@ def _load(largest: float, rng: np.random.Generator) -> NDArray:
 
 
 def _direction(rng: np.random.Generator) -> NDArray:
-    """Return a unit vector (3,) in a random direction."""
+    """Return a random unit vector (3,)."""
     vector = rng.normal(size=3)
     return vector / np.linalg.norm(vector)
 
@@ -262,7 +264,7 @@ def _direction(rng: np.random.Generator) -> NDArray:
 def _temperature(
     design: CampaignDesign, time: NDArray, rng: np.random.Generator
 ) -> NDArray:
-    """Return the temperature (rows,) [K] of each row."""
+    """Return the temperature of each row, (rows,) [K]."""
     if design.temperature == "constant":
         return np.full(len(time), 6.0)
     middle, size = (3.0, 3.5) if design.temperature == "swing" else (0.0, 4.0)

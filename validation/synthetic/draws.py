@@ -25,25 +25,27 @@ SLIDING = ("_lead", "_lead_backlash")  # effects of prismatic joints only
 
 
 class NotApplicable(ValueError):
-    """Exception raised if an effect cannot act anywhere on the robot."""
+    """Exception raised if an effect does not apply to a robot."""
 
 
 def draw_effect(
     name: str, robot: Robot, duration: float, rng: np.random.Generator
 ) -> Hidden:
-    """Return an effect with plausible random parameters, at one place or everywhere.
+    """Return an effect with plausible random parameters.
+
+    The effect acts on one frame or on all frames.
 
     Args:
         name: name of the effect.
-        robot: the robot with the effect.
+        robot: the robot.
         duration: [s] duration of the session.
         rng: random number generator.
 
     Raises:
         BadInput: the name of the effect is unknown.
-        NotApplicable: the effect cannot act anywhere on the robot.
+        NotApplicable: the effect does not apply to the robot.
     """
-    # Effects outside the library are only for tests, so the message does not list them.
+    # The message does not list effects outside the library, which are only for tests.
     if name not in (*LIBRARY, *OUTSIDE):
         raise BadInput(
             f'effect: found "{name[:60]}", expected one of {", ".join(LIBRARY)}'
@@ -52,11 +54,11 @@ def draw_effect(
 
 
 def strengthened(effect: Hidden, factor: float) -> Hidden:
-    """Return the effect with its contribution to the readings multiplied by a factor.
+    """Return the effect with a larger or smaller contribution to the readings.
 
     Args:
         effect: effect with its parameters.
-        factor: [-] positive factor.
+        factor: [-] factor on the contribution, > 0.
     """
     name, given = effect.name, dict(effect.parameters)
     for key, value in given.items():
@@ -79,12 +81,12 @@ def strengthened(effect: Hidden, factor: float) -> Hidden:
 
 
 def _one(frames: list[Frame], rng: np.random.Generator) -> str:
-    """Pick the name of a random frame."""
+    """Return the name of a random frame."""
     return frames[rng.integers(len(frames))].name
 
 
 def _some(frames: list[Frame], rng: np.random.Generator) -> list[str]:
-    """Pick either the name of a random frame or all names."""
+    """Return the name of a random frame or all names."""
     if not frames:
         raise NotApplicable("the robot has no frame on which the effect acts")
     return [_one(frames, rng)] if rng.random() < 0.5 else [f.name for f in frames]
@@ -108,13 +110,13 @@ def _turning(robot: Robot) -> list[Frame]:
 
 
 def _vector(name: str, components: Iterable[str], values: NDArray) -> Parameters:
-    """Name the components of a vector as parameters ``<name>.<component>``."""
+    """Return parameters ``<name>.<component>`` with the components of a vector."""
     keys = (f"{name}.{component}" for component in components)
     return dict(zip(keys, values.tolist(), strict=True))
 
 
 def _wave(name: str, size: float, rng: np.random.Generator) -> Parameters:
-    """Return a random amplitude and phase of a harmonic error at a frame."""
+    """Return a random amplitude and phase of a harmonic error of a frame."""
     amplitude = size * rng.uniform(0.5, 1.0)
     phase = rng.uniform(-math.pi, math.pi)
     return {f"{name}.amplitude": amplitude, f"{name}.phase": phase}

@@ -3,14 +3,11 @@
 The machine is a tree of frames, and most effects insert frames into it.  For example,
 an elastic drive is a spring after the joint, an encoder error is a finite rotation
 after the joint, and an elastic foundation is a spring below all frames.  Other effects
-change a body (length, compliance, clearance) or the load (weight, or a difference from
-the recorded load).  The remaining effects change the measuring frame, or only the
-reading.
+change a body, the load, the measuring frame or the reading.
 
-The effect models of the diagnosis are deliberately not used here, so that an error in
-them cannot affect the test data.  Names and parameters of effects are the public ones.
-Springs, rotations and translations of joints act about or along the z axis of the
-joint.
+The effect models of the diagnosis are not used here, so that an error in them cannot
+affect the test data.  Springs, rotations and translations of joints act about or along
+the z axis of the joint.
 """
 
 import math
@@ -34,15 +31,15 @@ Parameters = Mapping[str, float]
 
 @dataclass(frozen=True, eq=False)
 class Row:
-    """One commanded measurement.
+    """Commanded measurement.
 
     Attributes:
         coordinates: mapping from frame to the nominal coordinate of its joint [rad or
             m].
         load: (6,) [N m, N] recorded load at the reference point, base axes.
-        covariates: values of ``temperature`` [K], ``time`` [s], ``approach`` and
-            additional covariates.  ``gravity.x`` .. ``gravity.z`` [m/s^2] are the
-            components of gravity.
+        covariates: mapping from covariate to value, for example ``temperature`` [K],
+            ``time`` [s], ``approach``, and the components ``gravity.x`` to
+            ``gravity.z`` [m/s^2] of gravity.
     """
 
     coordinates: Mapping[str, float]
@@ -56,14 +53,14 @@ class Machine:
 
     Attributes:
         robot: robot with the frames that effects inserted.  The load acts on its
-            platform, whose pose is measured.
+            platform, and the pose of the platform is measured.
         coordinates: mapping from frame to joint coordinate [rad or m]; 0 for missing
             joints.
         load: (6,) [N m, N] applied load.
         gravity: (3,) [m/s^2] gravity in base axes.
         laws: mapping from frame to the nonlinear spring of its joint, or to the
-            clearance of a joint on an open chain, where the load determines the
-            position; see :mod:`forcefit.validation.synthetic.rest`.
+            clearance of its joint on an open chain; see
+            :mod:`forcefit.validation.synthetic.rest`.
     """
 
     robot: Robot
@@ -103,14 +100,14 @@ def insert_after(robot: Robot, name: str, suffix: str, **given: Any) -> Robot:
 
 
 def along_own_axis(frame: Frame, value: float, others: float = 0.0) -> NDArray:
-    """Return (6,) with one value along a joint's motion and another elsewhere."""
+    """Return a vector (6,) with a given component along the motion of a joint."""
     screw = np.full(6, others)
     screw[frame.own_axis] = value
     return screw
 
 
 def sprung(frame: Frame, stiffness: float) -> NDArray:
-    """Return a stiffness (6, 6), finite along a joint's motion and rigid elsewhere."""
+    """Return a stiffness (6, 6) that is finite only along a joint's motion."""
     return np.diag(along_own_axis(frame, stiffness, math.inf))
 
 
@@ -123,9 +120,9 @@ def beam_length(robot: Robot, name: str) -> float:
 
 
 def lengthened(robot: Robot, name: str, change: float) -> Robot:
-    """Lengthen a body by ``change`` [m] along its actual axis."""
+    """Return the robot with a body that is longer by ``change`` [m]."""
     frame = robot.frame(name)
-    if not isinstance(frame.link, BeamLink):  # lengthen the line between its joints
+    if not isinstance(frame.link, BeamLink):  # the body ends at its joints
         longer = 1.0 + change / float(np.linalg.norm(frame.translation))
         return with_frame(robot, replace(frame, translation=longer * frame.translation))
     length, x = beam_span(frame, frame.link)
@@ -137,7 +134,7 @@ def lengthened(robot: Robot, name: str, change: float) -> Robot:
 
 
 def with_frame(robot: Robot, frame: Frame) -> Robot:
-    """Replace the frame of the same name."""
+    """Return the robot with the frame of the same name replaced."""
     frames = (frame if f.name == frame.name else f for f in robot.frames)
     return replace(robot, frames=tuple(frames))
 
@@ -152,10 +149,9 @@ def misread(machine: Machine, name: str, suffix: str, change: float) -> Machine:
 def displacing(
     suffix: str, component: str, amount: Callable[[Row, Parameters, str], float]
 ) -> Change:
-    """Return a function that displaces the drives of a machine by an amount [rad or m].
+    """Return a function that displaces the drives named in an effect's parameters.
 
-    The drives are the frames in parameters ``<frame>.<component>``, or in parameters
-    ``<frame>`` without a component.
+    Parameters are named ``<frame>.<component>`` or ``<frame>``.
     """
 
     def change(machine: Machine, row: Row, given: Parameters) -> Machine:
@@ -281,7 +277,7 @@ def _load_gain(machine: Machine, row: Row, given: Parameters) -> Machine:
 
 
 def _body_mass(machine: Machine, row: Row, given: Parameters) -> Machine:
-    """Add a mass [kg] to a body, centred at the moment [kg m] divided by the mass."""
+    """Add a mass [kg] with a first moment [kg m] to a body."""
     robot = machine.robot
     keys = ("mass", "moment.x", "moment.y", "moment.z")
     for name in dict.fromkeys(n for key in keys for n in named(given, key)):
@@ -295,11 +291,11 @@ def _body_mass(machine: Machine, row: Row, given: Parameters) -> Machine:
 
 
 def _geometric_stiffening(machine: Machine, row: Row, given: Parameters) -> Machine:
-    return machine  # the simulation always contains this effect
+    return machine  # the simulation uses finite motions, which contain this effect
 
 
 def _registration(pose: NDArray, row: Row, given: Parameters) -> NDArray:
-    """Express the pose of a displaced point in a displaced measuring frame."""
+    """Return the pose of a displaced target in a displaced measuring frame."""
     screw = np.array([given.get(f"base.{k}", 0.0) for k in SCREW])
     tool = [given.get(f"tool.{k}", 0.0) for k in SCREW[3:]]
     measured = pose.copy()
@@ -308,7 +304,7 @@ def _registration(pose: NDArray, row: Row, given: Parameters) -> NDArray:
 
 
 def _device_scale(pose: NDArray, row: Row, given: Parameters) -> NDArray:
-    """Scale all lengths measured from the origin of the device."""
+    """Scale all lengths from the origin of the device."""
     measured = pose.copy()
     measured[:3, 3] *= given["factor"]
     return measured
@@ -322,7 +318,7 @@ def _drift(reading: NDArray, row: Row, given: Parameters) -> NDArray:
 
 
 def named(given: Parameters, component: str) -> list[str]:
-    """Return the frames named in parameters ``<frame>.<component>`` of a component."""
+    """Return the frames in the parameters ``<frame>.<component>`` of a component."""
     end = f".{component}"
     return [key.removesuffix(end) for key in given if key.endswith(end)]
 

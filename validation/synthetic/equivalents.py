@@ -1,15 +1,12 @@
 """Find effects that a design cannot distinguish from the hidden effects.
 
 The signature of an effect is the first-order change of the readings, divided by the
-noise.  Signatures of all public effects are computed by ``springs.py``, not by the
-model under test.  A set of effects explains the data as well as the hidden effects do
-if a combination of its signatures equals their contribution within the noise.  A
-diagnosis that names such a set is therefore not wrong.
+noise.  It is computed by ``springs.py``, independently of the model under test.  A set
+of effects explains the data as well as the hidden effects if a linear combination of
+its signatures equals the contribution of the hidden effects within the noise.  A
+diagnosis that names such a set is not wrong.
 
-The signature of a rotated drive or a lengthened beam depends only on the configuration,
-and the signatures of temperature, approach and contact follow from it.  An arm
-therefore requires 600 solutions instead of 5000.  Clearance and geometric stiffening
-are omitted, because they have no linear signature.
+Clearance and geometric stiffening are omitted, because they have no linear signature.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -25,8 +22,8 @@ from forcefit.validation.synthetic.effects import SCREW, WRENCH, Row, own_compli
 from forcefit.validation.synthetic.generator import Synthetic
 from forcefit.validation.synthetic.machine import Hidden, simulate_readings
 
-SAME = 10.0  # residual chi-square below which the difference is hidden by noise
-# Tested time constants of a drift, relative to the duration.
+SAME = 10.0  # residual chi-square below which noise hides the difference
+# Time constants of a drift, relative to the duration.
 _DRIFTS = (0.1, 0.3, 1.0)
 _STEP = 1e-5  # [rad, m] step of a finite difference
 _GRAM = 1e-3  # [kg, kg m] step of a finite difference
@@ -41,8 +38,8 @@ class Alternative:
     Attributes:
         names: names of the effects.
         parameters: number of their parameters.
-        residual: [-] chi-square of the part of the hidden effects' noise-free
-            contribution that this set does not explain.
+        residual: [-] chi-square of the hidden effects' contribution after fitting this
+            set.
     """
 
     names: tuple[str, ...]
@@ -51,14 +48,14 @@ class Alternative:
 
 
 def alternatives(campaign: Synthetic, size: int = 1) -> list[Alternative]:
-    """Return all small sets of public effects, best set first.
+    """Return all small sets of public effects, with the best set first.
 
     Args:
         campaign: campaign with its hidden effects.
         size: largest number of effects in a set.
 
     Returns:
-        The sets, with the unexplained contribution of the hidden effects.
+        The sets with their residuals.
     """
     known = np.isfinite(campaign.readings)
     target = (campaign.added / campaign.sigma)[known]
@@ -76,7 +73,7 @@ def alternatives(campaign: Synthetic, size: int = 1) -> list[Alternative]:
 
 
 def _residual(A: NDArray, target: NDArray) -> float:
-    """Return the squared distance of a vector from the span of columns."""
+    """Return the squared distance of a vector from the span of a matrix's columns."""
     norms = np.linalg.norm(A, axis=0)
     A = A[:, norms > 0] / norms[norms > 0]
     if not A.shape[1]:
@@ -88,14 +85,14 @@ def _residual(A: NDArray, target: NDArray) -> float:
 
 
 def signatures(campaign: Synthetic) -> dict[str, NDArray]:
-    """Return the whitened columns of every public effect that applies to the robot.
+    """Return the signatures of all public effects that apply to the robot.
 
     Args:
         campaign: campaign with the design and the noise.
 
     Returns:
-        Mapping from name to an array (6 rows, parameters), with one drift per time
-        constant.
+        Mapping from effect to its signatures (6 rows, parameters).  Drift has one entry
+        per time constant.
     """
     raw = dict(_raw(campaign))
     sigma = np.tile(campaign.sigma, len(campaign.plan.rows))
@@ -107,7 +104,7 @@ def signatures(campaign: Synthetic) -> dict[str, NDArray]:
 
 
 def _raw(campaign: Synthetic) -> Iterator[tuple[str, NDArray]]:
-    """Return the derivatives (rows, 6, parameters) of each effect."""
+    """Return the derivatives of readings by each effect, (rows, 6, parameters)."""
     differences = _FiniteDifferences(campaign)
     covariate = {
         name: np.array([row.covariates[name] for row in campaign.plan.rows])[:, None]
@@ -122,7 +119,7 @@ def _of_drives_and_lengths(
     campaign: Synthetic, differences: "_FiniteDifferences",
     covariate: Mapping[str, NDArray],
 ) -> Iterator[tuple[str, NDArray]]:  # fmt: skip
-    """Return the columns of effects that rotate a drive or lengthen a beam."""
+    """Return the signatures of effects that rotate a drive or lengthen a beam."""
     robot, rows = campaign.robot, campaign.plan.rows
     drives = [f.name for f in robot.frames if f.actuated]
     turning = [f.name for f in robot.frames if f.actuated and f.joint == "revolute"]
@@ -156,7 +153,7 @@ def _of_drives_and_lengths(
 def _of_loads(
     campaign: Synthetic, differences: "_FiniteDifferences"
 ) -> Iterator[tuple[str, NDArray]]:
-    """Return the columns of load-dependent effects: springs, weight, load errors."""
+    """Return the signatures of springs, weight and load errors."""
     beams = [f for f in campaign.robot.frames if isinstance(f.link, BeamLink)]
     base = [
         differences.loaded("base_compliance", f"stiffness.{k}", _SOFT, 1 / _SOFT)
@@ -183,7 +180,7 @@ def _of_loads(
 def _of_the_device(
     differences: "_FiniteDifferences", time: NDArray
 ) -> Iterator[tuple[str, NDArray]]:
-    """Return the columns of device effects: its pose and its drift."""
+    """Return the signatures of the device's pose and drift."""
     keys = [*(f"base.{k}" for k in SCREW), "tool.tx", "tool.ty", "tool.tz"]
     frame = [differences.unloaded("registration", key, _STEP) for key in keys]
     yield "registration", _columns(frame)
@@ -200,7 +197,7 @@ def _columns(screws: Sequence[NDArray]) -> NDArray:
 
 
 class _FiniteDifferences:
-    """Readings of the declared machine and their derivatives by effects."""
+    """Readings of the declared machine, and their derivatives by effect parameters."""
 
     def __init__(self, campaign: Synthetic) -> None:
         self._robot, self._point = campaign.robot, campaign.reference_point
@@ -215,19 +212,19 @@ class _FiniteDifferences:
         return simulate_readings(self._robot, self._point, rows, effects, "springs")
 
     def loaded(self, name: str, key: str, value: float, step: float) -> NDArray:
-        """Return the derivative (rows, 6) of the readings by an effect parameter."""
+        """Return the derivative of the readings by an effect parameter, (rows, 6)."""
         readings = self._read(self._rows, [Hidden(name, {key: value})])
         return (readings - self._loaded_readings) / step
 
     def unloaded(self, name: str, key: str, step: float) -> NDArray:
-        """Return the derivative by a parameter of a load-independent effect."""
+        """Return the derivative by a parameter if the load has no influence on it."""
         readings = self._read(self._unloaded, [Hidden(name, {key: step})])
         return ((readings - self._unloaded_readings) / step)[self._of]
 
 
 def _stiffening(softer: NDArray, offset: NDArray) -> NDArray:
-    """Return the columns of a Hertz contact, offset x load^(2/3), of a drive."""
-    # [1/m] Factors that make lengths commensurate with angles.
+    """Return the signatures of a Hertz contact in a drive, offset x load^(2/3)."""
+    # Factors [1/m] convert lengths to angles.
     scale = np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])
     a, b = softer * scale, offset * scale
     moments = (a * b).sum(axis=1) / (b * b).sum(axis=1)

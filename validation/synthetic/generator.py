@@ -2,9 +2,8 @@
 
 The machine is simulated in Exudyn with finite rotations and geometrically exact beams,
 independently of the model that is fitted later.  Each effect is scaled so that the rms
-of its contribution to the readings is the requested multiple of the noise.  The
-strength of weight and geometric stiffening is fixed, so for these effects the noise is
-adjusted instead.
+of its contribution to the readings is the requested multiple of the noise.  Weight and
+geometric stiffening cannot be scaled, so for these effects the noise is adjusted.
 
 The campaign folder contains only data that a measurement would provide.  Hidden effects
 are stored separately, in the truth format of the practice campaigns.
@@ -34,10 +33,10 @@ from forcefit.validation.synthetic.machine import Hidden, simulate_readings
 
 _GIVEN_STRENGTH = ("self_weight", "geometric_stiffening")
 _TRIES = 5
-_DRAWS = 6  # largest number of random draws until an effect's parameters are visible
+_DRAWS = 6  # largest number of random draws of an effect's parameters
 _CLOSE = 0.05  # accepted relative error of an effect's requested strength
 _MOST = 1000.0  # largest accepted factor on the plausible size of an effect
-_SMALL = 1e-2  # scale of errors and load at which the machine is nearly linear
+_SMALL = 1e-2  # factor on errors and load for nearly linear readings
 _BLUNDER = 40.0  # [sigma] size of a blunder
 
 Progress = Callable[[str, int, int], None]
@@ -62,7 +61,8 @@ class Synthetic:
         strength: mapping from the name of each effect to the rms of its contribution
             [sigma].
         outliers: rows that contain a blunder.
-        hidden_base: (6,) screw of the measuring frame; None if its pose is known.
+        hidden_base: (6,) [rad, m] error of the measuring frame; None if the pose of the
+            frame is known.
     """
 
     robot: Robot
@@ -88,10 +88,10 @@ class Noise:
     Attributes:
         rotation: [rad] standard deviation of rotations.
         position: [m] standard deviation of positions.
-        outliers: number of rows with a blunder in one reading.
+        outliers: number of rows that contain a blunder.
         missing: fraction of missing cells.
-        hidden_frame: [rad, m] size of the unknown pose of the measuring frame; 0 if the
-            pose is known.
+        hidden_frame: [rad, m] largest error of each component of the measuring frame's
+            pose; 0 if the pose is known.
     """
 
     rotation: float = 1e-5
@@ -109,7 +109,7 @@ class Noise:
 
     @property
     def sigma(self) -> NDArray:
-        """(6,) [rad, m] standard deviations of the components."""
+        """Standard deviations of the components, (6,) [rad, m]."""
         return np.repeat([self.rotation, self.position], 3)
 
 
@@ -127,12 +127,11 @@ def generate_campaign(
     Args:
         robot: the declared robot; its geometric errors are known.
         wanted: pairs of an effect and its requested strength, as a multiple of the
-            noise. If only the name of an effect is given, its parameters are drawn at
-            random.
+            noise.  The parameters are random if only the name of an effect is given.
         design: design of the campaign.
         noise: errors of the readings.
         seed: random seed.
-        program: ``"multibody"`` or, much faster, ``"springs"``.
+        program: ``"multibody"``, or ``"springs"``, which is much faster.
         update: function called with the stage, the number of finished rows and the
             total number.
 
@@ -142,8 +141,8 @@ def generate_campaign(
     Raises:
         BadInput: an effect is unknown, there are more blunders than rows, or the robot
             cannot execute the design.
-        NotApplicable: an effect cannot act anywhere on the robot, or is hardly visible
-            in every draw.
+        NotApplicable: an effect does not apply to the robot, or is hardly visible in
+            every draw.
         SimulationFailed: no equilibrium was found for a row.
     """
     design, noise = design or CampaignDesign(), noise or Noise()
@@ -188,7 +187,7 @@ def generate_campaign(
 
 @dataclass(frozen=True, eq=False)
 class _Shown:
-    """Hidden effects after scaling, with the readings that they cause.
+    """Scaled hidden effects and the readings that they cause.
 
     Attributes:
         effects: effects with their parameters.
@@ -208,7 +207,7 @@ class _Shown:
 
 @dataclass(eq=False)
 class _SimulatedMachine:
-    """A robot and the rows of a design in which it is simulated."""
+    """A simulated robot and the rows of a design."""
 
     robot: Robot
     point: NDArray
@@ -252,9 +251,9 @@ def _shown_effect(
     machine: _SimulatedMachine, effect: Hidden, multiple: float, sigma: NDArray,
     declared: NDArray, redraw: Draw | None,
 ) -> tuple[Hidden, NDArray, NDArray]:  # fmt: skip
-    """Scale an effect, redrawing its parameters if it is hardly visible."""
-    # An effect may be invisible in one draw.  For example, a force whose line
-    # intersects the axis of a drive does not load its spring.
+    """Scale an effect, with new random parameters if it is hardly visible."""
+    # An effect may be invisible for some parameters.  For example, a force does not
+    # load the spring of a drive if the drive axis intersects the line of the force.
     for _ in range(_DRAWS - 1):
         try:
             return _scaled_effect(machine, effect, multiple, sigma, declared)
@@ -272,7 +271,7 @@ def _scaled_effect(
     sigma: NDArray,
     declared: NDArray,
 ) -> tuple[Hidden, NDArray, NDArray]:
-    """Return the effect scaled to a strength, its readings, and the noise."""
+    """Return the effect scaled to a strength, its readings and the noise."""
     factor = 1.0
     for attempt in range(_TRIES):
         tried = strengthened(effect, factor) if attempt else effect
@@ -299,7 +298,7 @@ def _scaled_effect(
 
 
 def _linear(machine: _SimulatedMachine) -> NDArray:
-    """Return the readings (rows, 6) of the machine, linearised in errors and load."""
+    """Return the readings to first order in errors and load, (rows, 6)."""
     ends = []
     for scale in (_SMALL, -_SMALL):
         small = machine.robot.with_errors(scale * machine.robot.errors)
@@ -311,7 +310,7 @@ def _linear(machine: _SimulatedMachine) -> NDArray:
 def _measured(
     exact: NDArray, sigma: NDArray, noise: Noise, rng: np.random.Generator
 ) -> tuple[NDArray, tuple[int, ...]]:
-    """Add noise, blunders and gaps; return the readings and the rows with blunders."""
+    """Return readings with noise, blunders and gaps, and the rows with blunders."""
     readings = exact + sigma * rng.normal(size=exact.shape)
     blunders = rng.choice(len(exact), noise.outliers, replace=False)
     columns = rng.integers(6, size=noise.outliers)
@@ -328,10 +327,12 @@ def _rms(values: NDArray) -> float:
 
 
 def write_campaign(campaign: Synthetic, folder: Path | str) -> None:
-    """Write campaign.toml, measurements.csv and robot.toml; on failure, write no file.
+    """Write campaign.toml, measurements.csv and robot.toml.
+
+    No file is written if an error occurs.
 
     Args:
-        campaign: campaign to write, without its hidden effects.
+        campaign: campaign to write.  Its hidden effects are not written.
         folder: new or empty folder.
 
     Raises:

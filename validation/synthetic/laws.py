@@ -28,12 +28,12 @@ class PowerLawSpring:
 
 @dataclass(frozen=True)
 class TwoStepSpring:
-    """A joint spring whose compliance changes above a load.
+    """A joint spring with a compliance that changes at a load.
 
     Attributes:
         below: [rad/(N m) or m/N] compliance up to the knee.
         above: [rad/(N m) or m/N] compliance above the knee.
-        knee: [N m or N] load at which the compliance changes, positive.
+        knee: [N m or N] load at which the compliance changes, > 0.
     """
 
     below: float

@@ -36,8 +36,8 @@ class Hidden:
     """An effect that the declared model of the machine does not contain.
 
     Attributes:
-        name: public name of the effect; a leading underscore marks effects outside the
-            library.
+        name: name of the effect.  Names of effects outside the library begin with an
+            underscore.
         parameters: parameters as in the public formats.
     """
 
@@ -55,10 +55,10 @@ def simulate_readings(
 ) -> NDArray:
     """Return the pose deviations of a simulated machine in the rows of a design.
 
-    The deviations are free of noise.  Rows with identical machines are simulated once.
+    The deviations contain no noise.
 
     Args:
-        robot: the declared robot; a joint without declared clearance has no clearance.
+        robot: the declared robot.
         reference_point: (3,) [m] point at which the load acts and the pose is measured,
             platform axes.
         rows: commanded configurations, loads and covariates.
@@ -68,8 +68,8 @@ def simulate_readings(
             number.
 
     Returns:
-        (rows, 6) [rad, m] rotation vector of R_actual R_nominal^T, and displacement of
-        the reference point, base axes.
+        Rotation vector of R_actual R_nominal^T and displacement of the reference point,
+        base axes, (rows, 6) [rad, m].
 
     Raises:
         BadInput: the robot contains a helical joint.
@@ -104,7 +104,7 @@ def simulate_readings(
 
 
 def acts_on_machine(name: str) -> bool:
-    """Return whether an effect changes the machine rather than only the reading."""
+    """Return whether an effect changes the machine."""
     return name in _ALL_CHANGES
 
 
@@ -115,7 +115,7 @@ def with_point(robot: Robot, reference_point: NDArray) -> Robot:
 
 
 def nominal_pose(robot: Robot, row: Row) -> NDArray:
-    """Return the nominal platform pose (4, 4), computed along the chain of frames."""
+    """Return the nominal platform pose (4, 4)."""
     T, frame = np.eye(4), robot.frame(robot.platform)
     while True:
         own = np.array([0.0, 0.0, row.coordinates.get(frame.name, 0.0)])

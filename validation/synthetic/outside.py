@@ -1,7 +1,7 @@
-"""Model effects outside the library, which a diagnosis should report as such.
+"""Model effects that occur in real machines but not in the library.
 
-Each of these effects occurs in real machines, but no public effect describes it.  Their
-names begin with an underscore.
+A diagnosis should report that no effect of the library explains such data.  The names
+of these effects begin with an underscore.
 """
 
 import math
@@ -32,7 +32,7 @@ from forcefit.validation.synthetic.laws import TwoStepSpring
 
 
 def _pose_stiffness(machine: Machine, row: Row, given: Parameters) -> Machine:
-    """Apply a drive's compliance that varies as 1 + cos 3q, as in a gear mesh."""
+    """Add a drive compliance proportional to 1 + cos 3q, as in a gear mesh."""
     robot = machine.robot
     for name, softest in given.items():
         share = 1.0 + math.cos(3 * row.coordinates[name])
@@ -42,12 +42,12 @@ def _pose_stiffness(machine: Machine, row: Row, given: Parameters) -> Machine:
 
 
 def _humidity(machine: Machine, row: Row, given: Parameters) -> Machine:
-    """Apply a beam's swelling: a strain that is proportional to the humidity."""
+    """Add a beam strain that is proportional to the humidity."""
     return _swollen(machine, given, row.covariates["humidity"] - 40.0)
 
 
 def _quadratic_temperature(machine: Machine, row: Row, given: Parameters) -> Machine:
-    """Apply a beam's strain that grows with the square of the temperature."""
+    """Add a beam strain that is proportional to the square of the temperature."""
     return _swollen(machine, given, row.covariates["temperature"] ** 2)
 
 
@@ -59,7 +59,7 @@ def _swollen(machine: Machine, given: Parameters, cause: float) -> Machine:
 
 
 def _growth(machine: Machine, row: Row, given: Parameters) -> Machine:
-    """Apply a beam's elongation at a constant strain rate, as by wear or long creep."""
+    """Add a beam strain that is proportional to time, as in creep."""
     return _swollen(machine, given, row.covariates["time"])
 
 
@@ -70,25 +70,25 @@ def _backlash(row: Row, given: Parameters, name: str, angle: float) -> float:
 
 
 def _thread(row: Row, given: Parameters, name: str) -> float:
-    """Return the angle [rad] of a slide's screw."""
+    """Return the rotation angle [rad] of the lead screw of a slide."""
     return 2 * math.pi * (row.coordinates[name] / given[f"{name}.period"])
 
 
 def _friction(row: Row, given: Parameters, name: str) -> float:
-    """Return the displacement caused by load-proportional friction, c f/100 N."""
+    """Return the displacement due to friction that is proportional to the load."""
     pressed = float(np.linalg.norm(row.load[3:])) / 100 * row.covariates["approach"]
     return -given[name] * pressed
 
 
 def _cable(machine: Machine, row: Row, given: Parameters) -> Machine:
-    """Apply a cable's weight, which grows with the coordinate of a drive."""
+    """Add the weight of a cable, proportional to the coordinate of a drive."""
     load = machine.load.copy()
     load[5] -= sum(rate * row.coordinates[name] for name, rate in given.items())
     return replace(machine, load=load)
 
 
 def _two_steps(machine: Machine, row: Row, given: Parameters) -> Machine:
-    """Apply a joint's compliance that changes above a load."""
+    """Add a joint compliance that changes at a load."""
     robot, laws = machine.robot, dict(machine.laws)
     for name in named(given, "knee"):
         keys = ("below", "above", "knee")
@@ -100,7 +100,7 @@ def _two_steps(machine: Machine, row: Row, given: Parameters) -> Machine:
 
 
 def _torque_backlash(machine: Machine, row: Row, given: Parameters) -> Machine:
-    """Apply a gear's backlash, taken up in the direction of the drive's load."""
+    """Add the backlash of a gear, with the sign of the drive's load."""
     robot, laws = machine.robot, dict(machine.laws)
     for name, clearance in given.items():
         frame = robot.frame(name)
@@ -112,7 +112,7 @@ def _torque_backlash(machine: Machine, row: Row, given: Parameters) -> Machine:
 
 
 def _tilting(machine: Machine, row: Row, given: Parameters) -> Machine:
-    """Apply a tilt of the ground that is proportional to a sensor's reading."""
+    """Add a tilt of the ground that is proportional to the tilt covariate."""
     screw = np.zeros(6)
     screw[0] = given["gain"] * row.covariates["tilt"]
     ground = Frame("base~tilt", BASE, geometric_error=screw)
@@ -120,13 +120,13 @@ def _tilting(machine: Machine, row: Row, given: Parameters) -> Machine:
 
 
 def _stand(reading: NDArray, row: Row, given: Parameters) -> NDArray:
-    """Apply a deflection of the device's stand by the squared load: c (f/100 N)^2."""
+    """Add a deflection c (f/100 N)^2 of the device's stand under the load f."""
     squared = float(row.load[3:] @ row.load[3:]) / 1e4
     return reading + squared * np.array([given.get(f"c.{k}", 0.0) for k in SCREW])
 
 
 def _sag(reading: NDArray, row: Row, given: Parameters) -> NDArray:
-    """Apply a deflection of the measured target that is proportional to the load."""
+    """Add a deflection of the measured target that is proportional to the load."""
     sag = np.zeros(6)
     sag[5] = -given["rate"] * np.linalg.norm(row.load[3:])
     return reading + sag

@@ -1,17 +1,14 @@
 """Compute equilibria of a simulated machine with nonlinear joints.
 
-The nonlinear laws are solved by fixed-point iteration.  In each step, the machine is
-simulated with a linear spring or an offset in the joint, and the resulting load on the
-joint determines the next spring or offset.  The iteration ends when the change falls
-below a tolerance.
+The equilibrium is found by fixed-point iteration.  In each step, the machine is
+simulated with a linear spring or an offset in the joint.  The resulting load on the
+joint determines the next spring or offset.
 
-- A stiffening contact is replaced by a spring of its secant stiffness.  The deflection
-  is smaller than the last stiffness predicts.  Each step therefore multiplies the error
-  by at most 1 - 1/n, where n is the exponent of the contact law.
+- A stiffening contact is replaced by a spring of its secant stiffness.  Each step
+  multiplies the error by at most 1 - 1/n, where n is the exponent of the contact law.
 - The load displaces a joint with clearance up to the bounds of the clearance.  On an
-  open chain, the load does not depend on the clearance.  A weak spring (grease, seals)
-  centres the joint under small loads.  Without it, round-off would determine the
-  position of the joint.
+  open chain, the load does not depend on the clearance.  A weak spring, which
+  represents grease or seals, centres the joint under small loads.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -29,15 +26,13 @@ from forcefit.validation.multibody.simulation import (
 from forcefit.validation.synthetic.effects import Machine, Rest, sprung, with_frame
 from forcefit.validation.synthetic.springs import rest_on_springs
 
-# Number of elements of a beam; corrected elements are accurate for these small
-# deflections.
+# Number of elements of a beam, sufficient for small deflections.
 _ELEMENTS = 2
 _STEPS = 60
-_SETTLED = 1e-11  # [rad, m] change of power-law springs at convergence
-# [rad, m] Change of a joint's position within its clearance at convergence.  At small
-# loads, round-off in the force sensor prevents a smaller value.
+_SETTLED = 1e-11  # [rad, m] largest change of power-law springs at convergence
+# [rad, m] Largest change of a joint's position within its clearance at convergence.
 _SETTLED_CLEARANCE = 5e-9
-# [N/m, N m/rad] Springs that centre joints in their clearances.
+# [N/m, N m/rad] Stiffness of the springs that centre joints within their clearances.
 _CENTRING = {"radial": 3e3, "axial": 3e3, "tilt": 3e2, "spin": 3e2}
 Progress = Callable[[int, int], None]
 _ROWS = {"tilt": [0, 1], "spin": [2], "radial": [3, 4], "axial": [5]}
@@ -49,7 +44,7 @@ def rest_poses(
     """Return the equilibria of machines of equal structure under their loads.
 
     Args:
-        machines: machines including all their effects.
+        machines: machines with their effects.
         program: one of :data:`PROGRAMS`.
         update: function called with the number of finished machines and the total
             number.
@@ -58,7 +53,7 @@ def rest_poses(
         (k, 4, 4) poses of the platforms in the base frame.
 
     Raises:
-        SimulationFailed: there is no equilibrium, or the joints' laws do not converge.
+        SimulationFailed: no equilibrium was found, or the iteration does not converge.
     """
     poses = np.zeros((len(machines), 4, 4))
     waiting = dict(enumerate(machines))
@@ -80,7 +75,7 @@ def rest_poses(
 
 
 def _updated(machine: Machine, equilibrium: Rest) -> tuple[Machine, float]:
-    """Evaluate the joint laws at the computed loads; also return change / tolerance."""
+    """Return the joints under the computed loads, and the change over the tolerance."""
     largest, robot = 0.0, machine.robot
     for name, law in machine.laws.items():
         i, frame = robot.index(name), robot.frame(name)
@@ -113,7 +108,7 @@ def _clearance_position(clearance: Clearance, wrench: NDArray) -> NDArray:
 
 @dataclass(frozen=True, eq=False)
 class _Placed:
-    """Robot and joint coordinates, as the simulation requires them."""
+    """Robot and joint coordinates for the simulation."""
 
     robot: Robot
     coordinates: NDArray

@@ -1,10 +1,8 @@
 """Compute equilibria of machines whose links are springs.
 
-All rows are solved together, which is faster than the multibody simulation.  As there,
-motions are finite and equilibrium is imposed on the deformed machine.  A beam is
-represented by its tip compliance instead of finite elements, which makes a difference
-only for large deflections.  Clearances in closed loops require the multibody
-simulation.
+All rows are solved together, which is faster than the multibody simulation.  Motions
+are finite, and the deformed machine is in equilibrium.  A beam is represented by its
+tip compliance.  Clearances in closed loops require the multibody simulation.
 
 The unknowns are the motions q of the passive joints and the wrench l of each closure.
 They determine the deformations of the springs and the poses of the frames.  The
@@ -13,16 +11,15 @@ residuals are
     r = errors of the closures,        t = moments about passive joints' axes.
 
 Newton's method uses the Jacobian of the nominal posture, because deformations are
-small. a_j is the axis of joint j. s_kj is +1 or -1 if joint j is on the first or second
-chain of closure k:
+small.  In this Jacobian, a is the axis of a joint, and s is +1 if the joint is on the
+first chain of a closure and -1 if it is on the second:
 
     [ -S       -(s a) ] [ dl ]     [ r ]
     [ (s a)^T    0    ] [ dq ] = - [ t ]
 
 S is the compliance between each pair of closures.  Each step is the solution of minimum
 norm, which also determines free rotations and the wrenches of overconstrained rigid
-loops.  Screws and wrenches refer to the base origin and base axes unless stated
-otherwise.
+loops.  Screws and wrenches are at the base origin in base axes.
 """
 
 from collections.abc import Sequence
@@ -40,9 +37,9 @@ from forcefit.validation.multibody.simulation import SimulationFailed
 from forcefit.validation.synthetic.effects import Machine, Rest
 
 _STEPS = 60
-_CONVERGED = 1e-12  # [rad, m] size of the last step at convergence
+_CONVERGED = 1e-12  # [rad, m] largest step at convergence
 _DIVERGED = 1e3  # [rad, m] coordinate above which the iteration has diverged
-_RANK = 1e-10  # relative size below which singular values belong to free motions
+_RANK = 1e-10  # relative size below which a singular value belongs to a free motion
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,14 +47,15 @@ class _SpringModel:
     """Arrays that describe k machines of equal structure with n frames.
 
     Attributes:
-        robot: one of the robots, which defines the structure.
-        placed: (k, n, 4, 4) frames with their errors, relative to their parents.
-        compliances: (2, k, n, 6, 6) compliances of links and joints, at the frame, in
+        robot: a robot with this structure.
+        placed: (k, n, 4, 4) poses of frames with their errors, relative to their
+            parents.
+        compliances: (2, k, n, 6, 6) compliances of links and joints, at the frame in
             its axes.
-        nominal: (k, n, 4, 4) nominal frames of the robot.
+        nominal: (k, n, 4, 4) nominal poses of frames.
         passive: indices of the frames with free joints.
         pairs: (closures, 2) indices of the frames that each closure joins.
-        signs: (closures, n) +1 on the first chain, -1 on the second.
+        signs: (closures, n) +1 for frames on the first chain, -1 on the second.
         closed: (k, closures, 4, 4) nominal pose of the second frame relative to the
             first.
     """
@@ -79,7 +77,7 @@ def rest_on_springs(machines: Sequence[Machine]) -> list[Rest]:
         machines: machines of equal structure, without clearances.
 
     Raises:
-        SimulationFailed: a joint has clearance, or there is no equilibrium.
+        SimulationFailed: a joint has clearance, or no equilibrium was found.
     """
     robot = machines[0].robot
     if any(f.clearance is not None for m in machines for f in m.robot.frames):
@@ -97,8 +95,7 @@ def rest_on_springs(machines: Sequence[Machine]) -> list[Rest]:
     ends = _forward(parts, q, screws)
     for _ in range(_STEPS):
         carried = _carried(machines, parts, ends, wrenches)
-        # Wrenches are evaluated half-way along the deformation, because wrenches at
-        # either end are not the gradient of an energy.
+        # Only wrenches half-way along the deformation are the gradient of an energy.
         halfway = ends @ np.linalg.inv(_deflections(screws / 2))
         read = _at_frames(halfway, carried)
         new = np.einsum("skaij,skaj->skai", parts.compliances, read)
@@ -137,7 +134,7 @@ def _spring_model(machines: Sequence[Machine], q: NDArray) -> _SpringModel:
     first, second = np.array(pairs, dtype=int).reshape(-1, 2).T
     closed = np.linalg.inv(nominal[:, first]) @ nominal[:, second]
     passive = [i for i, f in enumerate(robot.frames) if f.passive and not f.compliant]
-    # Frames shared by several machines are computed once.
+    # Frames that machines share are computed once.
     known: dict[int, tuple[NDArray, NDArray]] = {}
     for frame in (f for m in machines for f in m.robot.frames):
         if id(frame) not in known:
@@ -167,7 +164,7 @@ def _compliances(frame: Frame) -> tuple[NDArray, NDArray]:
 
 
 def _placements(screws: NDArray) -> NDArray:
-    """Return (..., 4, 4) motions of rotation vectors and translations (..., 6)."""
+    """Convert rotation vectors and translations (..., 6) to motions (..., 4, 4)."""
     T = np.zeros((*screws.shape[:-1], 4, 4))
     turns = Rotation.from_rotvec(screws[..., :3].reshape(-1, 3)).as_matrix()
     T[..., :3, :3] = turns.reshape(*screws.shape[:-1], 3, 3)
@@ -177,7 +174,10 @@ def _placements(screws: NDArray) -> NDArray:
 
 
 def _deflections(screws: NDArray) -> NDArray:
-    """Return (..., 4, 4) motions of springs, with translations in half-rotated axes."""
+    """Return the motions (..., 4, 4) of springs with deformations (..., 6).
+
+    The translation is in the mean axes of both ends.
+    """
     half = screws.copy()
     half[..., :3] /= 2
     T = _placements(screws)
@@ -187,16 +187,16 @@ def _deflections(screws: NDArray) -> NDArray:
 
 
 def _chain(robot: Robot, steps: NDArray, ends: NDArray, q: NDArray) -> NDArray:
-    """Return the frames (k, n, 4, 4) as products along the chains.
+    """Return the poses of frames as products of motions along the chains.
 
     Args:
         robot: robot with the tree of frames.
-        steps: (k, n, 4, 4) motions from the parent's joint.
-        ends: (k, n, 4, 4) motions after the step and before the motion of the joint.
+        steps: (k, n, 4, 4) motions from the parent's joint to the end of the body.
+        ends: (k, n, 4, 4) motions from the end of the body to the joint.
         q: (k, n) [rad or m] coordinates of the joints.
 
     Returns:
-        Poses of the frames in the base frame, before the motion of their joints.
+        Poses in the base frame, before the motion of the joints, (k, n, 4, 4).
     """
     own = np.zeros((*q.shape, 6))
     for i, frame in enumerate(robot.frames):
@@ -213,14 +213,14 @@ def _chain(robot: Robot, steps: NDArray, ends: NDArray, q: NDArray) -> NDArray:
 
 
 def _forward(parts: _SpringModel, q: NDArray, screws: NDArray) -> NDArray:
-    """Return (2, k, n, 4, 4) frames: at the ends of bodies, and after joint springs."""
+    """Return poses at the ends of bodies and after joint springs, (2, k, n, 4, 4)."""
     links, joints = _deflections(screws)
     before = _chain(parts.robot, parts.placed @ links, joints, q)
     return np.stack([before @ np.linalg.inv(joints), before])
 
 
 def _maps(T: NDArray) -> NDArray:
-    """Return (..., 6, 6) maps from screws in frames' axes to the base."""
+    """Return matrices (..., 6, 6) that transform screws from frames to the base."""
     R, p = T[..., :3, :3], T[..., :3, 3]
     A = np.zeros((*T.shape[:-2], 6, 6))
     A[..., :3, :3] = A[..., 3:, 3:] = R
@@ -229,7 +229,7 @@ def _maps(T: NDArray) -> NDArray:
 
 
 def _axes(parts: _SpringModel, T: NDArray) -> NDArray:
-    """Return the (k, passive, 6) screws of unit motions of passive joints."""
+    """Return the screws of unit motions of passive joints, (k, passive, 6)."""
     own = [parts.robot.frames[i].own_axis for i in parts.passive]
     maps = _maps(T[:, parts.passive])
     columns = [maps[:, k, :, axis] for k, axis in enumerate(own)]
@@ -237,8 +237,8 @@ def _axes(parts: _SpringModel, T: NDArray) -> NDArray:
 
 
 def _newton(parts: _SpringModel, q: NDArray) -> tuple[NDArray, float]:
-    """Return the inverse Newton matrices and the compliance that scales wrenches."""
-    # Rows of one configuration with equal springs have equal matrices.
+    """Return the inverse Newton matrices, and the compliance that scales wrenches."""
+    # Rows with the same configuration and springs have the same matrix.
     distinct = np.hstack([
         q,
         parts.compliances.sum(axis=(0, 3, 4)).reshape(len(q), -1),
@@ -254,7 +254,7 @@ def _newton(parts: _SpringModel, q: NDArray) -> tuple[NDArray, float]:
     S = np.einsum("an,bn,knij->kaibj", s, s, at_base, optimize=True)
     S = S.reshape(machines, size, size)
     axes = _axes(parts, nominal)
-    # A closure wrench acts only on joints that belong to one of its two chains.
+    # A closure wrench acts on the joints of its two chains.
     A = np.einsum("an,kni->kain", s[:, parts.passive], axes)
     A = A.reshape(machines, size, passive)
     diagonal = np.diagonal(S, axis1=1, axis2=2)
@@ -269,7 +269,7 @@ def _newton(parts: _SpringModel, q: NDArray) -> tuple[NDArray, float]:
 def _carried(
     machines: Sequence[Machine], parts: _SpringModel, ends: NDArray, closing: NDArray
 ) -> NDArray:
-    """Return (2, k, n, 6) wrenches through each body's end and through its joint."""
+    """Return wrenches through each body's end and through its joint, (2, k, n, 6)."""
     robot, (bodies, before) = parts.robot, ends
     carried = np.zeros((2, *before.shape[:2], 6))
     platform = robot.index(robot.platform)
@@ -291,7 +291,10 @@ def _carried(
 def _add_weights(
     machines: Sequence[Machine], gravity: NDArray, bodies: NDArray, carried: NDArray
 ) -> None:
-    """Add the weights of bodies; a beam's weight acts at its ends, with end moments."""
+    """Add the weights of bodies.
+
+    The weight of a beam acts at its ends, with end moments.
+    """
     parents = machines[0].robot.parents
     for i, frame in enumerate(machines[0].robot.frames):
         R, tip = bodies[:, i, :3, :3], bodies[:, i, :3, 3]
@@ -314,23 +317,23 @@ def _add_weights(
 
 
 def _force(vectors: NDArray) -> NDArray:
-    """Return the (k, 6) wrenches of forces (k, 3)."""
+    """Return the wrenches (k, 6) of forces (k, 3)."""
     return np.concatenate([np.zeros_like(vectors), vectors], axis=1)
 
 
 def _at_base(wrenches: NDArray, points: NDArray) -> NDArray:
-    """Transform (k, 6) wrenches from given points to the base origin."""
+    """Transform wrenches (k, 6) from given points to the base origin."""
     moments = wrenches[:, :3] + np.cross(points, wrenches[:, 3:])
     return np.concatenate([moments, wrenches[:, 3:]], axis=1)
 
 
 def _at_frames(T: NDArray, wrenches: NDArray) -> NDArray:
-    """Transform (..., 6) wrenches to frames and their axes."""
+    """Transform wrenches (..., 6) to frames and their axes."""
     return np.einsum("...ij,...i->...j", _maps(T), wrenches)
 
 
 def _closure_errors(parts: _SpringModel, before: NDArray) -> NDArray:
-    """Return the (k, closures, 6) [rad, m] closure errors."""
+    """Return the closure errors, (k, closures, 6) [rad, m]."""
     first, second = parts.pairs.T
     target, T = before[:, first] @ parts.closed, before[:, second]
     turn = (T[..., :3, :3] @ np.swapaxes(target[..., :3, :3], -1, -2)).reshape(-1, 3, 3)

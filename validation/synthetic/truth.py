@@ -30,7 +30,7 @@ _UNITS = {
     "load_gain": "N",
     "drift": "rad",
 }
-_SLIDING = {  # units of the same parameters for sliding joints and translations
+_SLIDING = {  # units of the parameters for prismatic joints and translations
     "drive_compliance": "N/m",
     "base_compliance": "N/m",
     "encoder_offset": "m",
@@ -46,12 +46,12 @@ def truth_of(
     verdict: str | None = None,
     accept: list[list[str]] | None = None,
 ) -> dict[str, Any]:
-    """Return the truth of a campaign: its hidden effects and the correct verdict.
+    """Return the hidden effects of a campaign and the correct verdict.
 
     Args:
         campaign: campaign with its hidden effects.
-        verdict: verdict that a correct diagnosis reaches.  The default applies to a
-            design that distinguishes the effects.
+        verdict: correct verdict of a diagnosis.  The default is correct if the design
+            distinguishes the effects.
         accept: alternative sets of effects that explain the data equally well.
 
     Returns:
@@ -91,7 +91,7 @@ def truth_of(
 
 
 def _effect(campaign: Synthetic, effect: Hidden) -> dict[str, Any]:
-    """Return the name, place and parameters of an effect."""
+    """Return the name, frames and parameters of an effect."""
     names = [frame.name for frame in campaign.robot.frames]
     where: list[str] = []
     parameters = []

@@ -1,7 +1,7 @@
-"""Every library effect compared with simulated machines that have it physically.
+"""Tests of each library effect against simulated machines with this effect.
 
-The machines share no effect with the library: an elastic drive is a spring after its
-joint, a longer link is built longer.  Exudyn, and the program of springs.
+The machines are simulated in Exudyn and by ``springs.py``.  Neither uses the effects of
+the library.  For example, an elastic drive is a spring after its joint.
 """
 
 from dataclasses import replace
@@ -25,7 +25,7 @@ SPRING = np.diag([np.inf, np.inf, 2e4, np.inf, np.inf, np.inf])
 EFFECTS = {
     "self_weight": {"g.x": 1.0, "g.z": -9.81},
     "thermal_expansion": {"leg1.elbow": 2e-5},
-    # two rows at one time: the body is as warm as the sensor
+    # both rows have the same time, so the body is as warm as the sensor
     "delayed_expansion": {"leg1.elbow": 2e-5, "leg1.elbow.time_constant": 60.0},
     "drive_compliance": {"leg1.drive": 3e4, "leg2.drive": 5e4},
     "base_compliance": {"stiffness.rx": 1e6, "stiffness.tz": 1e7},
@@ -41,14 +41,14 @@ EFFECTS = {
     "load_gain": {"factor": 1.2, "offset.fx": 3.0},
     "drift": {"amplitude.tz": 1e-5, "time_constant": 60.0},
 }
-ELSEWHERE = {  # finite motions: test_synthetic_campaigns; clearance: test_generator
+ELSEWHERE = {  # effects that other files of this folder test
     "geometric_stiffening", "joint_clearance"
 }  # fmt: skip
 
 
 @pytest.fixture(scope="module")
 def robot():
-    """A 3-RRR with elastic links and drives, and errors."""
+    """Return a 3-RRR robot with elastic links, elastic drives and errors."""
     robot = without_clearance(load_robot("3rrr"))
     beam = BeamLink({"radius": 0.012, "inner_radius": 0.008}, 70e9, 0.33, 2700.0)
     links = {
@@ -68,7 +68,7 @@ def robot():
 
 @pytest.fixture(scope="module")
 def machine(robot):
-    """Conditions at two postures under different loads, and the same as rows."""
+    """Return conditions and rows for two postures under different loads."""
     drives = [f.name for f in robot.frames if f.actuated]
     placed = [
         place_robot(robot, joints={n: robot.frame(n).position + d for n in drives})
@@ -95,16 +95,16 @@ def test_every_effect_of_the_library_is_tested():
 @pytest.mark.exudyn
 @pytest.mark.parametrize("program", ["springs", "multibody"])
 @pytest.mark.parametrize(
-    "name",  # every third by default
+    "name",  # two of three are slow tests
     [pytest.param(n, marks=[pytest.mark.slow] * (i % 3 > 0))
      for i, n in enumerate(EFFECTS)],
 )  # fmt: skip
-def test_effect_in_a_simulation_adds_its_deviation_to_the_machine(
-    name, program, robot, machine
-):
-    """Deviations up to 500 um and urad agree with finite motions to 30 nm and nrad.
-    What is left is how screws of 1e-4 compound (1e-8), and the beams' own bending. A
-    beam built longer is also softer, which the effect does not say: no load there."""
+def test_library_effect_agrees_with_the_simulated_effect(name, program, robot, machine):
+    """Second-order motions and the bending of beams limit the agreement to 3e-8.
+
+    Effects that lengthen a beam are tested without load, because the simulated longer
+    beam is softer.
+    """
     conditions, rows = machine
     conditions = replace(conditions, exact=True)
     if name in {"link_length", "thermal_expansion", "delayed_expansion"}:

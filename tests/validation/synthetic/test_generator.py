@@ -1,8 +1,7 @@
-"""Synthetic campaigns: each effect compared with a closed form derived beforehand.
+"""Tests of simulated effects against closed-form solutions.
 
-The robot of most tests is one drive that turns a beam about z: L = 0.5 m, tip at
-(L cos q, L sin q, 0).  Each test states the expected value, to first order in small
-quantities unless marked as exact.
+The robot of most tests is a drive that rotates a beam of length L = 0.5 m about z.  The
+tip is at (L cos q, L sin q, 0).
 """
 
 import math
@@ -51,7 +50,7 @@ def row(q=0.0, load=(0, 0, 0, 0, 0, 0), **conditions):
 
 @pytest.fixture(params=["multibody", "springs"])
 def added(request):
-    """Return the contribution of an effect to a reading, computed by either program."""
+    """Return a function that computes the contribution of an effect to a reading."""
 
     def difference(name, parameters, where, robot=None, program=request.param):
         case = robot or one_link(), np.zeros(3), [where]
@@ -72,8 +71,8 @@ def test_perfect_robot_without_load_has_no_deviation(point):
     assert np.abs(readings).max() < 1e-12
 
 
-def test_declared_error_is_read_exactly():
-    """A rotation by e about the drive's axis moves the tip to L (cos, sin)(q + e)."""
+def test_reading_of_a_declared_error_equals_closed_form():
+    """An error e about the drive axis moves the tip to L (cos, sin)(q + e)."""
     q, e = 0.3, 0.02
     contribution = simulate_readings(
         one_link(error=np.array([0, 0, e, 0, 0, 0])), np.zeros(3), [row(q)]
@@ -83,9 +82,8 @@ def test_declared_error_is_read_exactly():
 
 
 @pytest.mark.parametrize("g", [9.81, 3.0])
-def test_deflection_of_a_heavy_beam_with_a_tip_mass_equals_its_closed_form(added, g):
-    """w L^4/8EI + w L^2/2kGA for the beam, m g L^3/3EI + m g L/kGA for the body. A bent
-    beam is also shorter, by less than s^2/L = 2.4e-8 m: second order."""
+def test_deflection_by_weight_equals_closed_form(added, g):
+    """The shortening of the bent beam is below 2.4e-8 m."""
     w, m = RHO * AREA * g, 1.3
     sag = w * L**4 / (8 * E * SECOND) + w * L**2 / (2 * SHEAR)
     sag += m * g * (L**3 / (3 * E * SECOND) + L / SHEAR)
@@ -98,33 +96,32 @@ def test_deflection_of_a_heavy_beam_with_a_tip_mass_equals_its_closed_form(added
     ("name", "parameter", "longer"),
     [("thermal_expansion", 2e-5, 2e-5 * 5 * L), ("link_length", 3e-4, 3e-4)],
 )
-def test_longer_or_warmer_beam_moves_the_tip_along_the_beam(
+def test_longer_or_warmer_beam_moves_its_tip_along_its_axis(
     added, name, parameter, longer
 ):
-    """alpha T L for a warm beam, exact."""
+    """A warm beam is longer by alpha T L."""
     q = 0.7
     contribution = added(name, {"tip": parameter}, row(q))
     close(contribution, longer * np.array([0, 0, 0, np.cos(q), np.sin(q), 0]), 1e-9)
 
 
-def test_deflection_of_a_longer_beam_equals_its_closed_form(added):
-    """P (L + d)^3 / 3EI + P (L + d) / kGA minus the same with d = 0,
-    across the beam."""
+def test_deflection_of_a_longer_beam_equals_closed_form(added):
+    """The contribution is P ((L + d)^3 - L^3) / 3EI + P d / kGA."""
     P, d = 1.0, 1e-2
     contribution = added("link_length", {"tip": d}, row(load=(0, 0, 0, 0, 0, -P)))
     more = ((L + d) ** 3 - L**3) / (3 * E * SECOND) + d / SHEAR
     assert contribution[5] == pytest.approx(-P * more, rel=1e-4)
 
 
-def test_elastic_drive_turns_by_moment_over_stiffness(added):
-    """F L / k, in addition to the declared spring."""
+def test_rotation_of_an_elastic_drive_is_moment_over_stiffness(added):
+    """The rotation is F L / k, in addition to that of the declared spring."""
     F, k = 10.0, 5e4
     contribution = added("drive_compliance", {"drive": k}, row(load=(0, 0, 0, 0, F, 0)))
     close(contribution[[2, 4]], [F * L / k, F * L**2 / k], 1e-4)
 
 
-def test_base_compliance_shifts_and_tilts_the_tip(added):
-    """A force F along y at (L, 0, 0): F / k_t along y, F L / k_r about z."""
+def test_tip_motion_by_base_compliance_equals_closed_form(added):
+    """A force F along y at the tip causes F / k_t along y and F L / k_r about z."""
     F = 10.0
     springs = {"rx": 1e6, "ry": 1e6, "rz": 2e5, "tx": 1e8, "ty": 4e6, "tz": 1e8}
     given = {f"stiffness.{k}": v for k, v in springs.items()}
@@ -133,8 +130,8 @@ def test_base_compliance_shifts_and_tilts_the_tip(added):
 
 
 @pytest.mark.parametrize("name", ["offset", "eccentricity", "wobble"])
-def test_encoder_error_turns_the_beam_by_that_angle(added, name):
-    """Exact: the tip is at L (cos, sin)(q + d)."""
+def test_encoder_error_rotates_the_beam(added, name):
+    """The tip is at L (cos, sin)(q + d)."""
     q, size, phase = 0.6, 2e-3, 0.9
     given = {"drive.amplitude": size, "drive.phase": phase}
     cases = {
@@ -148,8 +145,8 @@ def test_encoder_error_turns_the_beam_by_that_angle(added, name):
     close(contribution, [0, 0, d, L * dx, L * dy, 0], 1e-9)
 
 
-def test_registration_moves_device_frame_and_target(added):
-    """Exact: B R and B (p + R tool); a rotation by b about z, then a shift."""
+def test_registration_errors_move_device_frame_and_target(added):
+    """The pose is B R, B (p + R tool) with a rotation b about z and a shift in B."""
     q, b, shift, tool = 0.5, 0.01, [1e-3, -2e-3, 3e-3], [2e-3, 0, 1e-3]
     given = {"base.rz": b, "base.tx": shift[0], "base.ty": shift[1]}
     given |= {"base.tz": shift[2], "tool.tx": tool[0], "tool.tz": tool[2]}
@@ -160,8 +157,8 @@ def test_registration_moves_device_frame_and_target(added):
     close(contribution, [0, 0, b, x, y, shift[2] + tool[2]], 1e-12)
 
 
-def test_deflection_of_a_softer_beam_equals_its_closed_form(added):
-    """(1/f - 1) (P L^3/3EI + P L/kGA): G falls with E."""
+def test_deflection_of_a_softer_beam_equals_closed_form(added):
+    """The factor f on E also multiplies G."""
     P, f = 1.0, 0.8
     contribution = added("modulus_scale", {"tip": f}, row(load=(0, 0, 0, 0, 0, P)))
     bend = P * L**3 / (3 * E * SECOND) + P * L / SHEAR
@@ -169,8 +166,8 @@ def test_deflection_of_a_softer_beam_equals_its_closed_form(added):
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
-def test_load_shifts_a_joint_by_its_clearance(added, side):
-    """A force along x shifts the beam by the radial clearance, towards the force."""
+def test_load_moves_a_joint_to_the_bound_of_its_clearance(added, side):
+    """A force along x moves the beam by the radial clearance along x."""
     clearance = {"drive.radial": 3e-5, "drive.axial": 1e-5, "drive.tilt": 0.0}
     contribution = added(
         "joint_clearance", clearance, row(load=(0, 0, 0, 20 * side, 0, 0))
@@ -179,8 +176,8 @@ def test_load_shifts_a_joint_by_its_clearance(added, side):
 
 
 @pytest.mark.parametrize("approach", [1.0, -1.0])
-def test_friction_turns_an_elastic_joint_against_its_approach(added, approach):
-    """- tau x approach / k about the joint's axis."""
+def test_friction_rotates_an_elastic_joint_against_its_approach(added, approach):
+    """The rotation about the joint axis is - tau approach / k."""
     tau = 0.5
     contribution = added("friction_hysteresis", {"drive": tau}, row(approach=approach))
     close(contribution[[2, 4]], np.array([1, L]) * -tau * approach / DRIVE, 1e-4)
@@ -188,8 +185,8 @@ def test_friction_turns_an_elastic_joint_against_its_approach(added, approach):
 
 @pytest.mark.parametrize("exponent", [1.5, 1.0, 2.0])
 @pytest.mark.parametrize("force", [10.0, -0.1])
-def test_contact_deforms_by_its_power_law(added, exponent, force):
-    """F L = c d^n, in addition to all other compliances."""
+def test_deformation_of_a_contact_equals_its_power_law(added, exponent, force):
+    """The additional rotation d satisfies F L = c d^n."""
     c = 2e7
     given = {"drive.coefficient": c, "drive.exponent": exponent}
     contribution = added("contact_stiffening", given, row(load=(0, 0, 0, 0, force, 0)))
@@ -197,8 +194,8 @@ def test_contact_deforms_by_its_power_law(added, exponent, force):
     close(contribution[[2, 4]], [d, d * L], 1e-4)
 
 
-def test_load_gain_and_offset_deflect_the_beam_by_the_extra_force(added):
-    """((f - 1) P + offset) (L^3/3EI + L/kGA)."""
+def test_deflection_by_load_errors_equals_closed_form(added):
+    """The contribution is ((f - 1) P + offset) (L^3/3EI + L/kGA)."""
     P, f, more = 2.0, 1.1, 0.3
     given = {"factor": f, "offset.fz": more}
     contribution = added("load_gain", given, row(load=(0, 0, 0, 0, 0, P)))
@@ -208,13 +205,13 @@ def test_load_gain_and_offset_deflect_the_beam_by_the_extra_force(added):
 
 def test_drift_rises_exponentially(added):
     given = {"amplitude.ry": 2e-5, "amplitude.tz": -1e-5, "time_constant": 150.0}
-    rise = 1 - math.exp(-2.0)  # at 300 s
+    rise = 1 - math.exp(-2.0)  # relative drift at 300 s
     close(added("drift", given, row()), [0, 2e-5 * rise, 0, 0, 0, -1e-5 * rise], 1e-12)
 
 
 @pytest.mark.parametrize("program", ["multibody", "springs"])
 def test_geometric_stiffening_adds_the_finite_rotation(program):
-    """For a rotation by e: L (cos e - 1) along the beam, L (sin e - e) across."""
+    """A rotation e adds L (cos e - 1) along the beam and L (sin e - e) across it."""
     e = 0.02
     robot = one_link(error=np.array([0, 0, e, 0, 0, 0]))
     design = CampaignDesign(configurations=2, rows=2, load=0.0)
@@ -229,9 +226,8 @@ def test_geometric_stiffening_adds_the_finite_rotation(program):
     assert campaign.strength["geometric_stiffening"] == pytest.approx(5.0, rel=1e-9)
 
 
-def test_effects_outside_the_library_follow_their_formulas(added):
-    """A drive's compliance times (1 + cos 3q) / 2, swelling,
-    T^2, a stand, a sagging target."""
+def test_effects_outside_the_library_equal_closed_forms(added):
+    """The effects are those of ``outside.py``."""
     q, F = 0.3, 10.0
     pushed = row(q, load=(0, 0, 0, -F * math.sin(q), F * math.cos(q), 0))
     turn = F * L / 1e5 * (1 + math.cos(3 * q)) / 2
@@ -247,9 +243,9 @@ def test_effects_outside_the_library_follow_their_formulas(added):
 
 
 def two_walls():
-    """A point between two equal beams on sliding drives, all on the x axis."""
+    """Return a point between two equal beams on prismatic drives along x."""
     link = BeamLink({"radius": 0.01}, E, NU)
-    along = [0, math.pi / 2, 0]  # z of a slide along x
+    along = [0, math.pi / 2, 0]  # rotates z to x
     back = [0, -math.pi / 2, 0]
     frames = (
         Frame("left", rotation=along, joint="prismatic", actuated=True),
@@ -263,8 +259,8 @@ def two_walls():
     return Robot("walls", "a", frames, (("a", "b"),))
 
 
-def test_closed_loop_divides_a_misfit_by_stiffness(added):
-    """Equal springs: half of a length, of an offset, of a strain; F / (k1 + k2)."""
+def test_misfit_in_a_closed_loop_is_divided_between_equal_beams(added):
+    """Each of the two equal beams takes up half of a misfit."""
     robot = two_walls()
     rest = {f.name: 0.0 for f in robot.frames}
     where = Row(rest, np.zeros(6), CONDITIONS)

@@ -1,4 +1,4 @@
-"""Synthetic campaigns: plans, strengths, files, truths, equivalent effects, command."""
+"""Tests of plans, strengths, files and equivalent effects of synthetic campaigns."""
 
 import csv
 import json
@@ -48,7 +48,7 @@ SPRING = np.diag([np.inf, np.inf, 5e4, np.inf, np.inf, np.inf])
 
 
 def two_axes(spring=SPRING):
-    """An arm of two joints at right angles."""
+    """Return an arm with two perpendicular joints."""
     rng = np.random.default_rng(1)
     frames = (
         Frame("j1", joint="revolute", actuated=True, joint_stiffness=spring),
@@ -61,7 +61,7 @@ def two_axes(spring=SPRING):
 
 
 def sliding():
-    """A turning arm on a slide."""
+    """Return a rotating arm on a slide."""
     slide = Frame("slide", joint="prismatic", actuated=True)
     first, *others = two_axes().frames
     on_it = replace(first, parent="slide", rotation=np.array([0, 1.0, 0]))
@@ -74,9 +74,8 @@ def quick(wanted, robot=None, **given):
     return generate_campaign(robot, wanted, design, program="springs", **given)
 
 
-def test_plan_alternates_configurations_and_includes_repeats_and_zero_loads():
-    """Each pass visits every configuration once;
-    some loads are repeated, some are 0."""
+def test_plan_contains_repeated_loads_and_zero_loads():
+    """Each pass visits every configuration once."""
     plan = plan_campaign(two_axes(), SMALL, np.random.default_rng(0))
     passes = plan.configuration.reshape(5, 8)
     assert all(sorted(p) == list(range(8)) for p in passes.tolist())
@@ -98,9 +97,8 @@ def test_every_simulated_effect_has_the_requested_strength(name):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_effect_that_the_loads_do_not_excite_is_replaced_by_another_draw(seed):
-    """Forces at a point on the wrist's axis do not twist it:
-    another drive gets the compliance."""
+def test_effect_that_is_invisible_in_the_readings_is_drawn_again(seed):
+    """Forces at a point on the wrist axis do not load the wrist spring."""
     arm = two_axes()
     wrist = Frame("j3", "tool", joint="revolute", actuated=True, joint_stiffness=SPRING)
     robot = Robot("wristed", "j3", (*arm.frames, wrist))
@@ -113,8 +111,7 @@ def test_effect_that_the_loads_do_not_excite_is_replaced_by_another_draw(seed):
 
 
 def test_simulated_noise_has_the_requested_standard_deviation():
-    """240 x 6 readings:
-    their rms is 1 within 3 / sqrt(2 x 1440) = 0.06, three standard deviations."""
+    """The tolerance is three standard deviations of the rms of 1440 readings."""
     design = replace(SMALL, rows=240)
     campaign = quick({}, design=design, noise=Noise(3e-5, 2e-6), seed=2)
     noise = (campaign.readings - campaign.exact) / np.repeat([3e-5, 2e-6], 3)
@@ -133,8 +130,8 @@ def test_contributions_of_two_effects_add_up_to_first_order():
 
 @pytest.mark.exudyn
 @pytest.mark.parametrize("name", ["3rrr", "hexapod", "arm6"])
-def test_multibody_and_spring_programs_give_the_same_readings(name):
-    """Beams and springs differ by the beam's own bending, which is of second order."""
+def test_multibody_and_spring_programs_agree(name):
+    """Bending between the ends of beams changes the readings to second order."""
     rng = np.random.default_rng(5)
     robot = without_clearance(load_robot(name))
     robot = robot.with_errors(5e-5 * rng.uniform(-1, 1, (len(robot.frames), 6)))
@@ -150,9 +147,8 @@ def test_multibody_and_spring_programs_give_the_same_readings(name):
 
 
 @pytest.mark.parametrize("name", ["3rrr", "hexapod", "arm6"])
-def test_spring_program_and_exact_equilibrium_agree_for_large_errors(name):
-    """Two programs of one model:
-    finite motions, and a load that moves with its point."""
+def test_spring_program_agrees_with_exact_equilibrium_for_large_errors(name):
+    """Both programs use finite motions and a load that moves with the platform."""
     rng = np.random.default_rng(6)
     robot = without_clearance(load_robot(name))
     robot = robot.with_errors(2e-3 * rng.uniform(-1, 1, (len(robot.frames), 6)))
@@ -175,7 +171,7 @@ def test_spring_program_and_exact_equilibrium_agree_for_large_errors(name):
     np.testing.assert_allclose(springs, exact, rtol=0, atol=2e-9)
 
 
-def test_written_campaign_is_read_again_and_does_not_contain_the_hidden_effects(
+def test_written_campaign_does_not_contain_the_hidden_effects(
     tmp_path,
 ):
     noise = Noise(missing=0.05, outliers=2, hidden_frame=1e-3)
@@ -205,7 +201,7 @@ def test_written_campaign_is_read_again_and_does_not_contain_the_hidden_effects(
         write_campaign(campaign, tmp_path / "c")
 
 
-def test_campaign_of_commanded_poses_is_read_again(tmp_path):
+def test_campaign_of_commanded_poses_is_read_unchanged(tmp_path):
     robot = without_clearance(load_robot("hexapod"))
     design = CampaignDesign(configurations=3, rows=3, reach=0.1, command="pose")
     campaign = quick({}, robot, design=design)
@@ -218,7 +214,7 @@ def test_campaign_of_commanded_poses_is_read_again(tmp_path):
     np.testing.assert_allclose(readings, np.array(expected)[:, own], rtol=0, atol=1e-9)
 
 
-def test_file_of_hidden_effects_has_the_keys_of_the_practice_campaigns():
+def test_truth_of_a_campaign_contains_effects_and_verdict():
     campaign = quick({"drive_compliance": 5.0, "link_length": 3.0}, seed=1)
     truth = json.loads(json.dumps(plain(truth_of(campaign))))
     assert truth["verdict"] == "explained"
@@ -236,10 +232,11 @@ def test_file_of_hidden_effects_has_the_keys_of_the_practice_campaigns():
 
 
 @pytest.mark.parametrize("name", sorted(TRUTH))
-def test_stored_campaigns_agree_with_their_hidden_effects(name):
-    """The multibody simulation made them, and springs explain them down to the noise.
-    The rms of the noise is the truth's within 1e-3. Without the hidden effects the rms
-    is the truth's error before, also within 1e-3."""
+def test_residuals_of_stored_campaigns_equal_their_truth_files(name):
+    """The stored campaigns were simulated in Exudyn.
+
+    The rms residuals with and without the hidden effects equal those in the truth file.
+    """
     truth, campaign = TRUTH[name], read_campaign(CAMPAIGNS / name)
     names = [frame.name for frame in campaign.robot.frames]
     rows = [
@@ -263,11 +260,14 @@ def test_stored_campaigns_agree_with_their_hidden_effects(name):
 
 
 def left(campaign):
-    """What each effect leaves of 240 readings at 5 sigma, 6000; second order: < 0.1."""
+    """Return the residual chi-square of each effect.
+
+    The hidden effects contribute about 6000.  Second-order effects are below 0.1.
+    """
     return {one.names[0]: one.residual for one in alternatives(campaign)}
 
 
-def test_expansion_is_equivalent_to_length_only_at_constant_temperature():
+def test_expansion_equals_length_error_only_at_constant_temperature():
     hidden = [(Hidden("thermal_expansion", {"tool": 2e-5}), 5.0)]
     steady = left(quick(hidden, design=replace(SMALL, temperature="constant")))
     assert steady["thermal_expansion"] < 0.1
@@ -277,14 +277,14 @@ def test_expansion_is_equivalent_to_length_only_at_constant_temperature():
     assert swinging["link_length"] > 100
 
 
-def test_softer_links_are_equivalent_to_a_larger_load_only_with_rigid_joints():
+def test_softer_links_equal_a_larger_load_only_with_rigid_joints():
     rigid = left(quick({"load_gain": 5.0}, two_axes(spring=None), seed=2))
     assert rigid["modulus_scale"] < 0.1
     elastic = left(quick({"load_gain": 5.0}, seed=2))
     assert elastic["modulus_scale"] > 100
 
 
-# one of each kind: of the weight, a spring, the geometry, the reading, two laws
+# one effect of each kind: weight, spring, geometry, reading and nonlinear joint
 QUICK = ("self_weight", "drive_compliance", "encoder_offset", "registration",
          "friction_hysteresis", "contact_stiffening", "thermal_expansion")  # fmt: skip
 
@@ -294,23 +294,21 @@ QUICK = ("self_weight", "drive_compliance", "encoder_offset", "registration",
     [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow)
      for name in LIBRARY if name not in ("joint_clearance", "geometric_stiffening")],
 )  # fmt: skip
-def test_simulated_effect_has_the_best_score_among_all_effects(name):
+def test_simulated_effect_has_the_smallest_residual(name):
     design = varied_for(SMALL, [name])
     readings = alternatives(quick({name: 5.0}, design=design, seed=6))
     own = min(one.residual for one in readings if one.names[0].startswith(name))
     curved = "drift", "contact_stiffening", "delayed_expansion"
     bound = 60.0 if name in curved else 1.0
-    assert (
-        own < bound
-    )  # time constants, and contacts in addition to springs, are nonlinear
+    assert own < bound  # the readings are nonlinear in these parameters
     assert own <= min(one.residual for one in readings) + 1.0
 
 
-def test_effect_that_the_robot_cannot_have_is_rejected():
+def test_effect_that_does_not_apply_to_the_robot_is_rejected():
     rng = np.random.default_rng(0)
     with pytest.raises(NotApplicable):
         draw_effect("friction_hysteresis", two_axes(spring=None), 1.0, rng)
-    # loads too small to show it; a drive none reaches is the same
+    # the loads are too small for a visible deflection
     away = CampaignDesign(configurations=8, rows=40, load=1e-3)
     with pytest.raises(NotApplicable, match="hardly changes the readings"):
         quick({"drive_compliance": 5.0}, design=away)
@@ -319,7 +317,7 @@ def test_effect_that_the_robot_cannot_have_is_rejected():
     assert "self_weight" in str(caught.value)
     assert " _" not in str(
         caught.value
-    )  # effects outside the library are only for tests
+    )  # names of effects outside the library are not listed
     with pytest.raises(BadInput, match="configurations"):
         CampaignDesign(configurations=5, rows=4)
     with pytest.raises(BadInput, match="temperature"):
