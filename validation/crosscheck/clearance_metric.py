@@ -1,13 +1,15 @@
 """Compare two models with clearances by their energies and spring deformations.
 
-If a clearance carries no load, the minimum-energy pose is not unique, so poses are not
-compared.  The minimum energy and the deformations and wrenches of the springs are
-unique. In addition, the simulated clearance motions are inserted into the linear model.
-The excess of the resulting energy over the minimum is the optimality gap.  If links are
-springs in the simulation, its energy must also equal the energy of the exact
-virtual-joint model at full scale.  Errors, clearances and load are multiplied by one
-scale s.  The linear energy is proportional to s^2.  The relative optimality gap is also
-proportional to s^2, until the compliance of the contacts dominates.
+If a joint with clearance carries no load, the minimum-energy pose is not unique.
+Therefore the minimum energy and the deformations and wrenches of the springs are
+compared, but not the poses.  In addition, the linear model is evaluated at the
+simulated motions within the clearances.  The difference of its energy from the minimum
+is the optimality gap.  If links are springs in the simulation, its energy must also
+equal the energy of the exact virtual-joint model at full scale.
+
+Errors, clearances and load are multiplied by the same scale s.  The linear energy is
+proportional to s^2, and so is the relative optimality gap until the compliance of the
+contacts dominates.
 """
 
 import math
@@ -31,8 +33,8 @@ from forcefit.validation.crosscheck.limits import (
 from forcefit.validation.crosscheck.pair import Pair
 from forcefit.validation.crosscheck.verdict import Check
 
-TOLERANCE = 0.02  # [-] bound of differences; contacts are compliant and smoothed
-FLOOR_ENERGY = 1e-4  # [J] energy of the springs that centre clearances, at scale 1
+TOLERANCE = 0.02  # [-] largest accepted relative difference
+FLOOR_ENERGY = 1e-4  # [J] energy of the centring springs of joints, at scale 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,24 +58,23 @@ class ClearanceMetric:
 
     @property
     def scales(self) -> NDArray:
-        """(k,) scales of the imperfections, largest first."""
+        """Scales of the imperfections, largest first, (k,)."""
         return np.array([pair.scale for pair in self.pairs])
 
     @cached_property
     def gaps(self) -> NDArray:
-        """(k,) relative optimality gaps of the simulated clearance screws.
+        """Relative optimality gaps of the simulated motions within clearances, (k,).
 
-        The gap is divided by the larger of two energies: the energy of closing the
-        loops without clearances, and the energy stored under the load.
+        See :func:`optimality_gap`.
         """
         return np.array([optimality_gap(pair) for pair in self.pairs])
 
     @cached_property
     def signal(self) -> bool:
-        """Whether clearance motions or spring deformations exceed the noise.
+        """Whether motions within clearances or spring deformations exceed the noise.
 
-        Inside an assembly zone both energies are zero.  This agreement is meaningful
-        only if closing the loops without clearances would store energy.
+        If the robot assembles without force, both energies are zero.  This agreement is
+        significant only if assembly without clearances would require energy.
         """
         linear, s = self.pairs[0].linear, self.pairs[0].scale
         return (
@@ -97,7 +98,7 @@ class ClearanceMetric:
         return {k: replace(check, signal=self.signal) for k, check in limits.items()}
 
     def _strain_limit(self) -> Check:
-        """Return the energy norm of the difference in spring deformations."""
+        """Return the energy norm of the difference between spring deformations."""
         frames = self.robot.frames
         K = {"link_screws": np.zeros((len(frames), 6, 6))}
         K["joint_screws"] = np.zeros((len(frames), 6, 6))
@@ -132,10 +133,9 @@ class ClearanceMetric:
 
     @cached_property
     def energies(self) -> dict[str, NDArray]:
-        """(k,) relative differences of the simulated energy, by reference model.
+        """Relative differences of the energy from the linear and exact models, (k,).
 
-        The references are the linear and the exact model.  The values are NaN if the
-        exact model has no solution.
+        The values are NaN if the exact model has no solution.
         """
         relative: dict[str, list[float]] = {"linear": [], "exact": []}
         for pair in self.pairs:
@@ -159,7 +159,7 @@ class ClearanceMetric:
         return checks
 
     def table(self) -> dict[str, Any]:
-        """Return the public entries that are specific to this metric."""
+        """Return the results of this metric under their public keys."""
         return {
             "clearances": "on both sides; poses are not unique and not judged",
             "slope": None,
@@ -199,22 +199,21 @@ class ClearanceMetric:
 
 
 def optimality_gap(pair: Pair) -> float:
-    """Return the relative energy excess of the simulated clearance motions.
+    """Return the optimality gap of the simulated motions within clearances.
 
     Args:
         pair: both solutions of a robot with clearances.
 
     Returns:
-        [-] potential energy (elastic energy minus work of the load) of the linear model
-        minus its minimum, divided by a reference energy.  The linear model is evaluated
-        at the simulated clearance motions, projected onto their cones.  The reference
-        is the largest of the energy stored without clearances, the energy stored with
-        clearances under load, and :data:`FLOOR_ENERGY`.
+        [-] Difference of the linear model's potential energy from its minimum, divided
+        by a reference energy.  The model is evaluated at the simulated motions,
+        projected onto their cones.  The reference is the largest of the energy without
+        clearances, the energy with clearances under load, and :data:`FLOOR_ENERGY`.
     """
     best = pair.linear
     small = reduce_problem(linearise(best.posture), best.joints, best.frame_loads)
     cones = best.joints.cones
-    # Each column of ``cones`` has a single nonzero entry, the inverse of its bound.
+    # Each column of ``cones`` has a single nonzero entry, the inverse of a bound.
     u = cones.T @ pair.simulated.clearance_screws.ravel() / (cones**2).sum(axis=0)
     u = into_cones(u, best.joints.group)
     strain, least = small.G @ u + small.h, small.G @ best.clearances + small.h

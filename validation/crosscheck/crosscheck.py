@@ -1,10 +1,9 @@
 """Compare the virtual-joint model of a robot with its multibody simulation.
 
-Both models are solved at several scales.  A scale multiplies the load and all
-imperfections (geometric errors and clearances).  Without clearances, the platform's
-poses are compared (:mod:`forcefit.validation.crosscheck.pose_metric`).  With
-clearances, the minimum-energy pose is not unique, so energies and springs are compared
-(:mod:`forcefit.validation.crosscheck.clearance_metric`).
+Both models are solved at several scales.  A scale is a factor on the load, the
+geometric errors and the clearances.  Without clearances, the platform poses are
+compared (:mod:`forcefit.validation.crosscheck.pose_metric`).  With clearances, energies
+and springs are compared (:mod:`forcefit.validation.crosscheck.clearance_metric`).
 """
 
 from collections.abc import Callable, Sequence
@@ -67,7 +66,7 @@ ELEMENTS = 4  # number of elements of each beam in the simulation
 
 
 class Metric(Protocol):
-    """Protocol of a comparison of two models at several scales."""
+    """Protocol of a comparison between two models at several scales."""
 
     @property
     def slope(self) -> float:
@@ -87,7 +86,7 @@ class Metric(Protocol):
         """Return one table row per scale."""
 
     def table(self) -> dict[str, Any]:
-        """Return the public entries that are specific to this metric."""
+        """Return the results of this metric under their public keys."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,11 +96,10 @@ class Crosscheck:
     Attributes:
         posture: the nominal posture.
         load: (6,) [N m, N] load on the platform at scale 1, base axes.
-        links: model of links in the simulation: ``"beam"``, ``"spring"``, ``"fem"``.
+        links: model of links in the simulation: ``"beam"``, ``"spring"`` or ``"fem"``.
         gravity: (3,) [m/s^2] gravity at scale 1, base axes.
         pairs: solutions at each scale, largest first.
-        asked: number of requested scales.  Smaller scales were added because a check
-            was undecided.
+        asked: number of requested scales, without those that were added.
         metric: comparison of the solutions.
     """
 
@@ -132,7 +130,7 @@ class Crosscheck:
 
     @cached_property
     def resolutions(self) -> list[Resolution]:
-        """Smallest detectable change of each parameter of the robot."""
+        """Smallest detectable change of each robot parameter."""
         assert isinstance(self.metric, PoseMetric | ClearanceMetric)
         return resolutions(
             self.posture, self.pairs, self.metric, self.load, self.gravity
@@ -221,18 +219,17 @@ def crosscheck(
 
     Args:
         posture: the robot's configuration.
-        scales: factors on errors, clearances and load, positive, at least two different
-            values.  Smaller scales are added if a check is undecided.
+        scales: at least two different factors > 0 on errors, clearances and load.
+            Smaller scales are added if a check is undecided.
         load: (6,) [N m, N] load on the platform at its origin, in base axes, or a
             mapping from component to value such as ``{"fz": -50}``.
         links: model of the links in the simulation.  ``"beam"``: geometrically exact
-            beams.  ``"spring"``: every link is a spring with its K_E, which checks
-            everything except beam theory.  ``"fem"``: meshed links are solids in
-            floating frames.
+            beams.  ``"spring"``: springs with the stiffness K_E of the links.
+            ``"fem"``: solids in floating frames for meshed links.
         gravity: (3,) [m/s^2] gravity in base axes.  Beams with a density and bodies
             with a mass then have weight in all models.
         time_limit: [s] time limit of each simulation.
-        clearances: whether both models include clearances; poses are then not compared.
+        clearances: whether both models include clearances.
 
     Returns:
         Both solutions at every scale and the verdict.
@@ -241,18 +238,18 @@ def crosscheck(
         BadInput: fewer than two scales are given, or a scale is not positive.
         SimulationFailed: the simulation found no equilibrium.
         CannotAssemble: the virtual-joint model has no solution.
-        FreeMotion: the load acts along an unresisted motion.
+        FreeMotion: no joint or link resists the load.
     """
     robot = posture.robot if clearances else without_clearance(posture.robot)
     compared = replace(posture, robot=robot)
     wrench = np.zeros(6) if load is None else given_load(load)
-    force = wrench * [0, 0, 0, 1, 1, 1]  # a moment is a couple of dead forces
+    force = wrench * [0, 0, 0, 1, 1, 1]  # the moment is applied as a couple
     model = replace(link_models(robot, links), elements=ELEMENTS, clearances=clearances)
     g = np.zeros(3) if gravity is None else np.array(gravity, dtype=float)
     springs = links == "spring"
     between = 0.0 if springs else energy_between_ends(compared, g, ELEMENTS)
 
-    # Free motions that springs hold at one scale are held at all smaller scales, too.
+    # If springs are needed on free motions at a scale, they are used at smaller scales.
     held: list[float] = []
 
     def solve(s: float) -> Pair:
@@ -267,8 +264,7 @@ def crosscheck(
         )  # fmt: skip
         if simulated.held:
             held.append(s)
-        # The other models also contain the springs that hold free motions in the
-        # simulation.
+        # The linear model then contains the same springs as the simulation.
         if simulated.held and holding is not None:
             linear = holding
         exact = exact_solution(linear, s * g)
@@ -303,8 +299,8 @@ def attempt(
         check: function without arguments that runs the check.
 
     Returns:
-        ``(result, None)`` on success.  ``(None, table)`` on failure, where the table
-        contains ``status``, ``reason``, ``passed`` and a null ``slope``.
+        The result and None, or None and a mapping with ``status``, ``reason``,
+        ``passed`` and ``slope`` if the check failed to run.
     """
     try:
         return check(), {}

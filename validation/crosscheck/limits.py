@@ -8,8 +8,8 @@ slope   ``difference_slope`` slope of log difference over log scale, as s goes t
 limit   ``limit_difference`` difference / s^p extrapolated to s = 0, relative
 ======  ===================  ==========================================================
 
-The uncertainty of a limit is twice its change when the largest scale is omitted.
-Differences below :data:`FLOOR`, the resolution of the simulation, count as noise.
+The uncertainty of a limit is twice the change of the limit if the largest scale is
+omitted.  Differences below :data:`FLOOR` are regarded as noise of the simulation.
 """
 
 import math
@@ -28,8 +28,8 @@ LIMIT_TOLERANCE = 1e-3
 FLOOR = {
     "rotation": 1e-10,
     "translation": 1e-11,
-}  # [rad], [m] resolution of a simulation
-# Changes below this multiple of the effect of weak springs on free motions are noise.
+}  # resolution of a simulation [rad], [m]
+# Multiple of the effect of weak springs below which changes are regarded as noise.
 _NOISE = 3.0
 HALVES = {"rotation": slice(0, 3), "translation": slice(3, 6)}
 
@@ -37,17 +37,17 @@ HALVES = {"rotation": slice(0, 3), "translation": slice(3, 6)}
 def spring_limits(
     robot: Robot, pairs: Sequence[Pair], spread: bool = False
 ) -> dict[str, Check]:
-    """Return relative differences of springs and energy, extrapolated to scale 0.
+    """Return checks of spring deformations, wrenches and energy at scale 0.
 
     Args:
         robot: robot with the compared links and joint springs.
         pairs: both solutions at several scales.
         spread: whether loads act between the ends of links.  Link wrenches are then not
-            compared, because the linear model does not contain such loads.
+            compared, because the linear model lacks such loads.
 
     Returns:
-        Mapping from name to difference, relative to the largest value of all links or
-        all joints; see :func:`limit_difference`.
+        Mapping from quantity to its check; see :func:`limit_difference`.  Differences
+        are relative to the largest value of all links or joints.
     """
     scales = np.array([pair.scale for pair in pairs])
     stiff = _stiffest(robot)
@@ -80,7 +80,7 @@ def spring_limits(
 
 
 def energy_floor(robot: Robot) -> float:
-    """Return the energy [J] of the stiffest spring deformed by :data:`FLOOR`."""
+    """Return the energy [J] of the stiffest spring for a deformation :data:`FLOOR`."""
     return float((_stiffest(robot) * np.array(list(FLOOR.values())) ** 2).max())
 
 
@@ -88,23 +88,21 @@ def limit_difference(
     scales: NDArray, ours: NDArray, theirs: NDArray, power: int, floor: float,
     bound: float = LIMIT_TOLERANCE, least_size: float = 0.0,
 ) -> Check:  # fmt: skip
-    """Return the largest relative difference of two models as the scale goes to 0.
+    """Return the check of the relative difference between two models at scale 0.
 
     Args:
         scales: (k,) different scales, largest first.
-        ours: (k, ...) values of the virtual-joint model, which are proportional to a
-            power of the scale.
+        ours: (k, ...) values of the virtual-joint model, proportional to a power of the
+            scale.
         theirs: (k, ...) values of the simulation.
         power: exponent of the scale.
         floor: size below which differences are noise, in the unit of the values.
         bound: largest accepted relative difference.
-        least_size: smallest value by which the difference is divided, in the unit of
-            the values at scale 1.
+        least_size: smallest divisor of the difference, in the unit of the values.
 
     Returns:
-        [-] the relative difference, which is at most the bound if only noise remains.
-        The check has a signal if the bound times the largest value of ``ours`` exceeds
-        the noise.
+        The check of the largest relative difference.  It has a signal if the bound
+        times the largest value of ``ours`` exceeds the noise.
     """
     weight = scales.reshape(-1, *[1] * (ours.ndim - 1)) ** -float(power)
     limit, change = limit_of(scales, (theirs - ours) * weight)
@@ -115,15 +113,14 @@ def limit_difference(
 
 
 def limit_of(scales: NDArray, values: NDArray) -> tuple[float, float]:
-    """Return the largest component extrapolated to scale 0, and its uncertainty.
+    """Extrapolate values to scale 0 and return the largest component.
 
     Args:
         scales: (k,) different scales, largest first.
         values: (k, ...) values at these scales.
 
     Returns:
-        The absolute value of the component, and twice its largest change when the
-        largest scale is omitted.
+        The absolute value of the component, and its uncertainty.
     """
     limit = extrapolate(scales, values)
     change = limit - extrapolate(scales[1:], values[1:])
@@ -131,7 +128,7 @@ def limit_of(scales: NDArray, values: NDArray) -> tuple[float, float]:
 
 
 def _stiffest(robot: Robot) -> NDArray:
-    """Return the largest stiffness (2,) [N m/rad, N/m] of any spring."""
+    """Return the largest stiffness of all springs, (2,) [N m/rad, N/m]."""
     diagonals = [np.zeros(6)]
     links = [frame for frame in robot.frames if frame.link is not None]
     diagonals += [np.diag(link_stiffness(frame)) for frame in links]
@@ -143,11 +140,11 @@ def _stiffest(robot: Robot) -> NDArray:
 def difference_slope(scales: ArrayLike, differences: ArrayLike, floor: float) -> float:
     """Return the slope of log difference over log scale as the scale goes to 0.
 
-    A difference of second order is ``c2 s^2 + c3 s^3 + ..``, where the vectors c2 and
-    c3 may partly cancel.  A straight line through the logarithms of its norm may then
-    have almost any slope, for example 1.3 at scales from 1 to 1/8.  Therefore the
-    first-order term ``c1 s`` is extrapolated separately from ``difference / s``.  The
-    slope compares this term with the terms of higher order at the smallest scale.
+    In a difference of second order, ``c2 s^2 + c3 s^3 + ..``, the terms may partly
+    cancel.  A straight line through the logarithms would then have a wrong slope.
+    Therefore the first-order term ``c1 s`` is extrapolated from ``difference / s``.  At
+    the smallest scale, the slope follows from the ratio between this term and the terms
+    of higher order.
 
     Args:
         scales: (k,) positive scales, largest first.
@@ -155,8 +152,8 @@ def difference_slope(scales: ArrayLike, differences: ArrayLike, floor: float) ->
         floor: size below which differences are noise and are omitted.
 
     Returns:
-        2 without a first-order term, and 1 if only this term is present.  NaN if fewer
-        than two differences exceed the floor.
+        The slope: 2 without a first-order term, 1 without terms of higher order, and
+        NaN if fewer than two differences exceed the floor.
     """
     scales, parts = _clear(scales, differences, floor)
     if len(scales) < 2:
@@ -178,10 +175,10 @@ def slope_check(
         bound: largest accepted difference of the slope from 2.
 
     Returns:
-        The check.  Its uncertainty is the change of the slope when the largest scale is
-        omitted, and infinite for two scales.  The check has no signal in two cases:
-        fewer than two differences are above the floor, or noise can change the slope by
-        more than the bound.
+        The check.  Its uncertainty is the change of the slope if the largest scale is
+        omitted, and infinite for two scales.  The check has no signal if fewer than two
+        differences exceed the floor, or if noise can change the slope by more than the
+        bound.
     """
     value = 2.0 - difference_slope(scales, differences, floor)
     if math.isnan(value):
@@ -199,7 +196,7 @@ def slope_check(
 def _clear(
     scales: ArrayLike, differences: ArrayLike, floor: float
 ) -> tuple[NDArray, NDArray]:
-    """Return the scales and differences (k, components) that exceed the noise."""
+    """Return the differences (k, components) above the noise, and their scales."""
     scales = np.asarray(scales, dtype=float)
     parts = np.asarray(differences, dtype=float).reshape(len(scales), -1)
     clear = np.linalg.norm(parts, axis=1) > floor
@@ -222,7 +219,8 @@ def extrapolate(scales: NDArray, values: NDArray) -> NDArray:
         values: (k, ...) values at these scales.
 
     Returns:
-        (...) value at scale 0.  Its error is of the order of the product of the scales.
+        Value at scale 0, (...).  Its error is of the order of the product of the
+        scales.
     """
     table = [np.asarray(v, dtype=float) for v in values]
     for step in range(1, len(table)):

@@ -15,16 +15,16 @@ KINDS = ("beam", "spring", "fem")
 
 
 def link_models(robot: Robot, kind: str) -> SimulationModel:
-    """Return the link model of a simulation: spring stiffnesses and solids.
+    """Return the simulation model of a robot's links.
 
     Args:
         robot: robot of the virtual-joint model.
-        kind: ``"beam"``: beams are beams and other links are springs.  ``"spring"``:
-            all links are springs.  ``"fem"``: meshed links are solids; other links are
-            modelled as for ``"beam"``.
+        kind: ``"beam"``: links with a cross-section are beams, and other links are
+            springs.  ``"spring"``: all links are springs.  ``"fem"``: meshed links are
+            solids, and other links are modelled as for ``"beam"``.
 
     Returns:
-        The model, in which joints have no clearance.
+        The model.  Its joints have no clearance.
 
     Raises:
         BadInput: the kind is unknown, or a mesh cannot be used.
@@ -45,10 +45,10 @@ def link_stiffnesses(robot: Robot, links: str) -> Mapping[str, NDArray]:
 
     Args:
         robot: robot of the virtual-joint model.
-        links: ``"spring"`` for all links; for any other kind, beams are omitted.
+        links: kind of link model.  If it is not ``"spring"``, beams are omitted.
 
     Returns:
-        Mapping from the frame's name to K_E, (6, 6) [N m/rad .. N/m] in its axes.
+        Mapping from frame to K_E in the axes of the frame, (6, 6) [N m/rad .. N/m].
     """
     return {
         frame.name: link_stiffness(frame)
@@ -59,5 +59,5 @@ def link_stiffnesses(robot: Robot, links: str) -> Mapping[str, NDArray]:
 
 
 def link_stiffness(frame: Frame) -> NDArray:
-    """Return K_E (6, 6) [N m/rad .. N/m] of a frame's link."""
+    """Return K_E of a frame's link, (6, 6) [N m/rad .. N/m]."""
     return np.linalg.inv(link_compliance(frame))

@@ -26,12 +26,11 @@ class Pair:
         simulated: result of the simulation.
         exact: result of the virtual-joint model with finite rotations; None if no
             solution was found.
-        between: [J] energy of distributed weights in the beams of the simulation, which
-            the linear model does not contain.
+        between: [J] energy of distributed weights in the beams of the simulation.  The
+            linear model lacks this energy.
         holding: solution of the linear model with the springs of
-            :func:`hold_free_motions`, from which the effect of the weaker springs in
-            the simulation is estimated; None if the simulation contains no such
-            springs.
+            :func:`hold_free_motions`, used to estimate the effect of weaker springs in
+            the simulation.  None if the simulation contains no such springs.
     """
 
     scale: float
@@ -42,18 +41,17 @@ class Pair:
     holding: Assembly | None = None
 
     def noise_of(self, quantity: str) -> NDArray:
-        """Return the effect at scale 1 of the springs that hold free motions.
+        """Return the effect of the weak springs on free motions at scale 1.
 
-        These springs, which only the simulation contains, are so weak that their effect
-        is proportional to their stiffness.
+        The effect is proportional to the stiffness of these springs.
 
         Args:
-            quantity: name of a screw or of wrenches of an ``Assembly``, proportional to
-                the scale.
+            quantity: name of a screw or wrench of an ``Assembly`` that is proportional
+                to the scale.
 
         Returns:
-            Absolute changes, in the shape of the quantity; zero if both models contain
-            the same springs.
+            Absolute changes of the quantity.  They are 0 if both models contain the
+            same springs.
         """
         value = np.asarray(getattr(self.linear, quantity))
         if self.holding is None or self.simulated.held:
@@ -64,10 +62,9 @@ class Pair:
 
     @property
     def linear_energy(self) -> float:
-        """[J] energy of the linear model, including that of distributed weights.
+        """Energy [J] of the linear model with that of distributed weights.
 
-        The energy of the springs that hold free motions is excluded, as in the
-        simulation.
+        The energy of weak springs on free motions is not included.
         """
         robot = self.linear.posture.robot
         held = holding_energy(robot, self.linear.joint_screws)
@@ -75,7 +72,7 @@ class Pair:
 
     @property
     def screw_difference(self) -> NDArray:
-        """(6,) [rad, m] platform screw, simulated minus linear."""
+        """Simulated minus linear platform screw, (6,) [rad, m]."""
         return self.simulated.platform_screw - self.linear.platform_screw
 
     def table(self, robot: Robot) -> dict[str, Any]:
@@ -122,13 +119,13 @@ class Pair:
 
 
 def sprung(robot: Robot) -> NDArray:
-    """Mark the joint components that have springs and are therefore compared.
+    """Return which components of joints have springs.
 
     Args:
         robot: robot of n frames.
 
     Returns:
-        (n, 6) array, 1 where K_B is finite and 0 elsewhere.
+        Array with 1 where K_B is finite and 0 elsewhere, (n, 6).
     """
     rows = np.zeros((len(robot.frames), 6))
     for row, frame in zip(rows, robot.frames, strict=True):
@@ -138,7 +135,7 @@ def sprung(robot: Robot) -> NDArray:
 
 
 def _named(robot: Robot, part: str, rows: NDArray) -> dict[str, NDArray]:
-    """Return the row of each frame with a link or joint (``part``), by frame name."""
+    """Return a mapping from frames with a link or joint (``part``) to rows."""
     return {
         frame.name: row
         for frame, row in zip(robot.frames, rows, strict=True)
@@ -147,15 +144,15 @@ def _named(robot: Robot, part: str, rows: NDArray) -> dict[str, NDArray]:
 
 
 def hold_free_motions(posture: Posture) -> Posture:
-    """Return a posture with the springs that hold free motions in the simulation.
+    """Return the posture of a robot with weak springs on free motions.
 
     Args:
         posture: posture of a robot without clearances.
 
     Returns:
-        The posture of a robot with a spring of
+        The posture with a spring of stiffness
         :data:`~forcefit.validation.multibody.exudyn_model.HOLDING_STIFFNESS` at each
-        passive joint that has no spring.
+        passive joint without a spring.
     """
 
     def hold(frame: Frame) -> Frame:
@@ -171,15 +168,14 @@ def hold_free_motions(posture: Posture) -> Posture:
 
 
 def holding_energy(robot: Robot, joint_screws: NDArray) -> float:
-    """Return the energy of the springs that hold free motions, if there are any.
+    """Return the energy of the weak springs on free motions.
 
     Args:
-        robot: robot of the virtual-joint model, with or without springs on free
-            motions.
+        robot: robot of the virtual-joint model.
         joint_screws: (n, 6) [rad, m] deformations of its joints.
 
     Returns:
-        [J] energy.
+        The energy [J].
     """
     stored = 0.0
     for frame, screw in zip(robot.frames, joint_screws, strict=True):
@@ -191,15 +187,17 @@ def holding_energy(robot: Robot, joint_screws: NDArray) -> float:
 def exact_solution(
     linear: Assembly, gravity: ArrayLike | None = None
 ) -> ExactAssembly | None:
-    """Return the finite-rotation solution near a linear one, or None.
+    """Return the solution with finite rotations near a linear solution.
+
+    The moment of the load is a couple of forces of constant direction, as in the
+    simulation.
 
     Args:
         linear: linear solution from which the iteration starts.
-        gravity: (3,) [m/s^2] base axes, as in the linear solution.
+        gravity: (3,) [m/s^2] gravity in base axes, as in the linear solution.
 
     Returns:
-        The exact solution, or None if the iteration does not converge.  The moment of
-        the load is a couple of dead forces on the platform, as in the simulation.
+        The solution, or None if the iteration does not converge.
     """
     joints, robot = linear.joints, linear.posture.robot
     if not any(A.shape[1] for A in (joints.elastic, joints.cones, joints.free)):

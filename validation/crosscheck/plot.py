@@ -20,8 +20,8 @@ def slope_figure(check: Crosscheck) -> "Figure":
             without clearances.
 
     Returns:
-        A log-log figure with panels for rotation [mrad] and translation [mm], each with
-        a line of slope 2 through the value at the smallest scale.
+        A figure with panels for rotation [mrad] and translation [mm], each with a line
+        of slope 2 through the value at the smallest scale.
     """
     from matplotlib.figure import Figure
 

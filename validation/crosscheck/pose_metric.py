@@ -1,12 +1,12 @@
 """Compare the poses of two models without clearances by slopes and limits.
 
-The virtual-joint model is linear in the errors, whereas the simulation is nonlinear. If
-the linear model is correct, the difference is of second order: multiplying errors and
-load by s changes it in proportion to s^2, which is a slope of 2 in a log-log plot. Each
-quantity of the simulation is divided by its power of s and extrapolated to s = 0. The
-limit must equal the quantity of the linear model. Even a relative error of one
-thousandth in a first-order term changes the slope and the limit. Passive joints move
-freely about or along their z axis in both models.
+The virtual-joint model is linear in the errors, whereas the simulation is nonlinear.
+If the linear model is correct, the difference between the models is of second order.
+If errors and load are multiplied by s, it is proportional to s^2, which is a slope of
+2 in a log-log plot.  Each quantity of the simulation is divided by its power of s and
+extrapolated to s = 0.  The limit must equal the quantity of the linear model.
+
+Passive joints move freely about or along their z axis in both models.
 
 ======  ===============  =============================================================
 symbol  code             meaning
@@ -37,13 +37,13 @@ from forcefit.validation.crosscheck.limits import (
 from forcefit.validation.crosscheck.pair import Pair
 from forcefit.validation.crosscheck.verdict import Check
 
-# Largest accepted deviation of the slope of the pose difference from 2.
+# Largest accepted deviation of the slope from 2.
 SLOPE_TOLERANCE = 0.1
-# [-] Largest accepted fraction of the pose difference that remains with the exact model
-# if links are springs.
+# [-] Largest accepted fraction of the pose difference that the exact model does not
+# explain if links are springs.
 EXPLAINED_TOLERANCE = 0.02
-# [-] Relative first-order pose difference between a mesh's K_E and its solid.  It is
-# caused by round-off and matters only if second-order terms are equally small.
+# [-] Relative first-order pose difference between K_E of a mesh and the simulated
+# solid, due to round-off.
 _ROUNDING = 2e-5
 
 
@@ -65,23 +65,23 @@ class PoseMetric:
 
     @property
     def scales(self) -> NDArray:
-        """(k,) scales of the imperfections, largest first."""
+        """Scales of the imperfections, largest first, (k,)."""
         return np.array([pair.scale for pair in self.pairs])
 
     @cached_property
     def components(self) -> dict[str, NDArray]:
-        """(k, 3) pose differences ``rotation`` [rad] and ``translation`` [m]."""
+        """Pose differences ``rotation`` [rad] and ``translation`` [m], (k, 3) each."""
         screws = np.array([pair.screw_difference for pair in self.pairs])
         return {name: screws[:, half] for name, half in HALVES.items()}
 
     @cached_property
     def differences(self) -> dict[str, NDArray]:
-        """(k,) norm of the pose difference: ``rotation`` [rad], ``translation`` [m]."""
+        """Norms of the ``rotation`` [rad] and ``translation`` [m] differences, (k,)."""
         return {k: np.linalg.norm(v, axis=1) for k, v in self.components.items()}
 
     @cached_property
     def slopes(self) -> dict[str, float]:
-        """Slope of each difference; NaN if it is below the solver noise."""
+        """Slope of each difference; NaN if the difference is below the noise."""
         return {
             name: difference_slope(self.scales, values, FLOOR[name])
             for name, values in self.components.items()
@@ -95,12 +95,11 @@ class PoseMetric:
 
     @cached_property
     def unexplained(self) -> dict[str, float]:
-        """Fraction of the pose difference that remains with the exact model.
+        """Difference from the exact model over the difference from the linear model.
 
-        The fraction is computed at the largest scale.  If links are springs, only
-        round-off remains.  If links are beams, the error of modelling the finite
-        bending of a beam by one spring remains.  The fraction is NaN if there is no
-        pose difference.
+        The differences of platform poses at the largest scale are used.  If links are
+        beams, the exact model still differs from the simulation, because a single
+        spring replaces each beam.  The value is NaN without a pose difference.
         """
         first = self.pairs[0]
         if first.exact is None:
@@ -117,10 +116,9 @@ class PoseMetric:
     def limits(self) -> dict[str, Check]:
         """Relative difference of both models by quantity, extrapolated to scale 0.
 
-        Rotational and translational parts of screws and wrenches are compared
-        separately, each relative to the largest value over all frames with such a
-        spring.  Differences below :data:`FLOOR` are noise, and so are the wrenches that
-        they cause in the stiffest spring.
+        Rotations and translations are compared separately, and so are moments and
+        forces.  Each difference is relative to the largest value of all frames with
+        such a spring.  Differences below :data:`FLOOR` are noise.
         """
         ours = np.array([p.linear.platform_screw for p in self.pairs])
         theirs = np.array([p.simulated.platform_screw for p in self.pairs])
@@ -154,7 +152,7 @@ class PoseMetric:
         return slopes | limits | shares
 
     def table(self) -> dict[str, Any]:
-        """Return the public entries that are specific to this metric."""
+        """Return the results of this metric under their public keys."""
         return {
             "clearances": "left out on both sides",
             "slope": self.slope,
@@ -194,7 +192,9 @@ class PoseMetric:
         shares = [f"{100 * share:.2g} % of {half}" for half, share in known.items()]
         if shares:
             remaining = ", ".join(shares)
-            lines.append(f"difference from the exact model that remains: {remaining}")
+            lines.append(
+                f"difference that the exact model does not explain: {remaining}"
+            )
         if self.pairs[0].simulated.held:
-            lines.append("free motions are held by 0.01 N m/rad in all models")
+            lines.append("free motions have springs of 0.01 N m/rad in all models")
         return lines

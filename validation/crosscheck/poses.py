@@ -36,16 +36,16 @@ def check_poses(
 
     Args:
         robot: robot with its errors.
-        axes: mapping from pose component to its values [m or rad]; all other components
+        axes: mapping from pose component to its values [m or rad].  Other components
             are free.
         check: function that runs a check at a posture.
         progress: function called after each pose with the number of finished poses and
             the total.
 
     Returns:
-        For each pose, a mapping with the requested pose ``asked``, ``passed``,
-        ``status`` and the results of the check.  ``passed`` is None if the pose is
-        unreachable (status ``"out of reach"``) or violates a joint limit (status
+        One mapping per pose with the requested pose ``asked``, ``passed``, ``status``
+        and the results of the check.  ``passed`` is None if the pose is unreachable
+        (status ``"out of reach"``) or violates a joint limit (status
         ``"beyond_limits"``).
 
     Raises:
@@ -80,7 +80,7 @@ def _row(
 
 
 def poses_table(rows: list[dict[str, Any]]) -> dict[str, Any]:
-    """Convert to plain values; ``passed`` is true if all reached poses passed."""
+    """Convert results to plain values, with the outcome over all reachable poses."""
     reached = [row for row in rows if row["passed"] is not None]
     passed = bool(reached) and all(row["passed"] for row in reached)
     return {"poses": rows, "passed": passed, "reached": len(reached)}
@@ -95,7 +95,7 @@ def outcome_text(row: Mapping[str, Any]) -> str:
 
 
 def poses_text(rows: list[dict[str, Any]]) -> str:
-    """Format one line of text per pose, followed by the verdict."""
+    """Format the outcome at each pose, and the number of poses that passed."""
     lines = []
     for row in rows:
         where = ", ".join(f"{k}={v:.6g}" for k, v in row["asked"].items())

@@ -24,7 +24,7 @@ from forcefit.validation.crosscheck.verdict import NOT_CHECKED, verdict, verdict
 
 # Colour of the verdict for each outcome.
 GOOD = {PASSED: True, NOT_DECIDED: None, NO_SIGNAL: None, FAILED: False}
-_LISTED = 30  # parameters in the table of smallest detectable changes
+_LISTED = 30  # number of parameters in the table of detectable changes
 ASSUMED = (
     "The simulation (Exudyn) has geometrically exact motions; the virtual-joint model "
     "is linear in errors and loads.",
@@ -65,7 +65,7 @@ def crosscheck_page(check: Crosscheck, provenance: Provenance) -> str:
 
 
 def _verdict(check: Crosscheck) -> str:
-    """State the outcome of the checks in one sentence."""
+    """Return the outcome of the checks in one sentence."""
     outcomes = [one.verdict for one in check.checks.values()]
     count = f"{outcomes.count(OK)} of {len(outcomes)} checks passed"
     if verdict(check) == PASSED:
@@ -90,13 +90,13 @@ def _tiles(check: Crosscheck) -> list[Tile]:
 
 
 def compared(check: Crosscheck) -> list[str]:
-    """Return text, a table and a chart that compare both models at every scale.
+    """Return the HTML text, table and chart that compare both models at every scale.
 
     Args:
-        check: a cross-check, run alone or as part of a study.
+        check: a cross-check.
 
     Returns:
-        HTML fragments.  The chart is included only if poses are compared.
+        HTML fragments, with a chart if poses are compared.
     """
     pieces = [table(check.metric.header(), check.metric.rows(), "cross-check")]
     if not isinstance(check.metric, PoseMetric):
@@ -105,20 +105,20 @@ def compared(check: Crosscheck) -> list[str]:
         "The difference between a linearised model and the simulation must grow with "
         f"the square of the errors: slope 2. {_slope_text(check.slope)}"
     )
-    # There is no slope and no chart if the differences are below the noise.
+    # Without differences above the noise, there is no slope and no chart.
     chart = [] if np.isnan(check.slope) else [_slope_chart(check, check.metric)]
     return [text, *pieces, *chart]
 
 
 def _slope_text(slope: float) -> str:
-    """State the slope, or that there is none."""
+    """Return a sentence on the slope."""
     if np.isnan(slope):
         return "The two models do not differ measurably, so there is no slope."
     return f"Measured: {slope:.3f}."
 
 
 def _slope_chart(check: Crosscheck, metric: PoseMetric) -> str:
-    """Chart the differences over the scale, together with a line of slope 2."""
+    """Return a chart of the differences over the scale, with a line of slope 2."""
     scales = np.asarray(check.scales)
     traces: list[dict[str, Any]] = []
     for name, values in metric.differences.items():
@@ -139,7 +139,7 @@ def _slope_chart(check: Crosscheck, metric: PoseMetric) -> str:
 
 
 def _checks(check: Crosscheck) -> str:
-    """Tabulate the value, uncertainty, bound and outcome of every check."""
+    """Return a table of all checks."""
     rows: Cells = [
         [name, one.value, one.uncertainty, one.bound,
          NOT_CHECKED if one.verdict == NO_SIGNAL else one.verdict]
@@ -153,7 +153,7 @@ def _checks(check: Crosscheck) -> str:
 
 
 def _platform(check: Crosscheck) -> str:
-    """Tabulate the platform's displacement at the largest scale."""
+    """Return a table of the platform's displacement at the largest scale."""
     first = check.pairs[0]
     rows = screw_table(first.linear.platform_screw, first.simulated.platform_screw)
     text = paragraph(
@@ -164,7 +164,7 @@ def _platform(check: Crosscheck) -> str:
 
 
 def screw_table(ours: Any, theirs: Any) -> str:
-    """Tabulate a screw (6,) [rad, m] in both models, rotations first."""
+    """Return a table of a screw (6,) [rad, m] in both models."""
     rows: Cells = [
         [
             name,
@@ -178,7 +178,7 @@ def screw_table(ours: Any, theirs: Any) -> str:
 
 
 def _resolutions(check: Crosscheck) -> str:
-    """Tabulate the parameters whose changes are hardest to detect."""
+    """Return a table of the parameters with changes that are hardest to detect."""
     found = sorted(check.resolutions, key=lambda one: -one.smallest)
     unproved = sum(one.unproved for one in found)
     rows: Cells = [
@@ -199,7 +199,7 @@ def failure_page(failure: Mapping[str, Any], provenance: Provenance) -> str:
     """Return the report page of a cross-check that failed to run.
 
     Args:
-        failure: the failure returned by
+        failure: second result of
             :func:`forcefit.validation.crosscheck.crosscheck.attempt`.
         provenance: command and input files.
 

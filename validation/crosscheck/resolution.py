@@ -1,10 +1,9 @@
 """Compute the smallest change in each robot parameter that a cross-check detects.
 
 Each parameter in turn is changed by one per cent, and the linear model is solved again.
-The perturbed solution takes the place of the simulation in a cross-check with the same
-metric, noise floors and bounds.  The smallest detectable change follows by proportion:
-it is the relative change for which the first check reaches its bound.  A parameter is
-unproved if even a change by its full value goes undetected.
+The solution replaces that of the simulation in the cross-check.  The smallest
+detectable change is the relative change for which a check reaches its bound, computed
+by proportion.  A parameter is unproved if a change by its full value is not detected.
 """
 
 from collections.abc import Iterator, Sequence
@@ -39,12 +38,12 @@ from forcefit.validation.crosscheck.pair import (
 )
 from forcefit.validation.crosscheck.pose_metric import PoseMetric
 
-_CHANGE = 1e-2  # [-] relative change by which the effect of a parameter is computed
-# Name of the check whose value is proportional to the square of a change.
+_CHANGE = 1e-2  # [-] relative change of a parameter
+# Name of the check with a value proportional to the square of a change.
 _QUADRATIC = "optimality gap"
-# [-] A parameter is unproved if a relative change of this size is not detected.
+# [-] Relative change above which a parameter is unproved.
 UNPROVED = 1.0
-_NAMED = 4  # largest number of parameters in one line of text
+_NAMED = 4  # largest number of parameter names in a line of text
 _KINDS = ("link", "joint stiffness", "clearance", "error")
 
 
@@ -55,10 +54,9 @@ class Resolution:
     Attributes:
         name: frame and quantity, for example ``leg1.elbow.radial``.
         kind: kind of the parameter: link, joint stiffness, clearance or error.
-        value: value of the parameter.  For a link it is 1, the factor on its stiffness
-            matrix.
-        smallest: smallest relative change that a check detects; inf if no change is
-            detected.
+        value: value of the parameter, or 1 for a factor on a stiffness matrix.
+        smallest: smallest relative change that a check detects; infinite if no check
+            detects a change.
         by: name of the check that detects this change.
     """
 
@@ -70,7 +68,7 @@ class Resolution:
 
     @property
     def unproved(self) -> bool:
-        """Whether even a change by the parameter's full value goes undetected."""
+        """Whether a change by the full value of the parameter is not detected."""
         return not self.smallest < UNPROVED
 
 
@@ -89,8 +87,8 @@ def resolutions(
 
     Returns:
         One result per parameter, in the order of the robot's frames.  Parameters are
-        links, finite joint stiffnesses, clearances, and nonzero components of geometric
-        errors.
+        link stiffnesses, finite joint stiffnesses, clearances, and nonzero components
+        of geometric errors.
     """
     found = []
     for name, kind, value, frame in _changes(posture, bool(gravity.any())):
@@ -104,7 +102,7 @@ def resolutions(
 
 
 def _changes(posture: Posture, weight: bool) -> Iterator[tuple[str, str, float, Frame]]:
-    """Yield the name, kind and value of each parameter, and the perturbed frame."""
+    """Yield the name, kind and value of each parameter, and the changed frame."""
     more = 1.0 + _CHANGE
     for frame in posture.robot.frames:
         link = frame.link
@@ -132,7 +130,7 @@ def _changes(posture: Posture, weight: bool) -> Iterator[tuple[str, str, float, 
 def _joint_changes(
     frame: Frame, more: float
 ) -> Iterator[tuple[str, str, float, Frame]]:
-    """Yield perturbed finite joint stiffnesses; a matrix is one parameter."""
+    """Yield the changed finite joint stiffnesses of a frame."""
     K = frame.joint_stiffness
     if K is None:
         return
@@ -149,7 +147,7 @@ def _joint_changes(
 
 
 def _with_frame(posture: Posture, frame: Frame) -> Posture:
-    """Replace the frame of the same name in a posture."""
+    """Return the posture with the frame of the same name replaced."""
     frames = [frame if f.name == frame.name else f for f in posture.robot.frames]
     return replace(posture, robot=replace(posture.robot, frames=tuple(frames)))
 
@@ -164,7 +162,7 @@ def _noticed(
         changed = hold_free_motions(changed)
     s = first.scale
     other = solve_assembly(scaled(changed, s), s * load, gravity=s * gravity)
-    # Any second scale will do, because the linear model is homogeneous.
+    # The linear model is homogeneous, so any two scales give the same result.
     compared = tuple(
         replace(pair, simulated=_as_simulated(other, first, pair)) for pair in pairs[:2]
     )
@@ -181,7 +179,7 @@ def _noticed(
 
 
 def _as_simulated(other: Assembly, first: Pair, pair: Pair) -> Any:
-    """Present a linear solution as the simulation's result at another scale."""
+    """Convert a linear solution to a result of the simulation at another scale."""
     ratio = pair.scale / first.scale
     held = holding_energy(other.posture.robot, other.joint_screws)
     energy = (other.energy - held) * ratio**2 + pair.between
@@ -213,7 +211,7 @@ def resolution_text(found: Sequence[Resolution]) -> list[str]:
     if unproved:
         more = f" and {len(unproved) - _NAMED} more" if len(unproved) > _NAMED else ""
         lines.append(
-            f"unproved, a change by the full value is not detected: {len(unproved)} "
+            f"unproved (a change by the full value is not detected): {len(unproved)} "
             f"of {len(found)} parameters: {', '.join(unproved[:_NAMED])}{more}"
         )
     return lines

@@ -11,18 +11,18 @@ from forcefit.validation.multibody.exudyn_parts import MeshBody, MeshedSolid
 
 
 def mesh_bodies(robot: Robot) -> dict[str, MeshBody]:
-    """Return the solids of a robot's meshed links, for a simulation.
+    """Return the solids of a robot's meshed links.
 
     Args:
         robot: robot of the virtual-joint model.
 
     Returns:
-        Mapping from the frame's name to the finest mesh, which also determines K_E of
-        the linear model.  Links of the same shape and material share one solid.
+        Mapping from frame to the solid of the finest mesh, from which K_E of the linear
+        model is computed, too.  Links of the same shape and material share a solid.
 
     Raises:
-        BadInput: a mesh was not solved when the robot was loaded, or an interface is
-            not rigid.  Only rigid interfaces can be simulated.
+        BadInput: K_E of a mesh was not computed when the robot was loaded, or an
+            interface is not rigid.
     """
     known: dict[tuple[MeshedLink, float], MeshedSolid] = {}
     bodies = {}
@@ -45,7 +45,7 @@ def mesh_bodies(robot: Robot) -> dict[str, MeshBody]:
 
 
 def _solid(solved: MeshedLink, factor: float) -> MeshedSolid:
-    """Return the finest mesh of a link; its stiffness is multiplied by a factor."""
+    """Return the solid of a link's finest mesh with the link's stiffness factor."""
     from forcefit.stiffness.fem.elements import assemble
 
     mesh, constants = solved.level.mesh, solved.level.material

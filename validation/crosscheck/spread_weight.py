@@ -1,11 +1,9 @@
-"""Compute the energy that is lost when a beam's weight is lumped at its ends.
+"""Compute the energy of weight between the ends of beams.
 
-The virtual-joint model contains only the displacements of a link's two ends.  The
-weight is replaced by half of its force at each end, together with the fixed-end moments
-of a beam clamped at both ends (:func:`forcefit.assembly.linear.load.weights`).  The end
-displacements are then exact, but the energy stored between the ends is missing.
-Without the moments, the end displacements would also be wrong: the tip deflection of a
-cantilever would be one third too large.
+In the virtual-joint model, the weight of a beam is replaced by half of its force at
+each end, and by the end moments of a beam clamped at both ends
+(:func:`forcefit.assembly.linear.load.weights`).  The displacements of the ends are then
+exact, but the energy between the ends is missing.
 """
 
 from collections.abc import Iterator
@@ -29,7 +27,7 @@ class HeavyBeam:
         link: the beam, with its material.
         section: constants of its cross-section.
         length: [m] length of the beam.
-        line: (3,) [m] vector from base to tip, base axes.
+        line: (3,) [m] vector from start to tip, base axes.
         weight: (3,) [N/m] weight per unit length, in the cross-section axes x, y, z.
         total: (3,) [N] weight of the beam, base axes.
     """
@@ -79,20 +77,18 @@ def energy_between_ends(
 ) -> float:
     """Return the energy of beams clamped at both ends under their own weight.
 
-    The energy of the weight across the beam is q^2 L^5 / 1440 EI in bending and q^2 L^3
-    / 24 GA in shear; the energy of the weight along the beam is q^2 L^3 / 24 EA.  The
-    weight does no work on the motion of the ends.
+    For the weight across a beam, the energy is q^2 L^5 / 1440 EI in bending and q^2 L^3
+    / 24 GA in shear.  For the weight along the beam, the energy is q^2 L^3 / 24 EA.
 
     Args:
         posture: the robot's configuration.
         gravity: (3,) [m/s^2] gravity in base axes.
-        pieces: number of equal pieces into which each beam is cut.  The weight of a
-            piece is replaced by forces and fixed-end moments at its ends.  The energy
-            inside the pieces is omitted: 1 / pieces^4 of the bending energy, and 1 /
-            pieces^2 of the energy of shear and stretching.
+        pieces: number of equal elements of each beam.  The weight of an element is
+            replaced by forces and moments at its ends, and the energy between these
+            ends is omitted.
 
     Returns:
-        [J] sum over all beams with a density.
+        Sum over all beams with a density [J].
 
     Sources:
         Timoshenko & Gere, Mechanics of Materials: beam with built-in ends under a

@@ -2,14 +2,13 @@
 
 Both methods start from the equilibrium with the robot's errors, load and weight.  The
 linearised method differentiates the residual of the simulation.  The load-step method
-applies small loads to the platform along each axis, in both directions.  The
-uncertainty of each method is estimated (:mod:`forcefit.validation.multibody.tangent`).
-A method whose uncertainty exceeds the tolerance is not used for the verdict.
+applies small loads to the platform along each axis.  A method is not used for the
+verdict if its estimated uncertainty exceeds the tolerance.
 
 Clearances are zero in both models unless they are requested.  With clearances, only the
-linearised method is used, with smoothed contacts.  The force of a load keeps its
-direction (dead force).  Its moment is a couple of dead forces, because a moment about
-fixed axes has no potential (``docs/exact.md``).
+linearised method is used, with smoothed contacts.  The force of a load has a constant
+direction.  Its moment is a couple of such forces, because a moment about fixed axes has
+no potential (``docs/exact.md``).
 """
 
 from dataclasses import dataclass, replace
@@ -42,25 +41,22 @@ from forcefit.validation.multibody.tangent import (
 # sqrt(C_ii C_jj), for each model of the links.
 TOLERANCE = {"spring": 1e-6, "beam": 1e-3, "fem": 2e-2}
 CONTACT_TOLERANCE = 2e-2
-# [-] Equilibria are different if the displacements of the platform differ by more than
-# this fraction.  If links are beams, the displacements of one equilibrium differ by
-# about 1e-3.
+# [-] Relative difference of the platform displacements above which the models are at
+# different equilibria.
 _ELSEWHERE = 0.1
 
 
 @dataclass(frozen=True, eq=False)
 class StiffnessCheck:
-    """Platform compliance by exact model, linear model and simulation.
+    """Platform compliance of the exact model, the linear model and the simulation.
 
     Attributes:
         exact: tangent stiffness of the exact model at its equilibrium.
         linear: classical stiffness of the nominal robot.
-        simulated: stiffness of the simulation for small motions at the platform's
-            origin.
+        simulated: compliance of the simulation at the platform's origin.
         load: (6,) [N m, N] load at the equilibrium.
         links: model of the links in the simulation.
-        bent: whether springs are deformed at the equilibrium, by errors, a load or
-            weight.
+        bent: whether errors, a load or weight deform the springs at the equilibrium.
         clearances: whether clearances are modelled.
         moved: (6,) [rad, m] displacement of the platform from its nominal pose at the
             exact equilibrium.
@@ -79,11 +75,11 @@ class StiffnessCheck:
 
     @cached_property
     def differences(self) -> dict[str, float]:
-        """Largest entrywise differences divided by sqrt(C_ii C_jj), by name.
+        """Largest differences between entries, divided by sqrt(C_ii C_jj), by name.
 
-        The exact compliance is compared with load steps (``exact``) and with the
-        linearised simulation (``linearised``); the classical compliance is compared
-        with the linearised simulation (``linear``).
+        ``exact`` compares the exact model with load steps, ``linearised`` the exact
+        model with the linearised simulation, and ``linear`` the linear model with the
+        linearised simulation.
         """
         exact, linear = self.exact.compliance, self.linear.compliance
         stepped, linearised = self.simulated.stepped, self.simulated.linearised
@@ -99,7 +95,7 @@ class StiffnessCheck:
 
     @property
     def uncertainties(self) -> dict[str, float]:
-        """Uncertainties of the simulation's two methods, by name."""
+        """Uncertainties of the two simulation methods, by name."""
         return {
             "exact": self.simulated.stepped_error,
             "linearised": self.simulated.linearised_error,
@@ -107,18 +103,17 @@ class StiffnessCheck:
 
     @property
     def tolerance(self) -> float:
-        """[-] largest accepted difference of the exact tangent."""
+        """Largest accepted difference between entries of two compliances [-]."""
         own = TOLERANCE[self.links]
         return max(own, CONTACT_TOLERANCE) if self.clearances else own
 
     @cached_property
     def mixed(self) -> tuple[str, ...]:
-        """Names of deformed joints whose finite motion differs between the models.
+        """Names of deformed joints that the two models define differently.
 
-        Such joints are locked in some components and elastic in several others, at
-        least one of which is a rotation.  Locked components are components of the
-        logarithm of the rotation in the exact model, but angles between axes in the
-        simulation.  The two definitions agree only to first order.
+        Such joints are locked in some components and elastic in several others,
+        including a rotation.  In the exact model, locked components are components of
+        the rotation vector.  In the simulation, they are angles between axes.
         """
         names = []
         for frame in self.exact.posture.robot.frames:
@@ -130,17 +125,16 @@ class StiffnessCheck:
 
     @cached_property
     def simulated_moved(self) -> NDArray:
-        """(6,) [rad, m] displacement of the platform in the simulation."""
+        """Displacement of the platform in the simulation, (6,) [rad, m]."""
         nominal, there = self.exact.posture.platform, self.simulated.platform
         turn = rotation_vector(there[:3, :3] @ nominal[:3, :3].T)
         return np.concatenate([turn, there[:3, 3] - nominal[:3, 3]])
 
     @property
     def another_equilibrium(self) -> bool:
-        """Whether exact model and simulation are at different equilibria.
+        """Whether the exact model and the simulation are at different equilibria.
 
-        The tangents then differ.  A robot that is loaded beyond buckling has several
-        equilibria.
+        A robot that is loaded beyond buckling has several equilibria.
         """
         scale = np.repeat([self.exact.length, 1.0], 3)
         ours, theirs = scale * self.moved, scale * self.simulated_moved
@@ -150,7 +144,7 @@ class StiffnessCheck:
 
     @property
     def passed(self) -> bool:
-        """Whether all sufficiently accurate methods, at least one, agree."""
+        """Whether all methods of sufficient accuracy agree; False without one."""
         return not self.mixed and bool(self._decided) and all(self._decided)
 
     @property
@@ -187,7 +181,7 @@ class StiffnessCheck:
         if self.mixed:
             return (
                 f"{', '.join(self.mixed)} deform and have both locked and elastic "
-                "axes: their finite-deformation law is not unique"
+                "axes, for which the two models define finite motions differently"
             )
         return f"exact within {self.tolerance:.2g}"
 
@@ -229,9 +223,9 @@ class StiffnessCheck:
         }  # fmt: skip
         off, own = self.differences, self.uncertainties
         texts = [
-            f"exact minus load steps: {off['exact']:.2g} of sqrt(C_ii C_jj), known to "
-            f"{own['exact']:.2g}",
-            f"exact minus linearised simulation: {off['linearised']:.2g}, known to "
+            f"exact minus load steps: {off['exact']:.2g} of sqrt(C_ii C_jj), "
+            f"uncertainty {own['exact']:.2g}",
+            f"exact minus linearised simulation: {off['linearised']:.2g}, uncertainty "
             f"{own['linearised']:.2g}",
             f"linear minus linearised simulation: {off['linear']:.2g}",
         ]
@@ -276,7 +270,7 @@ def check_stiffness(
         CannotAssemble: the kinematic loops cannot be closed with these errors.
         FreeMotion: the platform has an unresisted motion.
         SolverFailed: no equilibrium was found.
-        SimulationFailed: the simulation found no equilibrium either.
+        SimulationFailed: the simulation found no equilibrium.
     """
     wrench = np.zeros(6) if load is None else np.array(load, dtype=float)
     robot = posture.robot if clearances else without_clearance(posture.robot)

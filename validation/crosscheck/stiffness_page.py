@@ -43,10 +43,10 @@ def stiffness_check_page(check: StiffnessCheck, provenance: Provenance) -> str:
 
 
 def _stiffness_tiles(check: StiffnessCheck) -> list[Tile]:
-    """Return tiles with each method's difference from the exact stiffness."""
+    """Return tiles with the difference of each method from the exact stiffness."""
     return [
         Tile(words, [f"{100 * check.differences[name]:.2g} %"],
-             [f"known to {100 * check.uncertainties[name]:.2g} %; at most "
+             [f"uncertainty {100 * check.uncertainties[name]:.2g} %; accepted "
               f"{100 * check.tolerance:g} %."])
         for name, words in (("exact", "Difference from load steps"),
                             ("linearised", "Difference from the linearised simulation"))
@@ -55,7 +55,7 @@ def _stiffness_tiles(check: StiffnessCheck) -> list[Tile]:
 
 
 def _compliances(check: StiffnessCheck) -> str:
-    """Tabulate the diagonals of the compliances by every method."""
+    """Return a table of the diagonal of each compliance."""
     names = ["exact", "linear", "load steps", "linearised simulation"]
     matrices = [check.exact.compliance, check.linear.compliance,
                 check.simulated.stepped, check.simulated.linearised]  # fmt: skip
@@ -70,7 +70,7 @@ def _compliances(check: StiffnessCheck) -> str:
 
 
 def _methods(check: StiffnessCheck) -> str:
-    """Tabulate the differences and uncertainties of the methods."""
+    """Return a table of the differences and uncertainties of the methods."""
     words = {"exact": "exact minus load steps", "linearised": "exact minus linearised "
              "simulation", "linear": "linear minus linearised simulation"}  # fmt: skip
     rows: Cells = [
@@ -79,13 +79,13 @@ def _methods(check: StiffnessCheck) -> str:
     ]
     head: list[str | Column] = [
         "methods", Column("largest difference of sqrt(C_ii C_jj)", digits=2),
-        Column("known to", digits=2),
+        Column("uncertainty", digits=2),
     ]  # fmt: skip
     return section("Differences of the methods", table(head, rows, "methods"))
 
 
 def _displacements(check: StiffnessCheck) -> str:
-    """Tabulate the platform's displacement at both equilibria."""
+    """Return a table of the platform's displacement at both equilibria."""
     return section(
         "The platform at the equilibrium",
         screw_table(check.moved, check.simulated_moved),

@@ -1,13 +1,11 @@
 """Decide whether two models agree, adding scales until every check is decided.
 
-Higher-order terms can imitate or cancel first-order errors, so that with large errors
-and few scales the uncertainty of a limit exceeds its bound.  Smaller scales are then
-added, each half of the previous one, until every check is decided.  At small scales,
-higher-order terms vanish while a wrong first-order term remains.  A check can fail only
-if at least four scales were solved.
+With large errors and few scales, higher-order terms can imitate or cancel a first-order
+error, so a check may be undecided.  Smaller scales are then added, each half of the
+previous one.  A check can fail only if at least four scales were solved.
 
-A quantity below the noise of either model is not compared, for example if the robot has
-neither errors nor loads.  Such a check has no signal and does not count as passed.
+A quantity below the noise of a model is not compared, for example if the robot has
+neither errors nor loads.  Such a check has no signal and has not passed.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -36,7 +34,7 @@ _FEWEST, _MOST = 4, 6
 
 @dataclass(frozen=True)
 class Check:
-    """A check that a value does not exceed a bound.
+    """A check whether a value is within a bound.
 
     Attributes:
         value: best estimate of the value, >= 0.
@@ -61,17 +59,17 @@ class Check:
             return FAILS
         if not self.signal and not max(self.value, self.uncertainty) > self.bound:
             return NO_SIGNAL
-        # Comparisons with NaN are false, so NaN is never "ok".
+        # Comparisons with NaN are false, so NaN is undecided.
         known = self.value <= self.bound and self.uncertainty <= self.bound
         return OK if known else UNDECIDED
 
 
 class Judged(Protocol):
-    """Protocol of checks on the solutions of two models at several scales."""
+    """Protocol of a comparison with checks."""
 
     @property
     def pairs(self) -> tuple[Pair, ...]:
-        """One pair of solutions per scale, largest first."""
+        """Pair of solutions at each scale, largest scale first."""
 
     @property
     def checks(self) -> Mapping[str, Check]:
@@ -88,8 +86,8 @@ def verdict(comparison: Judged) -> str:
         comparison: comparison with its checks.
 
     Returns:
-        ``"passed"``, ``"failed"``, ``"not decided"``, or ``"no signal"`` if no check
-        had a signal.
+        ``"passed"``, ``"failed"`` or ``"not decided"``; ``"no signal"`` if no check has
+        a signal.
     """
     outcomes = {check.verdict for check in comparison.checks.values()}
     if FAILS in outcomes and len(comparison.pairs) >= _FEWEST:
@@ -107,13 +105,13 @@ def compare_scales(
     """Solve both models at several scales, adding scales until the verdict is decided.
 
     Args:
-        scales: factors on all imperfections, at least two different values.
+        scales: at least two different factors on all imperfections.
         solve: function that solves both models at a scale.
-        judge: function that returns a comparison, given the pairs of solutions (largest
-            scale first) and the number of requested scales.
+        judge: function that returns a comparison for the pairs of solutions, largest
+            scale first, and the number of requested scales.
 
     Returns:
-        The comparison, which is undecided only if at least six scales were solved.
+        The comparison.  It is undecided only if at least six scales were solved.
 
     Raises:
         BadInput: fewer than two scales are given, or a scale is not finite and > 0.
@@ -128,13 +126,13 @@ def compare_scales(
 
 
 def check_scales(scales: Sequence[float]) -> list[float]:
-    """Validate the scales and return them in descending order.
+    """Check the scales and return them in descending order.
 
     Args:
         scales: factors on errors, clearances and load.
 
     Returns:
-        The distinct scales, sorted.
+        The different scales, largest first.
 
     Raises:
         BadInput: fewer than two scales are given, or a scale is not finite and > 0.
@@ -152,10 +150,10 @@ def verdict_text(comparison: Judged) -> str:
     texts = {
         PASSED: "passed",
         FAILED: "FAILED",
-        NOT_DECIDED: "NOT DECIDED: the errors are too large for these scales; use "
-        "smaller ones",
-        NO_SIGNAL: "NOT CHECKED: no difference exceeds the noise; a robot without "
-        "errors and load compares zero with zero",
+        NOT_DECIDED: "NOT DECIDED: the errors are too large at these scales; use "
+        "smaller scales",
+        NO_SIGNAL: "NOT CHECKED: no difference exceeds the noise, for example because "
+        "the robot has neither errors nor load",
     }
     outcome = verdict(comparison)
     silent = sum(check.verdict == NO_SIGNAL for check in comparison.checks.values())

@@ -1,4 +1,4 @@
-"""Fixtures: the robot of the paper with errors, and deliberately broken model terms."""
+"""Fixtures with the IRSBot-2 and with deliberately wrong terms of a model."""
 
 import sys
 from functools import lru_cache, partial
@@ -24,8 +24,10 @@ def posture(irsbot2):
 
 @pytest.fixture
 def broken(monkeypatch):
-    """Break a term of the numpy model and clear everything computed with it, because
-    robots with equal data share caches.  The compiled model duplicates each term."""
+    """Return a function that applies a mutation to the numpy model.
+
+    Caches are cleared, because robots with equal data share them.
+    """
     from forcefit.assembly.linear.energy import solve_assembly
     from forcefit.validation.crosscheck import crosscheck
 
@@ -40,7 +42,7 @@ def broken(monkeypatch):
 
 
 def forget():
-    """Clear the caches of all functions."""
+    """Clear the caches of all forcefit functions."""
     for name, module in list(sys.modules.items()):
         if name.startswith("forcefit."):
             for value in vars(module).values():

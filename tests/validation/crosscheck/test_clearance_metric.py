@@ -1,4 +1,4 @@
-"""Clearances modelled as contacts, compared with closed forms and linear cones."""
+"""Tests of clearances that are modelled as contacts."""
 
 import math
 import time
@@ -34,7 +34,7 @@ DISC = ClearanceCone((3, 4), 3e-5, 1e12)
 
 
 def coaxial(error, clearance, length=0.4):
-    """Two beams that are misaligned by an error, one with clearance at its end."""
+    """Return two misaligned beams, with clearance at the end of the first beam."""
     frames = (
         Frame("a", translation=[length, 0, 0], rotation=[0, math.pi / 2, 0],
               link=ROUND, geometric_error=error, clearance=clearance),
@@ -46,7 +46,7 @@ def coaxial(error, clearance, length=0.4):
 
 
 def push(cone, screw, width):
-    """(6,) wrench of a contact."""
+    """Return the wrench of a contact, (6,)."""
     wrench = np.zeros(6)
     for row, value in cone_forces(cone, screw, width):
         wrench[row] += value
@@ -55,11 +55,9 @@ def push(cone, screw, width):
 
 @pytest.mark.parametrize("arm", [0.0, 0.04, -0.04])
 def test_contact_force_is_the_gradient_of_its_energy(arm):
-    """Compare with central differences of half a nanometre inside, at and outside the
-    bound. With an arm of 40 mm, a pin tilted by r / arm touches like a pin shifted by
-    r."""
+    """The gradient is computed by differences inside, at and outside the bound."""
     disc = replace(DISC, arm=arm)
-    unit = np.array([0.04, 0.04, 1, 1, 1, 1])  # [m] for a rad
+    unit = np.array([0.04, 0.04, 1, 1, 1, 1])  # displacement per unit motion
     for r in (0.0, 1e-5, 2.999e-5, 3.001e-5, 3.3e-5):
         for width in (3.0, 1e-2):
             screw = np.array([0.1, -0.2, 0.3, 0.6, 0.8, 0.4]) * r / unit
@@ -73,9 +71,8 @@ def test_contact_force_is_the_gradient_of_its_energy(arm):
                 assert force == pytest.approx(slope, abs=2e-5 * scale)
 
 
-def test_pin_in_two_bushes_touches_where_its_axis_reaches_the_radius():
-    """A tilt of c / h or a shift of c just touches, and both together press.  At z = h,
-    the axis is at (TX + h RY, TY - h RX)."""
+def test_pin_in_two_bushes_has_contact_at_the_radial_clearance():
+    """At z = h, the pin's axis is at (TX + h RY, TY - h RX)."""
     clearance = Clearance(radial=3e-5, tilt=7.5e-4, axial=1e-5)
     bushes = joint_clearance(Frame("f", clearance=clearance), bushes=True)
     assert [(c.rows, c.size, c.arm) for c in bushes.cones] == [
@@ -92,10 +89,11 @@ def test_pin_in_two_bushes_touches_where_its_axis_reaches_the_radius():
 
 
 @pytest.mark.parametrize("misfit", [5e-5, 1e-4])
-def test_axial_clearance_reduces_the_misfit(misfit):
-    """E = (g - c)^2 EA / 2(2L) with c = 30 um along the joint's z axis.  A contact of
-    1e12 N/m in series with 3.8e8 N/m stores 4e-4 of the energy, which is corrected for;
-    the smoothing width of 3e-4 c, 9 nm, remains."""
+def test_energy_with_axial_clearance_equals_closed_form(misfit):
+    """The energy is (g - c)^2 EA / 2(2L) for a misfit g and a clearance c = 30 um.
+
+    The tolerance is twice the effect of the smoothing width, 9 nm.
+    """
     stiffness = E * AREA / 0.8
     check = simulate_assembly(
         coaxial([0, 0, 0, 0, 0, misfit], Clearance(axial=3e-5)),
@@ -107,9 +105,13 @@ def test_axial_clearance_reduces_the_misfit(misfit):
 
 
 @pytest.mark.parametrize("pause", [0.0, 0.05])
-def test_time_limit_of_a_simulation_does_not_end_other_simulations(pause, monkeypatch):
-    """This includes idle time, because all models share Exudyn's timer.  Without a
-    limit, 0.05 s at each of about 3000 contact calls would take minutes."""
+def test_time_limit_of_a_simulation_does_not_affect_other_simulations(
+    pause, monkeypatch
+):
+    """All models share Exudyn's timer.
+
+    With a pause of 0.05 s, the simulation would take minutes without a time limit.
+    """
     contacts = SimulationModel(clearances=True)
     posture = coaxial([0, 0, 0, 0, 0, 1e-4], Clearance(axial=3e-5))
     with monkeypatch.context() as patch:
@@ -123,8 +125,8 @@ def test_time_limit_of_a_simulation_does_not_end_other_simulations(pause, monkey
     assert simulate_assembly(posture, model=contacts).rigid_energy > 0
 
 
-def test_interruption_inside_the_solver_is_raised(monkeypatch):
-    """Exudyn converts Ctrl-C to an error of its own."""
+def test_keyboard_interrupt_in_the_solver_is_raised(monkeypatch):
+    """Exudyn replaces a KeyboardInterrupt by another exception."""
 
     def interrupted(*_):
         raise KeyboardInterrupt
@@ -135,8 +137,8 @@ def test_interruption_inside_the_solver_is_raised(monkeypatch):
         simulate_assembly(posture, model=SimulationModel(clearances=True))
 
 
-def test_a_ball_reduces_an_oblique_misfit_as_in_the_exact_model():
-    """As for an axial clearance, only the smoothing error remains."""
+def test_energy_of_a_ball_agrees_with_the_exact_model():
+    """The tolerance is the effect of the smoothing of contacts."""
     posture = coaxial([0, 0, 0, 6e-5, -9e-5, 3e-5], Clearance(ball=3e-5))
     exact = solve_exact(posture)
     found = simulate_assembly(posture, model=SimulationModel(clearances=True))
@@ -153,23 +155,20 @@ def test_crosscheck_of_a_joint_with_a_ball_passes():
 
 
 @pytest.mark.slow
-def test_crosscheck_of_the_papers_robot_with_clearances_passes(irsbot2):
-    """The models agree within 2 % as errors vanish, and the optimality gap decreases
-    quadratically."""
+def test_crosscheck_of_irsbot2_with_clearances_passes(irsbot2):
+    """The optimality gap decreases with the scale."""
     check = crosscheck(
         place_robot(irsbot2, {"tx": 0.0, "tz": -0.5}), (1.0, 0.5, 0.25), clearances=True
     )
     assert check.passed, check.checks
-    # Contacts of 1e9 N m/rad deform 4e-4 as much as links of 1e6 N m/rad.
+    # The contacts are about 1000 times as stiff as the links.
     assert check.metric.limits["spring deformation"].value < 5e-3
     assert check.metric.gaps[0] > check.metric.gaps[1] > check.metric.gaps[2] > 0
 
 
 @pytest.mark.slow
 def test_energy_with_clearances_agrees_with_the_exact_model(irsbot2):
-    """Contacts are compared with cones, with springs as links, at the full errors of
-    the paper. They differ by at most 0.3 %, whereas the linear energy differs by more
-    than 1 %."""
+    """At the full errors of the paper, the linear energy differs by more than 1 %."""
     posture = place_robot(irsbot2, {"tx": 0.1, "tz": -0.15})
     check = crosscheck(posture, (1.0, 0.5), links="spring", clearances=True)
     assert check.passed, check.checks
@@ -178,8 +177,7 @@ def test_energy_with_clearances_agrees_with_the_exact_model(irsbot2):
 
 
 def heavy(length=0.4):
-    """Two beams with bodies of 4 kg and 6 kg, 60 um apart, one end with 20 um
-    clearance."""
+    """Return two heavy, misaligned beams with bodies of 6 kg and a clearance."""
     frames = coaxial(
         [0, 0, 0, 6e-5, 2e-5, 5e-5], Clearance(radial=2e-5, axial=2e-5), length
     ).robot.frames
@@ -194,10 +192,11 @@ def heavy(length=0.4):
 
 
 @pytest.mark.parametrize("links", ["beam", "spring"])
-def test_crosscheck_passes_for_weight_together_with_clearance(links):
-    """Deflections by a hundredfold weight exceed the clearance, and the checks of
-    energy, springs and gap pass.  Each simulated beam also stores q^2 L^5 / 1440 EI
-    between its ends."""
+def test_crosscheck_with_weight_and_clearances_passes(links):
+    """The acceleration is about 100 times that of gravity.
+
+    The deflections then exceed the clearance.
+    """
     check = crosscheck(
         heavy(), (1.0, 0.5), links=links, gravity=[0, 300.0, -900.0], clearances=True
     )
@@ -220,7 +219,7 @@ def test_crosscheck_with_clearances_fails_for_a_wrong_weight(monkeypatch):
 
 
 def drawn(name, size, pose=None):
-    """A built-in robot with random errors of 1 mrad and 0.1 mm."""
+    """Return a built-in robot with random errors of 1 mrad and 0.1 mm times a size."""
     robot = load_robot(name)
     sources = tolerance_sources(robot, size * np.array([1e-3] * 3 + [1e-4] * 3))
     errors = sources.errors(sources.draw(0, 1, seed=7))[0]
@@ -237,9 +236,8 @@ def drawn(name, size, pose=None):
      pytest.param("irsbot2", 0.1, {"tx": 0.1, "tz": -0.5}, "passed",
                   marks=pytest.mark.slow)],
 )  # fmt: skip
-def test_errors_within_the_clearance_store_no_energy(name, size, pose, said):
-    """There is no load.  Only overconstrained robots are checked, because the others
-    close without energy for any clearance."""
+def test_energy_of_errors_within_the_clearance_is_zero(name, size, pose, said):
+    """Without overconstraint, the cross-check has no signal."""
     check = crosscheck(drawn(name, size, pose), (1.0, 0.5), clearances=True)
     assert check.pairs[0].linear.energy == pytest.approx(0.0, abs=1e-20)
     assert check.pairs[0].simulated.energy < 1e-8
@@ -253,8 +251,7 @@ def test_errors_within_the_clearance_store_no_energy(name, size, pose, said):
      ("five_bar", [0, 0, 0, 0, -20, 0])],
 )  # fmt: skip
 def test_optimality_gap_under_a_load_is_relative_to_the_stored_energy(name, load):
-    """Without errors, closing requires no energy, so the reference is the energy under
-    load. Parts of the five-bar stay free under its load."""
+    """Without errors, assembly requires no energy."""
     check = crosscheck(
         home_posture(load_robot(name)), (1.0, 0.5), load=load, clearances=True
     )

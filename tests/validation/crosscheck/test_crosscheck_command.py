@@ -1,4 +1,4 @@
-"""The command ``validation crosscheck``: keys, exit statuses and error messages."""
+"""Tests of the command ``validation crosscheck``."""
 
 import json
 from functools import partial
@@ -17,13 +17,12 @@ pytestmark = pytest.mark.exudyn
 
 @pytest.fixture
 def check(run):
-    """Run a cross-check: exit status, output and error output."""
+    """Run a cross-check and return exit status, output and error output."""
     return partial(run, "validation", "crosscheck")
 
 
-def test_readme_example_compares_a_draw_of_errors(check):
-    """The errors in the file replace those of the robot, and the seed selects the
-    draw."""
+def test_readme_example_reads_errors_from_a_file(check):
+    """The errors in the file replace those of the robot."""
     root = Path(__file__).parents[3]
     example = root / "examples" / "irsbot2_errors.toml"
     words = "validation crosscheck irsbot2 --errors examples/irsbot2_errors.toml"
@@ -60,7 +59,7 @@ def test_crosscheck_writes_the_public_keys(check, tmp_path):
 
 
 def test_crosscheck_includes_clearances_on_request(check, tmp_path):
-    """The misfit of springs in series exceeds the clearance between them."""
+    """The misfit of two springs in series exceeds their clearance."""
     file = tmp_path / "robot.toml"
     gap = np.array([0, 0, 0, 2e-4, 1e-4, 5e-5])
     loose = Clearance(radial=2e-5, axial=1e-5)

@@ -1,4 +1,4 @@
-"""Report pages of cross-checks: values of both models, and the verdict's colour."""
+"""Tests of the report pages of cross-checks."""
 
 import json
 
@@ -13,7 +13,7 @@ PLACE = ("irsbot2", "--pose", "tx=0.1,tz=-0.45", "--scale", "1,0.5")
 
 
 def shown(run, folder, *words):
-    """Exit status, page and JSON of a cross-check."""
+    """Return exit status, page and JSON results of a cross-check."""
     page, written = folder / "page.html", folder / "page.json"
     status, _, err = run(
         "validation", "crosscheck", *words, "--report", page, "--json", written
@@ -22,7 +22,7 @@ def shown(run, folder, *words):
     return status, page.read_text(encoding="utf-8"), json.loads(written.read_text())
 
 
-def test_page_shows_the_platform_by_both_models_and_a_slope_of_two(run, tmp_path):
+def test_page_shows_the_displacements_of_both_models(run, tmp_path):
     status, text, results = shown(run, tmp_path, *PLACE, "--load", "fz=-100")
     assert status == 0
     assert "<p class='verdict good'>" in text
@@ -32,7 +32,7 @@ def test_page_shows_the_platform_by_both_models_and_a_slope_of_two(run, tmp_path
     first = results["scales"][0]
     for column, model in ((1, "vjm"), (2, "multibody")):
         assert [row[column].value for row in rows] == first[model]["platform_screw"]
-    # the force pushes the platform down
+    # the force and the virtual-joint displacement are along -z
     assert rows[5][1].value < 0 > rows[5][2].value
     slope = tiles(text)["Slope of the difference"][0]
     assert float(slope) == pytest.approx(2.0, abs=0.1)
@@ -50,7 +50,7 @@ def test_page_of_a_stiffness_check_shows_equal_compliances(run, tmp_path):
 
 
 def pose(passed, verdict, status="ok"):
-    """A pose of a grid with an outcome."""
+    """Return the result of a cross-check at a pose."""
     return {"asked": {"tx": 0.1}, "passed": passed, "verdict": verdict, "slope": 2.0,
             "status": status}  # fmt: skip
 
@@ -61,7 +61,7 @@ def pose(passed, verdict, status="ok"):
     ([pose(True, "passed"), pose(False, "failed")], "bad"),
     ([pose(None, "", "out of reach")], "bad"),
 ])  # fmt: skip
-def test_page_of_many_poses_is_red_if_one_fails_and_amber_if_undecided(rows, kind):
+def test_colour_of_a_page_of_poses_shows_the_worst_outcome(rows, kind):
     text = poses_page("a robot", rows, Provenance())
     assert f"<p class='verdict {kind}'>" in text
     assert len(parse(text).table("tx [mm]")) == 1 + len(rows)

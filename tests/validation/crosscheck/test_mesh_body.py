@@ -1,4 +1,4 @@
-"""Solids in floating frames compared with their condensed stiffness K_E."""
+"""Tests of solids in floating frames against their condensed stiffness K_E."""
 
 from pathlib import Path
 
@@ -20,13 +20,13 @@ from tests.solids_for_tests import box_solid
 pytestmark = pytest.mark.exudyn
 
 SURFACE = Path(__file__).parents[3] / "meshes" / "distal_plain.stl"
-SIZE = np.array([0.03, 0.04, 0.2])  # m; the link runs along the mesh's z
-TURN = np.array([0.4, -0.3, 0.8])  # rad: mesh axes seen from the frame's
+SIZE = np.array([0.03, 0.04, 0.2])  # [m] dimensions of a link along z of the mesh
+TURN = np.array([0.4, -0.3, 0.8])  # [rad] rotation vector from frame to mesh axes
 
 
 @pytest.fixture(scope="module")
 def block():
-    """A slender box as a mesh body, and its K_E at the tip in the frame's axes."""
+    """Return a slender box as a mesh body, and its K_E at the tip in frame axes."""
     solid = box_solid((2, 2, 8), SIZE)
     mesh = isoparametric(solid)
     constants = np.array(lame(70e9, 0.33))[:, None] * np.ones(len(solid.cells))
@@ -46,9 +46,8 @@ def block():
     ).stiffness @ A.T
 
 
-def test_loaded_solid_in_the_simulation_deforms_by_its_condensed_stiffness(block):
-    """Expect screw = K_E^-1 w and E = w K_E^-1 w / 2; at 1e-6 rad, they are linear to
-    1e-6."""
+def test_deformation_of_a_loaded_solid_equals_condensed_stiffness(block):
+    """The screw is K_E^-1 w, and the energy is w K_E^-1 w / 2."""
     body, K = block
     frame = Frame("tip", translation=[0.1, 0.2, 0.3], link=MatrixLink(K))
     posture = home_posture(Robot("block", "tip", (frame,)))
@@ -66,9 +65,8 @@ def test_loaded_solid_in_the_simulation_deforms_by_its_condensed_stiffness(block
     np.testing.assert_allclose(assembly.link_wrenches[0], wrench, atol=1e-5 * 0.4)
 
 
-def test_solid_between_two_walls_agrees_with_its_spring_to_first_order(block):
-    """Compare a loop that contains the solid with one that contains its K_E: a tenth of
-    the misfit gives a hundredth of the difference."""
+def test_solid_between_walls_agrees_with_its_spring_to_first_order(block):
+    """A tenth of the misfit causes a hundredth of the difference."""
     body, K = block
     error = np.array([1e-3, -2e-3, 1e-3, 1e-4, 2e-4, -1e-4])
     frames = (
@@ -89,10 +87,8 @@ def test_solid_between_two_walls_agrees_with_its_spring_to_first_order(block):
 
 
 @pytest.mark.slow
-def test_crosscheck_of_a_robot_with_meshed_links_passes_with_solids():
-    """The linear model uses K_E and the simulation the solid, both from one mesh of the
-    surface file.  They differ by round-off of the sparse solver, and a floating frame
-    bends linearly about its base."""
+def test_crosscheck_of_meshed_links_as_solids_passes():
+    """The linear model uses K_E, and the simulation uses the solid of the same mesh."""
     link = MeshLink(SURFACE, "z=0", "z=0.452", 60e9, 0.3)
     error = [1e-3, -2e-3, 1e-3, 1e-4, 2e-4, -1e-4]
     frames = (

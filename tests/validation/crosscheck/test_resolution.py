@@ -1,4 +1,4 @@
-"""Smallest changes that a cross-check detects, calculated by hand for two bars."""
+"""Tests of the smallest changes that a cross-check of two bars detects."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -21,14 +21,14 @@ ERROR, CLEARANCE, STIFFNESS = 4e-4, 1e-4, 1e6  # [m], [m], [N/m]
 
 
 def bars(clearance=CLEARANCE):
-    """Two bars on the x axis with a gap of 0.4 mm and a clearance disc of 0.1 mm."""
+    """Return two bars along x with a misfit of 0.4 mm and a radial clearance."""
     loose = Clearance(radial=clearance) if clearance else None
     gap = [0, 0, 0, ERROR, 0, 0]
     return home_posture(coaxial_beams(gap, (STIFFNESS, STIFFNESS), clearance=loose))
 
 
 def found(posture, metric):
-    """By name, with the linear model in place of the simulation."""
+    """Return the smallest detectable changes by parameter name."""
     simulated = SimpleNamespace(held=False)
     pairs = tuple(
         Pair(s, solve_assembly(scaled(posture, s)), simulated, None) for s in (1.0, 0.5)
@@ -46,9 +46,8 @@ def without(robot, pairs):
     return PoseMetric(robot, pairs, True, False)
 
 
-def test_smallest_detected_clearance_change_follows_from_the_energy():
-    """E = k (e - c)^2 / 4, so a relative change d of c changes it by 2 c d / (e -
-    c)."""
+def test_smallest_detected_clearance_change_equals_closed_form():
+    """A relative change d of c changes E = k (e - c)^2 / 4 by 2 c d / (e - c)."""
     by_name = found(bars(), with_clearances)
     (clearance,) = (r for r in by_name.values() if r.kind == "clearance")
     expected = TOLERANCE * (ERROR - CLEARANCE) / (2 * CLEARANCE)
@@ -57,7 +56,7 @@ def test_smallest_detected_clearance_change_follows_from_the_energy():
     assert (clearance.value, clearance.unproved) == (CLEARANCE, False)
 
 
-def test_smallest_detected_error_change_follows_from_the_energy():
+def test_smallest_detected_error_change_equals_closed_form():
     """A relative change d of e changes E by 2 e d / (e - c)."""
     (error,) = (r for r in found(bars(), with_clearances).values() if r.kind == "error")
     expected = TOLERANCE * (ERROR - CLEARANCE) / (2 * ERROR)
@@ -65,8 +64,7 @@ def test_smallest_detected_error_change_follows_from_the_energy():
 
 
 def test_smallest_detected_stiffness_change_is_twice_the_bound():
-    """Each of two equal springs in series stores half of the energy, so a bound b gives
-    2 b."""
+    """Each of the two equal springs in series stores half of the energy."""
     for clearance, metric, bound in (
         (CLEARANCE, with_clearances, TOLERANCE),
         (None, without, LIMIT_TOLERANCE),
@@ -96,8 +94,10 @@ def test_unloaded_clearance_is_reported_as_unproved():
 @pytest.mark.slow
 @pytest.mark.exudyn
 @pytest.mark.parametrize(("share", "passed"), [(0.5, True), (2.0, False)])
-def test_wrong_clearance_beyond_the_resolution_fails(monkeypatch, share, passed):
-    """Half of the smallest detectable change passes, and twice this change fails."""
+def test_clearance_error_above_the_smallest_detectable_change_fails(
+    monkeypatch, share, passed
+):
+    """The change is half or twice the smallest detectable change."""
     posture = bars()
     right = crosscheck.crosscheck(posture, clearances=True)
     (clearance,) = (r for r in right.resolutions if r.kind == "clearance")

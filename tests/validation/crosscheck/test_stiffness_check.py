@@ -1,4 +1,4 @@
-"""Platform stiffness compared with Exudyn, including forced assemblies."""
+"""Tests of the platform stiffness against Exudyn."""
 
 import json
 from dataclasses import replace
@@ -31,8 +31,7 @@ def test_stiffness_of_robots_without_errors_agrees_with_the_simulation(name, lin
 
 @pytest.mark.slow
 def test_stiffness_of_a_forced_assembly_agrees_with_the_simulation():
-    """At the full errors of the paper, the nominal matrix is off by 5 %.  The moment of
-    the load is a couple of dead forces in both models."""
+    """At the full errors of the paper, the nominal compliance has an error of 5 %."""
     case = NUMBERS["cases"][1]
     posture = place_robot(irsbot2_with(case), {"tx": 0.1, "tz": -0.5})
     answer = check_stiffness(posture, [20, 10, -5, 100, 50, -300])
@@ -53,8 +52,8 @@ def test_stiffness_of_a_loaded_robot_agrees_with_the_simulation(force):
     assert answer.passed
 
 
-def test_pin_pressed_against_its_hole_has_a_stiffness_along_the_rim():
-    """Its stiffness is F / c, in series with that of its arm."""
+def test_tangential_stiffness_of_a_pin_in_contact_equals_closed_form():
+    """The stiffness is F / c, in series with that of the arm."""
     force, bound, k = 300.0, 5e-5, 1e6
     link = MatrixLink(np.diag([1e4, 1e4, 1e4, k, k, k]))
     frames = (
@@ -66,7 +65,7 @@ def test_pin_pressed_against_its_hole_has_a_stiffness_along_the_rim():
     answer = check_stiffness(posture, [0, 0, 0, force, 0, 0], clearances=True)
     assert answer.passed
     assert np.isnan(answer.simulated.stepped).all()
-    # The contribution of the force by rotating the arm is below 1e-3 of this.
+    # the force that rotates the arm changes this by less than 1e-3
     along = 1 / k + bound / force + 0.1**2 / 1e4
     assert answer.simulated.linearised[4, 4] == pytest.approx(along, rel=1e-2)
     assert answer.differences["linearised"] < 1e-3
@@ -80,8 +79,8 @@ def test_stiffness_check_fails_for_a_wrong_stiffness():
     assert not replace(answer, exact=wrong).passed
 
 
-def test_stiffness_of_links_in_pieces_converges_to_that_of_beams():
-    """The error of n pieces decreases as 1/n^2, down to that of Exudyn's elements."""
+def test_stiffness_of_divided_links_converges_to_that_of_beams():
+    """The error of n elements is proportional to 1/n^2."""
     robot, off = load_robot("four_bar"), []
     for pieces in (1, 2, 4):
         frames = [
@@ -102,7 +101,7 @@ def test_stiffness_check_reports_a_different_equilibrium_of_the_simulation():
     there = answer.simulated.platform.copy()
     there[:3, 3] += 0.2 * answer.moved[3:]
     elsewhere = replace(answer.simulated, platform=there, stable=False)
-    # This is irrelevant as long as the tangents agree.
+    # A different equilibrium has no effect if the compliances agree.
     assert replace(answer, simulated=elsewhere).passed
     stiffer = replace(elsewhere, linearised=0.5 * elsewhere.linearised)
     other = replace(answer, simulated=stiffer)
@@ -116,7 +115,7 @@ def test_stiffness_check_reports_a_different_equilibrium_of_the_simulation():
     assert "FAILED" in other.text()
 
 
-def test_stiffness_check_names_a_bent_joint_that_is_locked_and_elastic():
+def test_stiffness_check_reports_a_joint_that_is_locked_and_elastic():
     robot = load_robot("four_bar")
     frames = [
         replace(f, joint_stiffness=np.diag([np.inf, 1e3, 1e3, np.inf, np.inf, 1e6]))

@@ -1,4 +1,4 @@
-"""Addition of scales until the verdict is decided."""
+"""Tests of the addition of scales until the verdict is decided."""
 
 from dataclasses import dataclass, field
 
@@ -15,7 +15,7 @@ from forcefit.validation.crosscheck.verdict import Check, compare_scales, verdic
 
 @dataclass
 class Scale:
-    """A stand-in for a pair of solutions: two numbers at one scale."""
+    """Pair of solutions at a scale, represented by two numbers."""
 
     scale: float
     ours: float
@@ -24,7 +24,7 @@ class Scale:
 
 @dataclass
 class Found:
-    """A stand-in for a comparison, with one limit and one slope."""
+    """Comparison of the two numbers, with a limit and a slope."""
 
     pairs: tuple
     asked: int
@@ -50,7 +50,7 @@ def compared(scales, wrong, second=0.05, third=0.03):
 
 
 def test_correct_model_passes_if_only_two_scales_are_requested():
-    """With only two scales, the slope of 1.76 and the limit of 0.015 would not pass."""
+    """With two scales, slope and limit would not pass."""
     s = np.array([1.0, 0.5])
     assert abs(difference_slope(s, 0.05 * s**2 + 0.03 * s**3, 0) - 2) > 0.1
     comparison = compared((1.0, 0.5), wrong=0.0)
@@ -64,26 +64,24 @@ def test_correct_model_passes_if_only_two_scales_are_requested():
 
 @pytest.mark.parametrize("wrong", [0.003, -0.003, 0.02, -0.05])
 @pytest.mark.parametrize("scales", [(1.0, 0.5), (1.0, 0.7), (2.0, 1.0, 0.5)])
-def test_error_of_three_thousandths_in_a_term_is_detected_from_few_scales(
-    wrong, scales
-):
-    """With only two scales, its limit is uncertain by 0.05."""
+def test_error_of_three_thousandths_is_detected(wrong, scales):
+    """With two scales, the uncertainty of the limit is 0.05."""
     assert verdict(compared(scales, wrong)) == "failed"
 
 
-def test_wrong_term_that_is_cancelled_by_second_order_at_one_scale_is_detected():
-    """At s = 0.5, both terms cancel: -0.025 s + 0.05 s^2."""
+def test_error_that_second_order_cancels_at_a_scale_is_detected():
+    """At s = 0.5, the terms of -0.025 s + 0.05 s^2 cancel."""
     assert verdict(compared((1.0, 0.5), wrong=-0.025, third=0.0)) == "failed"
 
 
-def test_no_scale_is_added_if_the_limit_at_scale_zero_is_determined():
+def test_no_scale_is_added_if_every_check_is_decided():
     comparison = compared((1.0, 0.5, 0.25, 0.125), wrong=0.0)
     assert len(comparison.pairs) == 4
     assert verdict(comparison) == "passed"
 
 
 def test_undecided_check_is_reported_after_six_scales():
-    """The uncertainty of this check always exceeds its bound."""
+    """The uncertainty of this check exceeds its bound at all scales."""
 
     class Vague(Found):
         def __post_init__(self):
@@ -97,11 +95,8 @@ def test_undecided_check_is_reported_after_six_scales():
 @pytest.mark.parametrize(("theirs", "limit", "expected"), [
     (lambda s: 1e-14, "no signal", "no signal"), (lambda s: 1e-6 * s, "fails", "failed")
 ])  # fmt: skip
-def test_noise_against_zero_has_no_signal_and_a_signal_against_zero_fails(
-    theirs, limit, expected
-):
-    """Simulations resolve a hundredth of the floor, which extrapolation multiplies by
-    15."""
+def test_value_against_zero_fails_if_it_exceeds_the_noise(theirs, limit, expected):
+    """The virtual-joint model has the value 0."""
     scales = (1.0, 0.5, 0.25, 0.125)
     comparison = compare_scales(scales, lambda s: Scale(s, 0.0, theirs(s)), Found)
     assert comparison.checks["limit"].verdict == limit
