@@ -1,4 +1,4 @@
-"""Predict readings, correct commands and fit new sessions with a saved robot.
+"""Predict readings, correct commands, and fit a saved robot to new sessions.
 
 Start with ``prediction.py``; see ``docs/correction.md``.
 """

@@ -21,12 +21,12 @@ from forcefit.validation.diagnosis.saved_covariance import (
 
 
 def save(carried: CarriedRobot, path: Path | str) -> None:
-    """Write the fitted robot and its covariance to two files.
+    """Write a fitted robot and its covariance to two files.
 
     Args:
         carried: the robot, fitted to the new sessions.
-        path: path of the robot file.  The file of the covariance has the same name with
-            the suffix ``.npz``.
+        path: path of the robot file.  The covariance file has the same name with the
+            suffix ``.npz``.
 
     Raises:
         BadInput: a file cannot be written.
@@ -46,7 +46,7 @@ def covariance_of(carried: CarriedRobot, robot: Robot) -> SavedCovariance:
 
     Args:
         carried: the robot, fitted to the new sessions.
-        robot: the robot as written to its file.
+        robot: the robot in the file.
     """
     fit, rows = carried.fit, dict[Number, NDArray]()
     count, machine = len(fit.x), fit.machine
@@ -68,7 +68,7 @@ def covariance_of(carried: CarriedRobot, robot: Robot) -> SavedCovariance:
 
 
 def _with_std(robot: Robot, known: SavedCovariance) -> Robot:
-    """Store the standard deviations in ``known`` with the robot's functions."""
+    """Return the robot with the standard deviations of its functions in ``known``."""
     functions = list(robot.functions)
     for number, sigma in zip(known.numbers, known.std.tolist(), strict=True):
         if number.kind == FUNCTION:

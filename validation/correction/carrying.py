@@ -1,11 +1,11 @@
 r"""Fit a saved robot to the set-up rows of a new session and test it on other rows.
 
-The parameters of a session are the pose of the measuring device, the changes with time
-and, if requested, the measured point and the zeros of the joints
-(:mod:`.session_unknowns`).  The prior of the robot's parameters consists of their saved
-values and covariance (:mod:`.machine_numbers`).  All parameters are fitted to the
-set-up rows of all sessions (:mod:`.session_fit`) and tested on all other rows.  Set-up
-rows are measured at the beginning of a session for this purpose.
+Set-up rows are measured at the beginning of a session.  The parameters of a session are
+the pose of the measuring device, the changes with time and, if requested, the measured
+point and the zeros of the joints (:mod:`.session_unknowns`).  The prior of the robot's
+parameters consists of their saved values and covariance (:mod:`.machine_numbers`).  All
+parameters are fitted to the set-up rows of all sessions (:mod:`.session_fit`) and
+tested on the other rows.
 
 The uncertainty of the fit is propagated to the other rows.  The set-up rows are
 insufficient if this uncertainty exceeds their residual with the saved robot.
@@ -48,15 +48,16 @@ class Carried:
         values: (k,) [rad, m] fitted values.
         std: (k,) standard deviations of the values.
         rows: number of set-up rows, and number of other rows.
-        error: error on the other rows.
-        declared: error of the declared robot, fitted in the same way.
+        error: prediction error on the other rows.
+        declared: prediction error of the declared robot, fitted to the same set-up
+            rows.
         uncertainty: [m] rms uncertainty of the predicted points of the other rows.
         left: [m] rms residual of the set-up rows.
         held: [m] rms residual of the set-up rows if the robot's parameters are fixed at
             their saved values.
         open_: names of the most uncertain parameters; empty if the set-up rows suffice.
-        left_behind: changes with time in the original session that cannot be fitted
-            here, because the new session has no column ``cov.time``.
+        left_behind: changes with time in the original session that cannot be fitted,
+            because the new session has no column ``cov.time``.
     """
 
     session: str | None
@@ -81,7 +82,7 @@ class Carried:
 
     @property
     def better(self) -> bool:
-        """Whether this robot predicts the other rows better than the declared robot."""
+        """Whether the other rows are predicted better than by the declared robot."""
         error, declared = self.error.normalised, self.declared.normalised
         return math.isnan(declared) or error <= declared
 
@@ -92,7 +93,7 @@ class CarriedRobot:
 
     Attributes:
         fit: fitted parameters of the sessions and of the robot.
-        sessions: results of the sessions on the rows that were not fitted.
+        sessions: result of each session.
     """
 
     fit: SessionsFit
@@ -100,7 +101,7 @@ class CarriedRobot:
 
     @property
     def good(self) -> bool:
-        """Whether set-up rows suffice and the robot outperforms the declared one."""
+        """Whether set-up rows suffice and predictions are better in all sessions."""
         return all(one.suffices and one.better for one in self.sessions)
 
 
@@ -110,19 +111,19 @@ def carry(
     setup: NDArray,
     fitted: Sequence[str] = ("registration",),
 ) -> CarriedRobot:
-    """Fit a saved robot to the set-up rows of sessions and test it on all other rows.
+    """Fit a saved robot to the set-up rows of sessions and test it on the other rows.
 
     Args:
         campaign: campaign with the saved robot.
-        declared: the same rows with the campaign's declared robot.
+        declared: the same campaign with the declared robot.
         setup: (R,) bool, True for set-up rows.
         fitted: names of parameters in :data:`OF_A_SESSION`.
 
     Returns:
-        The robot in these sessions and the result of every session.
+        The fitted robot and the result of each session.
 
     Raises:
-        BadInput: a session consists only of set-up rows or contains none.
+        BadInput: all rows of a session are set-up rows, or none.
     """
     clock = "time" in campaign.covariates
     unknowns = session_unknowns(campaign.robot, fitted, clock=clock)
@@ -143,31 +144,31 @@ def carry(
 
 
 def _sessions(campaign: Campaign) -> tuple[str | None, ...]:
-    """Return the names of the sessions; (None,) for a campaign without sessions."""
+    """Return the names of the sessions, or (None,) for a campaign without sessions."""
     return campaign.sessions or (None,)
 
 
 def _of(campaign: Campaign, session: str | None, setup: NDArray) -> NDArray:
-    """Return (R,) bool, True for a session's rows; check its set-up rows."""
+    """Return a mask (R,) of a session's rows, and check its set-up rows."""
     own = campaign.in_session(session)
     if setup[own].any() and not setup[own].all():
         return own
     which = f"session {quoted(session)}" if session is not None else campaign.name
-    rows = "nothing but set-up rows" if setup[own].any() else "no set-up rows"
+    rows = "only set-up rows" if setup[own].any() else "no set-up rows"
     raise BadInput(
         f"--setup: found {rows} in {which}; expected set-up rows and other rows"
     )
 
 
 def _left_behind(robot: Robot, unknowns: SessionUnknowns) -> tuple[str, ...]:
-    """Return the titles of changes with time that cannot be fitted in a new session."""
+    """Return the titles of changes with time that cannot be fitted in a session."""
     drift, functions = of_one_session(robot)
     whole = [DRIFT] if drift and unknowns.constant is None else []
     return (*whole, *(f.title for f in functions if f not in unknowns.functions))
 
 
 def _judged(fit: SessionsFit, other: SessionsFit, number: int) -> Carried:
-    """Test one session on the rows that were not fitted."""
+    """Return the result of a session on the rows that were not fitted."""
     one, alike = fit.sessions[number], other.sessions[number]
     campaign, setup, values = one.campaign, one.rows, fit.values(number)
     read = one.read(fit.robot, values)
@@ -204,7 +205,7 @@ def _judged(fit: SessionsFit, other: SessionsFit, number: int) -> Carried:
 
 
 def carried_robot(carried: CarriedRobot) -> Robot:
-    """Return the robot to save, without the parameters of its original session.
+    """Return the fitted robot without the parameters of its original session.
 
     Args:
         carried: the robot, fitted to the new sessions.
@@ -221,7 +222,7 @@ def carried_robot(carried: CarriedRobot) -> Robot:
 
 
 def _added(before: Any, more: dict[str, dict[str, float]]) -> dict[str, Any]:
-    """Add ``more`` to the parameters of effects; a drift is replaced."""
+    """Return effects with ``more`` added to their parameters and with a new drift."""
     merged = {name: dict(values) for name, values in before.items()}
     for effect, values in more.items():
         own = merged.setdefault(effect, {})

@@ -48,8 +48,8 @@ def text(carried: CarriedRobot) -> str:
     lines = []
     if carried.fit.machine.numbers:
         lines.append(
-            f"the robot's {len(carried.fit.machine.numbers)} parameters: also fitted, "
-            f"with {carried.fit.widened:.3g} times their covariance as prior"
+            f"fitted robot parameters: {len(carried.fit.machine.numbers)}; their prior "
+            f"has {carried.fit.widened:.3g} times the saved covariance"
         )
     for one in carried.sessions:
         name = one.session or "campaign"
@@ -67,14 +67,14 @@ def text(carried: CarriedRobot) -> str:
             f"{in_unit(one.held, 'um')}"
         )
         lines += [
-            f"  not used here, an effect of an earlier session: {title}"
+            f"  effect of an earlier session that is not used: {title}"
             for title in one.left_behind
         ]
         if not one.suffices:
             lines.append(
                 "  the set-up rows are not sufficient to determine "
-                f"{', '.join(one.open_)}; measure set-up rows at other places and in "
-                "other orientations"
+                f"{', '.join(one.open_)}; measure set-up rows at other positions and "
+                "in other orientations"
             )
         elif not one.better:
             lines.append(

@@ -1,9 +1,8 @@
 r"""Compute commands with which a corrected robot reaches the nominal poses.
 
 The controller computes commands q for which the nominal robot has the target pose.  The
-machine deviates from this pose by d(q), which the corrected model predicts.  The
-Gauss-Newton method solves, for all rows together, for commands with which the machine
-has the target pose:
+machine deviates from this pose by d(q), which the corrected model predicts.  Commands
+with which the machine has the target pose are computed by the Gauss-Newton method:
 
  nominal pose(q) changed by the deviation d(q) = target pose
 
@@ -12,7 +11,7 @@ symbol  code           shape       meaning
 ======  =============  ==========  ===================================================
 q       ``drives``     (R, d)      commands of the driven joints
 e       ``error``      (R, 6)      motion from the machine's pose to the target pose
-J       ``jacobian``   (R, 6, d)   derivative of the platform's pose by the drives
+J       ``jacobian``   (R, 6, d)   derivative of the platform pose by the commands
 ======  =============  ==========  ===================================================
 
 If a robot has fewer than six drives, positions take priority over rotations.
@@ -47,7 +46,7 @@ if TYPE_CHECKING:
 
 _STEPS = 25
 _HALVINGS = 8
-_STILL = 1e-10  # [rad or m] changes of a command below this value count as zero
+_STILL = 1e-10  # [rad or m] largest change of a command at convergence
 _TURN = np.pi  # [rad] largest accepted correction of a revolute drive
 # Factor on the weight of rotations if the drives cannot correct all six components.
 _LOW = 1e-4
@@ -60,17 +59,17 @@ class Compensation:
     Attributes:
         targets: commands at which the nominal robot has the target poses.
         drives: names of the d actuated joints.
-        commands: (R, d) [rad or m] corrected commands; rows without a solution are
-            unchanged.
-        transforms: (R, n, 4, 4) nominal frames at the commands.
+        commands: (R, d) [rad or m] corrected commands.  Rows without a solution contain
+            the given command.
+        transforms: (R, n, 4, 4) nominal poses of the frames at the commands.
         coordinates: (R, n) [rad or m] coordinate of every joint at the commands.
         before: (R, 6) [rad, m] deviation from the target pose for the given commands,
             at the reference point, base axes.
         after: (R, 6) [rad, m] deviation from the target pose for the corrected
             commands.
         spread: (R, 6) [rad, m] standard deviation of ``after`` due to the uncertainty
-            in the robot's file.
-        limited: (R,) bool, True where a joint's limit prevents the correction.
+            in the robot file.
+        limited: (R,) bool, whether a joint limit prevents the correction.
         reason: (R,) reason why a row has no solution; empty if it has one.
     """
 
@@ -88,7 +87,7 @@ class Compensation:
     __repr__, _repr_html_ = short_repr, html_table
 
     def to_xarray(self) -> "xarray.Dataset":
-        """Convert to an xarray data set over ``row``: commands, offsets and errors."""
+        """Convert to an xarray data set over ``row``."""
         from forcefit.validation.correction.compensation_table import (
             compensation_dataset,
         )
@@ -103,7 +102,7 @@ class Compensation:
 
     @property
     def offsets(self) -> NDArray:
-        """(R, d) [rad or m] corrections to add to the commands of the drives."""
+        """Corrections to be added to the commands of the drives, (R, d) [rad or m]."""
         return self.commands - self.targets.coordinates[:, _driven(self.targets.robot)]
 
 
@@ -112,12 +111,11 @@ def compensate(targets: Campaign, *, as_read: bool = False) -> Compensation:
 
     Args:
         targets: commands for the corrected robot.
-        as_read: whether the commands also cancel effects of the measuring device, so
-            that the readings become zero.  Otherwise only deviations of the machine are
-            corrected.
+        as_read: whether effects of the measuring device are corrected, too, so that the
+            readings become zero.
 
     Returns:
-        The corrected commands; the command of a row without a solution is unchanged.
+        The corrected commands.
 
     Raises:
         BadInput: an effect of the robot depends on a covariate that is missing in the
@@ -161,9 +159,9 @@ def _corrected(
     machine: "_Machine", standing: "_Standing", q: NDArray, weights: NDArray,
     limits: tuple[NDArray, NDArray], going: NDArray,
 ) -> tuple[NDArray, "_Standing"]:  # fmt: skip
-    """Return the commands (R, d) of smallest error, and the machine's state there.
+    """Return the commands (R, d) of smallest error, and the state of the machine.
 
-    Only rows in ``going`` (R,) bool are corrected, by damped Gauss-Newton steps.
+    Only the rows in ``going`` are corrected, by damped Gauss-Newton steps.
     """
     for _ in range(_STEPS):
         step = _step(standing, weights, q, limits)
@@ -179,7 +177,7 @@ def _corrected(
             if not worse.any():
                 break
             share = np.where(worse, share / 2, share)
-        # The remaining error is due to round-off or joint limits.
+        # Rows without progress have errors due to round-off or joint limits.
         going = going & moving & ~worse
         q = np.where(going[:, None], tried, q)
         standing = next_ if going[moving].all() else machine.at(q)[0]
@@ -187,7 +185,7 @@ def _corrected(
 
 
 def _each_once(targets: Campaign) -> Campaign:
-    """Drop the duplicates of commands at which several points were measured."""
+    """Return the commands without the repeats for several measured points."""
     if targets.point is None:
         return targets
     labels = tuple(dict.fromkeys(targets.labels))
@@ -196,12 +194,12 @@ def _each_once(targets: Campaign) -> Campaign:
 
 
 def _driven(robot: Robot) -> NDArray:
-    """Return the (d,) indices of the frames with actuated joints."""
+    """Return the indices of the frames with actuated joints, (d,)."""
     return np.flatnonzero([frame.actuated for frame in robot.frames])
 
 
 def _limits(robot: Robot, driven: NDArray) -> tuple[NDArray, NDArray]:
-    """Return the (d,) lower and (d,) upper limits of the commands."""
+    """Return the lower and upper limits of the commands, (d,) each."""
     given = [robot.frames[i].limits or (-np.inf, np.inf) for i in driven]
     least, most = np.array(given).reshape(-1, 2).T
     return least, most
@@ -210,10 +208,10 @@ def _limits(robot: Robot, driven: NDArray) -> tuple[NDArray, NDArray]:
 def _too_far(
     robot: Robot, driven: NDArray, change: NDArray, reason: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Find rows whose correction (R, d) exceeds the robot's size or half a turn.
+    """Find rows with a correction larger than the robot's size or half a turn.
 
     Returns:
-        (R,) bool, True for such rows, and (R,) texts of the reasons.
+        A mask of these rows and the reasons, (R,) each.
     """
     slides = np.array([robot.frames[i].joint == "prismatic" for i in driven])
     most = np.where(slides, size_of(robot), _TURN)
@@ -231,7 +229,7 @@ def _too_far(
 
 
 def _astray(robot: Robot, error: NDArray, reason: NDArray) -> NDArray:
-    """Return reasons (R,), extended by errors (R, 6) larger than the robot."""
+    """Return reasons (R,), with those of rows with errors larger than the robot."""
     size, reason = size_of(robot), reason.copy()
     off = np.linalg.norm(error[:, 3:], axis=1)
     for row in np.flatnonzero((off > size) & (reason == "")):
@@ -243,7 +241,7 @@ def _astray(robot: Robot, error: NDArray, reason: NDArray) -> NDArray:
 
 
 def _weights(robot: Robot, drives: int) -> NDArray:
-    """Return the (6,) [m/rad and 1] weights of the components of a pose error."""
+    """Return the weights of the components of a pose error, (6,) [m/rad, 1]."""
     turn = size_of(robot) * (1.0 if drives >= 6 else _LOW)
     return np.repeat([turn, 1.0], 3)
 
@@ -254,9 +252,9 @@ class _Standing:
 
     Attributes:
         campaign: the commands.
-        conditions: postures, loads and covariates of the measurement at the commands.
+        conditions: postures, loads and covariates at the commands.
         error: (R, 6) [rad, m] motion to the target pose; NaN without a solution.
-        jacobian: (R, 6, d) derivative of the reference point's pose by the drives.
+        jacobian: (R, 6, d) derivative of the reference point's pose by the commands.
     """
 
     campaign: Campaign
@@ -265,7 +263,7 @@ class _Standing:
     jacobian: NDArray
 
     def size(self, weights: NDArray) -> NDArray:
-        """Return the (R,) [m] weighted norm of the error."""
+        """Return the weighted norm of the error, (R,) [m]."""
         return np.linalg.norm(self.error * weights, axis=1)
 
 
@@ -284,7 +282,7 @@ class _Machine:
     as_read: bool
 
     def conditions(self, campaign: Campaign) -> Conditions:
-        """Return the measuring conditions at the commands, for the reference point."""
+        """Return the conditions at the commands for the reference point."""
         conditions = replace(finite_conditions(campaign), target=None)
         if self.as_read:
             return conditions
@@ -292,9 +290,9 @@ class _Machine:
         return replace(conditions, base=still, tool=still[:3], reading=0.0)
 
     def at(self, q: NDArray) -> tuple[_Standing, NDArray]:
-        """Return the state of the machine at commands (R, d) and reasons for failures.
+        """Return the state of the machine at commands (R, d), and reasons of failures.
 
-        Unreachable rows keep the given commands.
+        In unreachable rows, the given commands are used.
         """
         campaign, reason = _commanded(self.targets, q)
         conditions = self.conditions(campaign)
@@ -307,7 +305,7 @@ class _Machine:
 
 
 def _commanded(targets: Campaign, q: NDArray) -> tuple[Campaign, NDArray]:
-    """Return a campaign with new commands; unreachable commands stay unchanged."""
+    """Return a campaign with new commands, except for unreachable rows."""
     robot = targets.robot
     driven = _driven(robot)
     wanted = np.full((len(q), len(robot.frames)), np.nan)
@@ -329,7 +327,7 @@ def _commanded(targets: Campaign, q: NDArray) -> tuple[Campaign, NDArray]:
 
 
 def _between(conditions: Conditions, deviation: NDArray, goal: NDArray) -> NDArray:
-    """Return the motion (R, 6) from the present pose to the target pose, base axes."""
+    """Return the motion from the present to the target pose, base axes, (R, 6)."""
     nominal = conditions.postures.platform
     arm = nominal[:, :3, :3] @ conditions.point
     R = rotation_matrix(deviation[:, :3]) @ nominal[:, :3, :3]
@@ -340,7 +338,7 @@ def _between(conditions: Conditions, deviation: NDArray, goal: NDArray) -> NDArr
 
 
 def _jacobian(conditions: Conditions, drives: int) -> NDArray:
-    """Return the derivative (R, 6, d) of the reference point's pose by the drives."""
+    """Return the derivative of the reference pose by the commands, (R, 6, d)."""
     robot = without_joint_clearances(conditions.robot)
     columns = np.zeros((6 * len(robot.frames), drives))
     for k, i in enumerate(_driven(robot)):
@@ -355,7 +353,7 @@ def _jacobian(conditions: Conditions, drives: int) -> NDArray:
 def _step(
     standing: _Standing, weights: NDArray, q: NDArray, limits: tuple[NDArray, NDArray]
 ) -> NDArray:
-    """Return the least-squares step (R, d), zero for drives at their limits."""
+    """Return the least-squares step (R, d), with 0 for drives at their limits."""
     A = standing.jacobian * weights[:, None]
     b = np.nan_to_num(standing.error) * weights
     held = np.zeros(q.shape, dtype=bool)

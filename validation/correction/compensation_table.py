@@ -26,9 +26,7 @@ def command_table(compensation: "Compensation") -> str:
         compensation: result of :func:`.compensation.compensate`.
 
     Returns:
-        CSV with ``id``, ``q.*`` or ``pose.*``, and the given loads and covariates.  A
-        controller can execute this file, and it can be compensated again after a
-        measurement.
+        CSV with ``id``, ``q.*`` or ``pose.*``, and the given loads and covariates.
     """
     targets = compensation.targets
     platform = compensation.transforms[:, targets.robot.index(targets.robot.platform)]
@@ -57,9 +55,9 @@ def offset_table(compensation: "Compensation") -> str:
 
     Returns:
         CSV with ``id`` and the offsets ``offset.<drive>`` [rad or m].  The columns
-        ``before`` and ``after`` contain the errors before and after correction in
-        position [m] and rotation [rad].  The column ``spread`` is the standard
-        deviation [m] of the position after correction.
+        ``before`` and ``after`` contain the position [m] and rotation [rad] errors
+        before and after correction.  The column ``spread`` is the standard deviation
+        [m] of the position after correction.
     """
     columns: dict[str, Any] = {
         f"offset.{n}": x
@@ -79,9 +77,9 @@ def compensation_dataset(compensation: "Compensation") -> "xarray.Dataset":
         compensation: result of :func:`.compensation.compensate`.
 
     Returns:
-        Data set with the ``command`` and the ``offset`` of each drive, the errors
-        ``before`` and ``after`` as screws, the standard deviation ``spread`` of
-        ``after``, ``limited`` and ``reason``.
+        Data set with ``command`` and ``offset`` of each drive, the screws ``before``
+        and ``after``, the standard deviation ``spread`` of ``after``, ``limited`` and
+        ``reason``.
     """
     drives = list(compensation.drives)
     of_drive = ("drive",)
@@ -123,12 +121,12 @@ def summary(
     Args:
         compensation: result of :func:`.compensation.compensate`.
         diagnosed: ``position`` [m] and ``rotation`` [rad] rms error on held-out rows;
-            None for the values of the robot's file.
+            None for the values in the robot file.
 
     Returns:
         Plain values.  ``expected`` combines the error after correction, the parameter
-        uncertainty in the file, and the unexplained error of the diagnosis.  It is None
-        if neither the file nor ``diagnosed`` states the latter.
+        uncertainty, and the unexplained error of the diagnosis.  It is None if the
+        unexplained error is unknown.
     """
     ids = compensation.targets.ids
     record = compensation.targets.robot.diagnosis
@@ -188,8 +186,8 @@ def summary_text(compensation: "Compensation", table: Mapping[str, Any]) -> str:
     """Format ``table``, the result of :func:`summary`, as text."""
     lines = [f"{table['rows']} commands, drives {', '.join(compensation.drives)}"]
     says = {
-        "before": "as commanded", "after": "corrected", "spread": "spread of the model",
-        "expected": "expected",
+        "before": "error without correction", "after": "error with correction",
+        "spread": "uncertainty of the model", "expected": "expected error",
     }  # fmt: skip
     for key, words in says.items():
         size = table["error"][key]
@@ -199,7 +197,7 @@ def summary_text(compensation: "Compensation", table: Mapping[str, Any]) -> str:
             lines.append(f"{words}: {readings_text(size)}")
     if table["error"]["expected"]["position"] is None:
         lines.append(
-            "expected: the residual of the robot's diagnosis (see "
+            "expected error: the residual of the robot's diagnosis (see "
             "--diagnosed), because the file contains no uncertainty"
         )
     if table["not_measured"]:
@@ -209,6 +207,6 @@ def summary_text(compensation: "Compensation", table: Mapping[str, Any]) -> str:
             "computed from the geometric errors in the other directions"
         )
     if table["limited"]:
-        lines.append(f"at a joint's limit: {', '.join(table['limited'][:10])}")
+        lines.append(f"rows at a joint limit: {', '.join(table['limited'][:10])}")
     lines += [f"{row['id']}: {row['reason']}" for row in table["without_answer"][:10]]
     return "\n".join(lines)

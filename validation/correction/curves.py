@@ -1,8 +1,8 @@
 """Plot the functions in a robot file with their uncertainty.
 
 Functions describe deviations that depend on temperature, time, load or position.  For a
-function with memory, the response to a unit step is plotted over time.  A function that
-depends on the direction of motion is plotted for an approach from below.
+function with memory, the response to a unit step is plotted over time.  If a function
+depends on the direction of motion, the approach is from below.
 """
 
 from collections.abc import Mapping
@@ -48,12 +48,12 @@ class Curve:
         function: the function.
         component: component of the screw or compliance that the function returns.
         variable: variable on the horizontal axis.
-        constant: name and value of the second variable, which is constant along the
-            curve; None for a function of one variable.
+        constant: name and value of the second variable; None for a function of one
+            variable.
         x: (k,) values of the variable, in its unit.
-        values: (k,) values of the component [rad, m, N m, N]; divided by N or N m for a
+        values: (k,) values of the component [rad, m, N m, N], divided by N or N m for a
             compliance.
-        std: (k,) standard deviations; zero if the file states none.
+        std: (k,) standard deviations; 0 if the file contains none.
         units: unit of ``x``, and unit of ``values``.
     """
 
@@ -76,13 +76,12 @@ def curves_of(
 
     Args:
         robot: robot with its functions.
-        over: mapping from a variable to its smallest and largest plotted value.  By
-            default, a full turn, the range of a spline's knots, or a typical range is
-            used.
+        over: mapping from variable to its smallest and largest plotted value.  The
+            default is a full turn, the range of a spline's knots, or a typical range.
 
     Returns:
-        One curve per component.  A function of two variables has one curve per
-        component for each of three values of the second variable.
+        One curve per component, or three curves per component for a function of two
+        variables, with different values of the second variable.
     """
     curves = []
     for function in robot.functions:
@@ -100,7 +99,7 @@ def curves_of(
 
 
 def _variables(function: Function) -> tuple[str, str]:
-    """Return the plotted variable and, if there is one, the second variable."""
+    """Return the plotted variable and the second variable, if there is one."""
     first, *rest = function.variables
     if function.form in {"lag", "creep"}:
         return "time", ""
@@ -113,7 +112,7 @@ def _curve(
     robot: Robot, function: Function, component: str, along: str,
     fixed: tuple[str, float] | None, x: NDArray,
 ) -> Curve:  # fmt: skip
-    """Return one curve with standard deviations from the parameter covariance."""
+    """Return a curve with its standard deviations."""
     values = _values(function, component, x, fixed)
     numbers, C = _covariance_of(robot, function)
     slopes = np.zeros((len(numbers), len(values)))
@@ -140,7 +139,7 @@ def _curve(
 
 
 def _covariance_of(robot: Robot, function: Function) -> tuple[list[str], NDArray]:
-    """Return the uncertain parameters of a function, and their (k, k) covariance."""
+    """Return the uncertain parameters of a function, and their covariance (k, k)."""
     known = known_covariance(robot)
     place = str(next(k for k, f in enumerate(robot.functions) if f is function))
     own = [
@@ -154,7 +153,7 @@ def _covariance_of(robot: Robot, function: Function) -> tuple[list[str], NDArray
 def _values(
     function: Function, component: str, x: NDArray, fixed: tuple[str, float] | None
 ) -> NDArray:
-    """Return the values of one component of the function at the variable's values x."""
+    """Return a component of the function at values x of the variable."""
     own = parameters_of(function, component)
     inputs = [x]
     if function.form in {"lag", "creep"}:
@@ -241,7 +240,7 @@ def text(curves: list[Curve]) -> str:
 
 
 def figure_of(curves: list[Curve]) -> "Figure":
-    """Plot each curve in its own panel, with a band of two standard deviations.
+    """Plot each curve in a separate panel, with a band of two standard deviations.
 
     Args:
         curves: result of :func:`curves_of`, at least one curve.

@@ -1,16 +1,16 @@
 r"""Compute the prior of machine parameters in a new session.
 
 The file of a saved robot contains its geometric errors, compliances, effects and
-functions, and the covariance C of their fit.  The machine may have changed by more than
-this uncertainty before the new session.  The prior therefore has the saved values as
-its mean and k C as its covariance, where k is chosen by cross-validation on the set-up
+functions, and the covariance C of their fit.  Before the new session, the machine may
+have changed by more than this uncertainty.  The prior therefore has the mean of the
+saved values and the covariance k C, where k is chosen by cross-validation on the set-up
 rows (:mod:`.session_fit`).
 
 ======  =============  =========  ====================================================
 symbol  code           shape      meaning
 ======  =============  =========  ====================================================
 u       ``u``          (r,)       independent variables of variance k
-L       ``root``       (m, r)     C = L L'; the m parameters are saved + L u
+L       ``root``       (m, r)     C = L L'; the m parameters are saved value + L u
 ======  =============  =========  ====================================================
 """
 
@@ -29,8 +29,8 @@ from forcefit.validation.diagnosis.saved_covariance import (
     known_covariance,
 )
 
-# Eigenvalues of the correlations below this fraction of the largest one are rounding
-# errors.
+# Fraction of the largest eigenvalue of the correlations below which an eigenvalue is
+# regarded as round-off.
 _RANK = 1e-10
 
 
@@ -53,17 +53,17 @@ class MachineNumbers:
 
     @property
     def std(self) -> NDArray:
-        """(m,) standard deviations of the parameters."""
+        """Standard deviations of the parameters, (m,)."""
         return np.sqrt(np.einsum("mr,mr->m", self.root, self.root))
 
     def robot_at(self, u: NDArray) -> Robot:
         """Return the robot with its parameters changed by L u, within bounds.
 
         Args:
-            u: (r,) independent variables; a change of the parameters is L u.
+            u: (r,) independent variables.
 
         Returns:
-            The robot.  A parameter that cannot be negative is scaled by a positive
+            The robot.  A parameter that cannot be negative is multiplied by a positive
             factor instead of adding the change.
         """
         robot = self.robot
@@ -82,8 +82,8 @@ def machine_numbers(robot: Robot) -> MachineNumbers:
         robot: robot with a covariance, or with ``tolerance`` and ``std``, in its file.
 
     Returns:
-        Parameters with a stated uncertainty, except those of a single session and of
-        the pose of a measuring device.
+        Parameters with a known uncertainty, except those of a single session and of a
+        measuring device's pose.
 
     Raises:
         BadInput: the file of the covariance cannot be read.
@@ -110,7 +110,7 @@ def _is_shared(number: Number, robot: Robot) -> bool:
 
 
 def _possible(number: Number, robot: Robot, by: float) -> float:
-    """Limit the change of a parameter to its admissible range."""
+    """Return the change of a parameter, limited to its admissible range."""
     value = number.of(robot)
     if number.kind == EFFECT and value > 0.0:
         unknowns = LIBRARY[number.owner].unknowns(robot)
@@ -120,18 +120,18 @@ def _possible(number: Number, robot: Robot, by: float) -> float:
 
 
 def unchanging(robot: Robot) -> MachineNumbers:
-    """Return an empty set of parameters, as for a robot that is known exactly."""
+    """Return an empty set of parameters, for a robot that is known exactly."""
     return MachineNumbers(robot, (), np.zeros((0, 0)))
 
 
 def renumbered(machine: MachineNumbers) -> list[Number]:
-    """Return the parameters, renumbered for a robot without functions of time.
+    """Return the parameters with new function numbers, without functions of time.
 
     Args:
         machine: parameters of a saved robot.
 
     Returns:
-        The same parameters, in which function indices skip functions of time.
+        The parameters for a robot without functions of time.
     """
     own, places = of_one_session(machine.robot)[1], dict[str, str]()
     for place, function in enumerate(machine.robot.functions):

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-_MOVED = 3.0  # largest ratio of residuals, saved to fitted pose, of an unmoved device
+_MOVED = 3.0  # ratio of residuals, saved to fitted pose, above which a device was moved
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,11 +41,11 @@ class PredictedReadings:
         error: measured readings minus predicted readings; NaN for components that were
             not measured.
         spread: (R, 6) [rad, m] standard deviation of the prediction due to the
-            uncertainty in the robot's file.
-        noise: (R, 6) [rad, m] standard deviation of a reading about the machine's true
-            deviation; NaN if neither the table nor the robot's file states it.
-        extrapolated: (R,) names of the variables whose values are outside the range in
-            which the robot was identified; empty if there are none.
+            uncertainty in the robot file.
+        noise: (R, 6) [rad, m] standard deviation of a reading from the true deviation
+            of the machine; NaN if it is unknown.
+        extrapolated: (R,) names of the variables with values outside the range in which
+            the robot was identified; empty if there are none.
         registration: source of the pose of the measuring device: ``"known"``, ``"of the
             robot file"``, ``"fitted to these rows"`` or ``"none"``.
         point: measured point for which the robot was identified, if the readings belong
@@ -115,9 +115,9 @@ def _both(values: NDArray) -> dict[str, float]:
 def predict(commands: Campaign) -> PredictedReadings:
     """Return the predicted readings of a campaign's robot for its commands.
 
-    An unknown registration, that is, the pose of the measuring device, is read from the
-    robot file.  It is fitted to the measured rows if the file contains none, or if the
-    residual of these rows shows that the device was moved.
+    The registration is the pose of the measuring device.  An unknown registration is
+    read from the robot file.  It is fitted to the measured rows if the file contains
+    none, or if the residuals show that the device was moved.
 
     Args:
         commands: campaign with the robot, its effects and its rows.
@@ -156,7 +156,7 @@ _FITTED = "fitted to these rows"
 
 
 def _registered(commands: Campaign, conditions: Conditions) -> tuple[Conditions, str]:
-    """Add the device pose to the conditions; also return the source of this pose."""
+    """Return the conditions with the device pose, and the source of this pose."""
     if commands.registration == "known":
         return conditions, "known"
     carried = np.broadcast_to(conditions.base, (len(commands), 6)).any(axis=1).all()
@@ -190,7 +190,7 @@ def _unplaced(robot: Robot) -> Robot:
 
 
 def _noise(commands: Campaign) -> NDArray:
-    """Return the noise (R, 6) [rad, m]: sigma, or the scatter of held-out rows."""
+    """Return the noise, which is sigma or the scatter of held-out rows, (R, 6)."""
     record = commands.robot.diagnosis
     known = [record.get("noise_rotation"), record.get("noise_position")]
     sizes = [x if isinstance(x, float) else np.nan for x in known]
@@ -201,11 +201,11 @@ def _noise(commands: Campaign) -> NDArray:
 
 
 def reading_names(commands: Campaign) -> list[tuple[str, str, int]]:
-    """Return the columns of a table of readings as triples: column, point, component.
+    """Return the column, point and component of each reading in a table of readings.
 
     Args:
-        commands: the rows of the table.  Components that were never measured are
-            omitted unless the table contains no measurement at all.
+        commands: the rows of the table.  Components without a measurement are omitted,
+            unless the table contains no measurements.
     """
     points = [""]
     if commands.point is not None:
@@ -232,10 +232,10 @@ def reading_table(predicted: PredictedReadings) -> str:
         predicted: result of :func:`predict`.
 
     Returns:
-        CSV in which the cells of rows without a solution are empty.  If the robot file
-        contains uncertainties, columns ``std.`` and ``noise.`` follow for every
-        reading.  The column ``extrapolated`` lists the variables whose values are
-        outside the range in which the robot was identified.
+        CSV with empty cells in rows without a solution.  If the robot file contains
+        uncertainties, each reading has columns ``std.`` and ``noise.``.  The column
+        ``extrapolated`` contains the variables outside the range in which the robot was
+        identified.
     """
     commands, deviations = predicted.commands, predicted.prediction.deviation
     columns = reading_names(commands)
@@ -263,7 +263,7 @@ def csv_text(rows: Mapping[str, Mapping[str, object]], columns: Sequence[str]) -
     """Return a table with labelled rows as CSV.
 
     Args:
-        rows: mapping from each label to the cells of its row, by name of the column.
+        rows: mapping from label to a row, which is a mapping from column to cell.
         columns: names of the columns after ``id``, in order.
 
     Returns:
@@ -276,7 +276,7 @@ def csv_text(rows: Mapping[str, Mapping[str, object]], columns: Sequence[str]) -
 
 
 def _cell(value: object) -> str:
-    """Format a number with ten digits; return a text unchanged."""
+    """Format a number with ten digits, or return a text."""
     if not isinstance(value, float):
         return str(value)
     return "" if np.isnan(value) else f"{value:.10g}"

@@ -11,16 +11,14 @@ C       ``covariance``  (k, k)        covariance of x
 
 The parameters of each session (:mod:`.session_unknowns`) have a flat or a Gaussian
 prior.  The parameters u of the machine (:mod:`.machine_numbers`) are common to all
-sessions, with the prior N(0, k).  The ratio tau of the scatter about the saved robot to
-sigma is known from the diagnosis; its prior has 20 degrees of freedom.  Rows of one
-configuration contain the same information, so together they carry the weight of a
-single row.
+sessions, with the prior N(0, k).  The ratio tau of the scatter to sigma is known from
+the diagnosis, with a prior of 20 degrees of freedom.  All rows of a configuration
+together have the weight of a single row.
 
-k is chosen by cross-validation: each configuration of the set-up rows is predicted by a
-fit to the others.  A larger k replaces a smaller one only if it reduces the prediction
-error by more than a standard error and by a relevant fraction of the noise.  The
-Bayesian evidence of k is not used, because it assumes that the machine changed along
-the directions of the covariance.
+The factor k is chosen by cross-validation, in which each configuration of the set-up
+rows is predicted by a fit to the other configurations.  A larger k is chosen only if it
+reduces the prediction error by more than a standard error and by a relevant fraction of
+the noise.
 """
 
 from collections.abc import Sequence
@@ -47,10 +45,10 @@ from forcefit.validation.diagnosis.registration import coarse_frame
 from forcefit.validation.diagnosis.separability import orthonormal_basis
 
 _STEPS = 8
-_SETTLED = 1e-3  # [standard deviations] largest change of x at convergence
+_SETTLED = 1e-3  # largest step of x at convergence, in standard deviations
 _WIDENED = 4.0 ** np.arange(8)  # candidate values of k, the factor on the covariance
-_SURE = 1.0  # number of standard errors by which a larger k must predict better
-_MATTERS = 0.03  # [-] smallest relevant improvement / variance of the noise
+_SURE = 1.0  # smallest improvement for a larger k, in standard errors
+_MATTERS = 0.03  # [-] smallest improvement for a larger k, over the noise variance
 _AT_ONCE = 1000  # number of rows processed together, which limits memory
 
 
@@ -80,13 +78,13 @@ class SetUp:
 
     @property
     def told(self) -> float:
-        """Ratio of a reading's prior variance to sigma^2; it grows with repeats."""
+        """Ratio of a reading's prior variance to sigma^2, including repeats."""
         left = self.campaign.robot.diagnosis.get("normalised")
         level = max(1.0, left) if isinstance(left, float) else 1.0
         return level**2 * self.repeated
 
     def start(self) -> NDArray:
-        """Return start values (p,) of the session's parameters."""
+        """Return start values of the session's parameters, (p,)."""
         x = self.unknowns.mean.copy()
         if any(name in BASE for _, name in self.unknowns.names):
             conditions = self._still(self.campaign.robot, self.rows)
@@ -95,19 +93,19 @@ class SetUp:
         return x
 
     def _still(self, robot: Robot, rows: NDArray) -> Conditions:
-        """Return the conditions of selected rows, excluding the session's effects."""
+        """Return the conditions of selected rows without the session's effects."""
         bare = replace(self.campaign, robot=without_session(robot))
         return finite_conditions(bare, rows)
 
     def read(self, robot: Robot, values: NDArray) -> NDArray:
-        """Return the predicted readings (R, 6) [rad, m] of all rows."""
+        """Return the predicted readings of all rows, (R, 6) [rad, m]."""
         still = self._still(robot, np.arange(len(self.campaign)))
         return predict(self.unknowns.applied(still, values)).deviation
 
     def tangent(
         self, machine: MachineNumbers, values: NDArray, u: NDArray, rows: NDArray
     ) -> tuple[NDArray, NDArray]:
-        """Return the readings of selected rows, and their derivatives.
+        """Return the predicted readings of selected rows and their derivatives.
 
         Args:
             machine: parameters of the robot.
@@ -116,8 +114,8 @@ class SetUp:
             rows: mask (R,) or indices of N rows.
 
         Returns:
-            (N, 6) [rad, m] readings, and (N, 6, p + r) derivatives by ``values`` and
-            ``u``.
+            The readings (N, 6) [rad, m], and their derivatives by ``values`` and ``u``,
+            (N, 6, p + r).
         """
         robot, unknowns = machine.robot_at(u), self.unknowns
         still = self._still(robot, rows)
@@ -140,7 +138,7 @@ class SetUp:
     def whitened(
         self, machine: MachineNumbers, values: NDArray, u: NDArray
     ) -> tuple[NDArray, NDArray]:
-        """Return residuals (n,) / sigma of set-up rows and their slopes (n, p + r)."""
+        """Return residuals / sigma (n,) of set-up rows and derivatives (n, p + r)."""
         own = self.own
         read, slopes = self.tangent(machine, values, u, self.rows)
         A = (slopes / own.sigma[:, :, None])[own.cells]
@@ -157,8 +155,7 @@ class SessionsFit:
         x: (k,) parameters of all sessions, followed by u of the machine.
         covariance: (k, k) covariance of x.
         widened: factor on the covariance of the machine's parameters.
-        held: parameters of every session if the machine's parameters are fixed at their
-            saved values.
+        held: parameters of the sessions for a machine with its saved parameters.
     """
 
     sessions: tuple[SetUp, ...]
@@ -170,7 +167,7 @@ class SessionsFit:
 
     @property
     def u(self) -> NDArray:
-        """(r,) independent variables u that describe changes of the machine."""
+        """Independent variables u of the changes of the machine, (r,)."""
         return self.x[len(self.x) - len(self.machine) :]
 
     @property
@@ -183,20 +180,19 @@ class SessionsFit:
         return _own(self.sessions, number)
 
     def values(self, number: int) -> NDArray:
-        """Return the (p,) fitted parameters of a session."""
+        """Return the fitted parameters of a session, (p,)."""
         return self.x[self.own(number)]
 
     def spread(self, number: int, cells: NDArray) -> tuple[float, NDArray]:
-        """Return the variance of a session's readings caused by the uncertainty of x.
+        """Return the mean variance of a session's readings due to the uncertainty of x.
 
         Args:
             number: index of the session.
-            cells: (R, 6) bool, True for the readings over which the variance is
-                averaged.
+            cells: (R, 6) mask of the readings.
 
         Returns:
-            The mean variance, and the contributions (p + 1,) of each session parameter
-            and of u as a whole.
+            The mean variance, and the contributions of each session parameter and of u,
+            (p + 1,).
         """
         one, own = self.sessions[number], self.own(number)
         p, u = own.stop - own.start, slice(len(self.x) - len(self.machine), len(self.x))
@@ -220,14 +216,14 @@ def _own(sessions: Sequence[SetUp], number: int) -> slice:
 
 
 def fit_sessions(sessions: Sequence[SetUp], machine: MachineNumbers) -> SessionsFit:
-    """Return session and machine parameters fitted to the set-up rows.
+    """Fit session and machine parameters to the set-up rows.
 
     Args:
         sessions: sessions of one robot.
         machine: parameters of the robot.
 
     Returns:
-        The most probable values, computed by the Gauss-Newton method.
+        The most probable values.
     """
     told = [one.told for one in sessions]
     x = np.concatenate([np.zeros(0), *(one.start() for one in sessions)])
@@ -269,7 +265,7 @@ def _settled(
 
 
 def _inverse(H: NDArray) -> NDArray:
-    """Return the inverse of the information matrix H, finite even if H is singular."""
+    """Return the inverse of the information matrix H, also if H is singular."""
     size = np.sqrt(np.diag(H))
     unit = np.where(size > 0, size, 1.0)
     scaled = H / np.outer(unit, unit) + 1e-14 * np.eye(len(H))
@@ -298,7 +294,7 @@ def _widened(
     blocks = np.concatenate([_blocks(sessions, k) for k in range(len(sessions))])
 
     def predicted(k: float) -> tuple[NDArray, float]:
-        """Return each block's sum of squared prediction errors, and tau."""
+        """Return the sum of squared prediction errors of each block, and tau."""
         std = np.append(known, np.full(len(machine), np.sqrt(k)))
         marginal = marginalise(A, std, z, Q)
         errors, _ = leave_block_out(marginal, blocks)
@@ -316,13 +312,13 @@ def _widened(
 
 
 def _matters(more: NDArray, count: int) -> bool:
-    """Return whether an increase in the blocks' squared errors is significant."""
+    """Return whether an increase of the squared errors is significant."""
     error = float(more.std(ddof=1)) * np.sqrt(len(more)) if len(more) > 1 else 0.0
     return bool(more.sum() > max(_SURE * error, _MATTERS * count))
 
 
 def _blocks(sessions: Sequence[SetUp], number: int) -> NDArray:
-    """Return the configuration (n,) of set-up readings, numbered over all sessions."""
+    """Return the configuration numbers of set-up readings over all sessions, (n,)."""
     before = sum(len(np.unique(s.own.configuration)) for s in sessions[:number])
     own = sessions[number].own
     rows = np.nonzero(own.cells)[0]

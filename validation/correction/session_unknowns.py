@@ -1,14 +1,11 @@
-"""Define the robot parameters that are refitted in every session.
+"""Define the robot parameters that are fitted in every session.
 
-These are the pose of the measuring device, all changes with time, that is, the effect
-``drift`` and the functions of time, and, if requested, the measured point and the zeros
-of the joints.  A slow wave or a step that occurred on one day is not expected to
-repeat.  In a new session the prior mean of its coefficients is zero, and the prior
-standard deviation is their previous size.  A change that starts with every session (a
-lag or creep) may repeat, so the prior mean of its coefficients is their previous
-values.  Early readings determine a later drift poorly, so the drift increases the
-uncertainty of predictions for later rows.  No drift is fitted without a column
-``cov.time``.
+These are the pose of the measuring device, the effect ``drift``, the functions of time
+and, if requested, the measured point and the zeros of the joints.  A slow wave or a
+step of one day is not expected to repeat, so the prior mean of its coefficients is 0,
+and the prior standard deviation is their previous size.  A lag or creep starts with
+every session, so the prior mean of its coefficients is their previous values.  No drift
+is fitted without a column ``cov.time``.
 """
 
 from collections.abc import Sequence
@@ -34,13 +31,13 @@ from forcefit.assembly.model.robot import Robot
 OF_A_SESSION = ("registration", "tool", "zeros")
 DRIFT = "drift"
 _ZERO = 1e-3  # [rad, m] prior standard deviation of a joint's new zero
-_SETTLING = ("lag", "creep")  # functions of time that start with the session
-_STEP = 1e-6  # [rad, m] step of numerical derivatives except for drift
+_SETTLING = ("lag", "creep")  # forms of functions that start with the session
+_STEP = 1e-6  # [rad, m] step of numerical derivatives, except for drift
 _CONSTANT = "time_constant"
 
 
 def of_one_session(robot: Robot) -> tuple[dict[str, float], tuple[Function, ...]]:
-    """Return the drift parameters and the functions of time of all sessions."""
+    """Return the drift parameters and the functions of time of a robot."""
     functions = tuple(
         f for f in robot.functions
         if f.session is None and any(name in CLOCKS for name in f.variables)
@@ -49,7 +46,7 @@ def of_one_session(robot: Robot) -> tuple[dict[str, float], tuple[Function, ...]
 
 
 def without_session(robot: Robot) -> Robot:
-    """Remove the device pose and all changes with time from a robot."""
+    """Return the robot without device pose and changes with time."""
     effects = {name: dict(values) for name, values in robot.effects.items()}
     effects.pop(DRIFT, None)
     tool = {k: v for k, v in effects.pop("registration", {}).items() if k in TOOL}
@@ -65,13 +62,12 @@ class SessionUnknowns:
     """Prior of the k parameters that are fitted in a session.
 
     Attributes:
-        names: pairs of owner (an effect or the title of a function) and parameter.
+        names: pairs of an effect or function title and the name of a parameter.
         mean: (k,) prior means.
-        prior: (k,) prior precisions, 1 / variance; zero for a flat prior.
-        step: (k,) step of the numerical derivative, which changes the readings by
-            micrometres.
+        prior: (k,) prior precisions, 1 / variance; 0 for a flat prior.
+        step: (k,) step of the numerical derivative.
         constant: [s] time constant of the drift; None if no drift is fitted.
-        functions: functions of time whose coefficients are fitted.
+        functions: functions of time with fitted coefficients.
     """
 
     names: tuple[tuple[str, str], ...]
@@ -86,7 +82,7 @@ class SessionUnknowns:
 
     @property
     def owners(self) -> list[str]:
-        """Title under which the coefficients of each function are listed."""
+        """Title of each function in the list of parameters."""
         return [_owner(i, function) for i, function in enumerate(self.functions)]
 
     def effects(self, x: NDArray) -> dict[str, dict[str, float]]:
@@ -100,7 +96,7 @@ class SessionUnknowns:
         return values
 
     def functions_with(self, x: NDArray, session: str | None) -> tuple[Function, ...]:
-        """Return the functions of time for values x (k,), active in one session."""
+        """Return the functions of time for parameter values x (k,)."""
         known = dict(zip(self.names, x.tolist(), strict=True))
         return tuple(
             replace(
@@ -116,7 +112,7 @@ class SessionUnknowns:
         )
 
     def applied(self, conditions: Conditions, x: NDArray) -> Conditions:
-        """Apply the values x (k,) to the conditions of the session's rows."""
+        """Return the conditions of the session's rows with parameter values x (k,)."""
         known = apply_effects(conditions, self.effects(x))
         return apply_functions(known, self.functions_with(x, None), conditions)
 
@@ -129,10 +125,11 @@ def session_unknowns(
     Args:
         robot: saved robot, including the parameters of its original session.
         fitted: names of parameters in :data:`OF_A_SESSION`.
-        clock: whether the rows of the session contain a time.
+        clock: whether the rows of the session contain a time.  Otherwise, no changes
+            with time are fitted.
 
     Returns:
-        The parameters, which include changes with time only if ``clock`` is true.
+        The parameters.
     """
     names: list[tuple[str, str]] = []
     if "registration" in fitted:
@@ -148,7 +145,7 @@ def session_unknowns(
     step, mean = [_STEP] * len(names), [0.0] * len(names)
     drift, functions = of_one_session(robot) if clock else ({}, ())
     constant = drift.pop(_CONSTANT, None)
-    # A formula is not linear in its parameters, so it is not fitted.
+    # A formula is not linear in its parameters and is therefore not fitted.
     functions = tuple(f for f in functions if f.form != FORMULA)
     alone = {name: (name[-2], value) for name, value in drift.items()}
     owned = [(DRIFT, True, alone)]
@@ -175,12 +172,12 @@ def session_unknowns(
 
 
 def _owner(number: int, function: Function) -> str:
-    """Return the title under which a function's coefficients are listed."""
+    """Return the title of a function in the list of parameters."""
     return f"function of time {number + 1}: {function.title}"
 
 
 def _numbers(robot: Robot, function: Function) -> dict[str, tuple[str, float]]:
-    """Return unit and value of each linear coefficient of a function."""
+    """Return the unit and the value of each linear coefficient of a function."""
     numbers, units = {}, units_of(robot, function)
     for component in function.components:
         own = parameters_of(function, component)

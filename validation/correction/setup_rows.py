@@ -16,10 +16,10 @@ def setup_rows(campaign: Campaign, text: str) -> NDArray:
             ranges and labels, for example ``1-20,31``.
 
     Returns:
-        (R,) bool; all points of one row of the file are selected together.
+        Mask (R,) of the rows.  All points in a row of the file are selected together.
 
     Raises:
-        BadInput: the text is neither a count nor a list of existing rows.
+        BadInput: the text is neither a number of rows nor a list of existing rows.
     """
     labels = list(campaign.labels)
     order = list(dict.fromkeys(labels))

@@ -1,8 +1,8 @@
 """Propagate the uncertainty in a robot file to the platform deviation.
 
 The covariance of the readings is J C J', where C is the parameter covariance in the
-file (:mod:`forcefit.validation.diagnosis.saved_covariance`) and J contains the
-derivatives of the readings with respect to the parameters.
+file (:mod:`forcefit.validation.diagnosis.saved_covariance`), and J is the derivative of
+the readings by the parameters.
 """
 
 from collections.abc import Callable
@@ -32,7 +32,7 @@ from forcefit.validation.diagnosis.saved_covariance import (
 )
 from forcefit.validation.diagnosis.sensitivities import sensitivity_at
 
-_STEP = 0.1  # [standard deviations] step of the numerical derivative
+_STEP = 0.1  # step of the numerical derivative, in standard deviations
 
 
 def deviation_spread(
@@ -45,7 +45,7 @@ def deviation_spread(
         conditions_for: function that returns the conditions of R rows for a robot.
 
     Returns:
-        (R, 6) [rad, m] standard deviations; zero if the file contains no uncertainty.
+        Standard deviations, (R, 6) [rad, m]; 0 if the file contains no uncertainty.
     """
     known = known_covariance(robot)
     conditions = conditions_for(robot)
@@ -65,13 +65,15 @@ def number_slopes(
     Args:
         robot: robot with its effects.
         conditions: conditions of R rows for the robot.
-        numbers: k parameters of its file.
-        std: (k,) standard deviations of the parameters, which determine the steps.
+        numbers: k parameters of the file.
+        std: (k,) standard deviations of the parameters, to which steps are
+            proportional.
         conditions_for: function that returns the conditions of the same rows for
             another robot.
 
     Returns:
-        (R, 6, k) [rad, m] per unit of a parameter; zero for rows without a solution.
+        Derivatives (R, 6, k) [rad, m per unit of the parameter]; 0 for rows without a
+        solution.
     """
     J = np.zeros((len(conditions), 6, len(numbers)))
     response = responses(conditions)
@@ -92,7 +94,7 @@ def number_slopes(
 
 
 def _is_direct(robot: Robot, number: Number) -> bool:
-    """Return whether a function's variables are unaffected by the motion it causes."""
+    """Return whether the motion of a function does not affect its variables."""
     function = robot.functions[int(number.owner)]
     wrench = any(name.startswith("wrench.") for name in function.variables)
     alone = function.where not in PLACES and function.kind == "compliance"
@@ -105,7 +107,7 @@ def _of_function(
     robot: Robot, conditions: Conditions, response: Responses, number: Number,
     sigma: float,
 ) -> NDArray:  # fmt: skip
-    """Return the derivatives (R, 6) of the deviation by one parameter of a function."""
+    """Return the derivative of the deviation by a function parameter, (R, 6)."""
     one = robot.functions[int(number.owner)]
     step = _STEP * sigma if sigma > 0.0 else 1.0
     more = one.parameters[number.name] + step

@@ -1,4 +1,4 @@
-"""Fitting of a saved robot to a new session."""
+"""Tests of fitting a saved robot to a new session."""
 
 import json
 from dataclasses import replace
@@ -23,7 +23,7 @@ DEVICE = np.array([0.3, -0.2, 0.5, 1.2, -0.4, 0.7])
 
 @pytest.fixture(name="machine")
 def a_machine(tmp_path):
-    """Return an arm whose saved file contains errors that the declared one lacks."""
+    """Write robot files of an arm, declared without and saved with errors."""
     declared = load_robot("arm6")
     rng = np.random.default_rng(5)
     errors = rng.normal(size=(len(declared.frames), 6)) * 3e-4
@@ -33,9 +33,10 @@ def a_machine(tmp_path):
 
 
 def measured(folder, rows, reach, sessions=None, zero=0.0, wave=None):
-    """Measure the machine, with noise, by a relocated device.  The relocation is a
-    rigid motion of the points.  A wave (sine, cosine) [m] has a period of one hour, for
-    which the time is recorded."""
+    """Write a campaign that is measured by a relocated device with noise.
+
+    A wave (sine, cosine) [m] along x has a period of one hour.
+    """
     rng = np.random.default_rng(rows)
     saved = load_robot(folder / "saved.toml")
     names = [f.name for f in saved.frames if f.actuated]
@@ -71,7 +72,7 @@ def measured(folder, rows, reach, sessions=None, zero=0.0, wave=None):
 
 
 def with_a_wave(machine, sine, cosine):
-    """Add to the saved file a slow wave that was learned on a different day."""
+    """Add a slow wave of another day to the saved robot file."""
     numbers = {"sine": sine, "cosine": cosine, "period": HOUR}
     wave = Function("reading", ("tx",), ("time",), "slow_wave", numbers)
     saved = load_robot(machine / "saved.toml")
@@ -87,13 +88,13 @@ def carried(run, machine, folder, *words):
     return code, text, json.loads(file.read_text())["sessions"], out
 
 
-def test_robot_is_fitted_to_a_new_session_with_few_rows(machine, run):
+def test_robot_fitted_to_few_rows_predicts_a_new_session(machine, run):
     folder = measured(machine, 60, 0.8)
     code, _, (day,), out = carried(run, machine, folder, "--setup", "12")
     assert code == 0
     assert day["suffices"]
     assert (day["setup_rows"], day["other_rows"]) == (12, 48)
-    # Noise, plus the uncertainty of the frame from 36 readings.
+    # noise and uncertainty of the device frame, fitted to 36 readings
     assert 0.9 < day["error"]["normalised"] < 1.3
     assert day["declared"]["normalised"] > 5
     found = {p["name"]: (p["value"], p["std"]) for p in day["parameters"]}
@@ -101,14 +102,13 @@ def test_robot_is_fitted_to_a_new_session_with_few_rows(machine, run):
     for k, axis in enumerate("xyz"):
         value, std = found[f"base.r{axis}"]
         assert abs(value - turn[k]) < 5 * std
-    # The written file predicts the session without further input.
+    # The saved file predicts the session without another fit.
     again = predict(read_commands(folder, load_robot(out)))
     assert again.error.position < 1.3 * SIGMA
 
 
-def test_set_up_rows_at_a_single_position_are_not_sufficient(machine, run):
-    """Forty rows within a milliradian determine a position, but not the device
-    rotation."""
+def test_set_up_rows_at_a_single_position_are_insufficient(machine, run):
+    """Forty rows within a milliradian do not determine the rotation of the device."""
     wide = measured(machine, 60, 0.8)
     text = (wide / "measurements.csv").read_text().splitlines()
     folder = measured(machine, 40, 1e-3)
@@ -124,7 +124,7 @@ def test_set_up_rows_at_a_single_position_are_not_sufficient(machine, run):
 
 
 def test_saved_robot_predicts_its_own_sessions(machine, run):
-    """The device is relocated in each session; the residual is noise."""
+    """The device is relocated in each session."""
     tight = load_robot(machine / "declared.toml")
     tight = replace(
         tight, frames=tuple(replace(f, clearance=None) for f in tight.frames)
@@ -148,21 +148,20 @@ def test_robot_is_fitted_to_each_session_separately(machine, run):
     assert set(load_robot(out).session_effects) == {"a", "b"}
 
 
-def test_drift_of_an_earlier_session_is_not_used_without_a_common_clock(machine, run):
-    """A 15-sigma drift of a different day is not written to the new file."""
+def test_drift_of_an_earlier_session_is_not_used_without_times(machine, run):
+    """The drift of another day is about 15 sigma."""
     folder = measured(machine, 60, 0.8)
     with_a_wave(machine, 3e-4, 1e-4)
     code, said, (day,), out = carried(run, machine, folder, "--setup", "12")
     assert code == 0
     assert day["left_behind"] == ["reading tx of time"]
-    assert "not used here, an effect of an earlier session: reading tx of time" in said
+    assert "effect of an earlier session that is not used: reading tx of tim" in said
     assert 0.9 < day["error"]["normalised"] < 1.3
     assert load_robot(out).functions == ()
 
 
 def test_drift_is_fitted_again_to_set_up_rows(machine, run):
-    """Every fourth row suffices to determine the drift of the new session to a third of
-    sigma."""
+    """The set-up rows are every fourth row of the session."""
     folder = measured(machine, 80, 0.8, wave=(-2e-4, 1e-4))
     with_a_wave(machine, 3e-4, 1e-4)
     rows = ",".join(map(str, range(1, 81, 4)))
@@ -178,8 +177,8 @@ def test_drift_is_fitted_again_to_set_up_rows(machine, run):
     assert written.parameters["sine"] == pytest.approx(numbers["sine"]["value"])
 
 
-def test_set_up_rows_of_the_first_minutes_do_not_determine_a_drift(machine, run):
-    """The prior is 2e-4 m, so the drift is unknown half an hour later."""
+def test_set_up_rows_of_the_first_minutes_are_insufficient_for_drift(machine, run):
+    """The prior standard deviation of the drift is 2e-4 m."""
     folder = measured(machine, 60, 0.8, wave=(0.0, 0.0))
     with_a_wave(machine, 2e-4, 2e-4)
     code, said, (day,), _ = carried(run, machine, folder, "--setup", "10")
@@ -193,7 +192,7 @@ def test_set_up_rows_of_the_first_minutes_do_not_determine_a_drift(machine, run)
     (["--setup", "x1"], 'found "x1", expected a row'),
     (["--setup", "1-99"], 'found "1-99", expected rows 1 to 6'),
     (["--setup", "0"], "found no set-up rows"),
-    (["--setup", "6"], "nothing but set-up"),
+    (["--setup", "6"], "found only set-up rows"),
     (["--setup", "3", "--fit", "zero"], '--fit: found "zero"; did you mean "zeros"'),
 ])  # fmt: skip
 def test_invalid_set_up_rows_are_rejected(words, message, machine, run):
@@ -205,8 +204,8 @@ def test_invalid_set_up_rows_are_rejected(words, message, machine, run):
     assert "\n" not in error.strip()
 
 
-def test_known_registration_that_the_rows_do_not_determine_is_refused(machine, run):
-    """The rows contain one reading each; campaign.toml states a known registration."""
+def test_rows_that_do_not_determine_the_registration_are_rejected(machine, run):
+    """The rows contain one reading each."""
     folder = measured(machine, 6, 0.8)
     file = folder / "campaign.toml"
     file.write_text(file.read_text().replace('"unknown"', '"known"'))

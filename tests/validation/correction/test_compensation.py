@@ -1,4 +1,4 @@
-"""Corrected commands, compared with hand calculations and simulated machines."""
+"""Tests of corrected commands against hand calculations and simulated machines."""
 
 import csv
 import json
@@ -33,8 +33,8 @@ def written(tmp_path, robot, rows, head="id,q.one,q.two"):
     return str(path), str(table)
 
 
-def test_compensation_table_equals_the_arrays_of_the_result(tmp_path):
-    """A zero offset of 2 mrad requires the opposite offset of its command."""
+def test_compensation_tables_equal_the_arrays(tmp_path):
+    """A zero error of 2 mrad requires the opposite offset of the command."""
     pytest.importorskip("xarray")
     robot, targets = written(tmp_path, ARM + ZERO, ["a,0.3,0.9", "b,-0.2,1.2"])
     found = compensate(read_commands(Path(targets), load_robot(robot)))
@@ -53,8 +53,7 @@ def rows_of(path):
 
 
 def two_links(x, y, length):
-    """Return the angles of a planar arm with links of 1 m and ``length`` (law of
-    cosines)."""
+    """Return the joint angles of a planar arm with links of 1 m and ``length``."""
     second = acos((x**2 + y**2 - 1 - length**2) / (2 * length))
     first = atan2(y, x) - atan2(length * sin(second), 1 + length * cos(second))
     return first, second
@@ -73,7 +72,7 @@ def test_compensation_of_a_longer_link_and_an_offset_equals_hand_calculation(
     words = ["compensate", robot, table, "-o", str(out), *options]
     code, text, error = run("validation", *words)
     assert (code, error) == (0, "")
-    assert "expected: " in text
+    assert "expected error: " in text
     for row, (q1, q2) in zip(rows_of(out), [(0.3, 0.9), (-0.2, 1.2)], strict=True):
         x = cos(q1) + 0.8 * cos(q1 + q2)
         y = sin(q1) + 0.8 * sin(q1 + q2)
@@ -81,7 +80,7 @@ def test_compensation_of_a_longer_link_and_an_offset_equals_hand_calculation(
         assert float(row["q.one"]) == pytest.approx(first - 2e-3, abs=1e-8)
         assert float(row["q.two"]) == pytest.approx(second, abs=1e-8)
     assert float(rows_of(offsets)[0]["after.position"]) < 1e-9
-    # The written file can be commanded again.
+    # The written file is a valid table of commands.
     again = read_commands(out, load_robot(robot))
     assert again.ids == ("a", "b")
     found = json.loads((tmp_path / "j.json").read_text())["error"]
@@ -89,14 +88,14 @@ def test_compensation_of_a_longer_link_and_an_offset_equals_hand_calculation(
     assert found["before"]["position"] > 8e-3 > 1e-8 > found["after"]["position"]
 
 
-def test_compensation_keeps_joints_within_their_limits(tmp_path, run):
-    """With the second joint at its limit, the first angle minimises the distance."""
+def test_compensated_joints_are_within_their_limits(tmp_path, run):
+    """The second joint is at its limit, so the first joint minimises the error."""
     text = LONGER.replace("position = 0.5", "position = 0.5\nlimits = [0.0, 0.9]")
     robot, table = written(tmp_path, text, ["a,0.3,0.9"])
     found = compensate(read_commands(table, load_robot(robot)))
     assert found.commands[0, 1] == 0.9
     assert found.limited[0]
-    # Minimum distance to the target over the first angle alone.
+    # smallest distance from the target for all angles of the first joint
     x, y = cos(0.3) + 0.8 * cos(1.2), sin(0.3) + 0.8 * sin(1.2)
     reach = np.hypot(1 + 0.81 * cos(0.9), 0.81 * sin(0.9))
     assert np.linalg.norm(found.after[0, 3:]) == pytest.approx(
@@ -114,9 +113,8 @@ def test_registration_is_compensated_only_on_request(tmp_path):
     assert np.abs(found.after[0, 3:]).max() < 1e-9
 
 
-def test_compensation_spread_includes_tolerances_and_fitted_parameters(tmp_path):
-    """A zero that is uncertain by 1e-4 rad moves the tip by this angle times its
-    distance."""
+def test_spread_includes_tolerances_and_fitted_parameters(tmp_path):
+    """The standard deviation of a zero error is 1e-4 rad."""
     text = ARM.replace(
         'name = "one"', 'name = "one"\ntolerance = [0, 0, 1e-4, 0, 0, 0]'
     )
@@ -137,9 +135,8 @@ std = { "1.sine" = 2e-4 }
 
 
 @pytest.mark.parametrize("name", ["arm6", "delta", "hexapod"])
-def test_compensation_brings_a_simulated_machine_to_its_target(name, tmp_path):
-    """The machine is simulated by an independent program.  The residual is of second
-    order, the squared errors over the robot size, which is a few nanometres here."""
+def test_compensated_machine_reaches_its_target(name, tmp_path):
+    """The machine is simulated independently.  The residual is of second order."""
     robot = load_robot(name)
     frames = tuple(replace(f, clearance=None) for f in robot.frames)
     robot = replace(robot, frames=frames)
@@ -196,10 +193,8 @@ parameters = { "0" = OFF }
 
 
 @pytest.mark.parametrize("off", [2e11, -5.0, 1e-3])
-def test_command_stays_unchanged_if_its_correction_exceeds_the_robot_size(
-    off, tmp_path, run
-):
-    """The function displaces a slide by metres."""
+def test_correction_larger_than_the_robot_is_not_applied(off, tmp_path, run):
+    """The function displaces a prismatic joint by metres."""
     robot, table = written(
         tmp_path, SLIDE.replace("OFF", repr(off)), ["a,0.3"], "id,q.carriage"
     )

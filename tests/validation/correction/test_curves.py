@@ -1,4 +1,4 @@
-"""Curves of functions: values, uncertainty bands and units."""
+"""Tests of the curves of functions."""
 
 import json
 from math import sin
@@ -53,7 +53,7 @@ def test_explain_accepts_a_range_and_writes_a_figure(tmp_path, run):
     assert figure.read_text().count("gear of the drive") >= 1
 
 
-def test_function_of_two_variables_yields_three_curves(tmp_path, run):
+def test_function_of_two_variables_has_three_curves(tmp_path, run):
     both = (
         LAG
         .replace('"lag"', '"powers"')

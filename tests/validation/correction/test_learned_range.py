@@ -1,4 +1,4 @@
-"""The identified range of a robot and rows outside it."""
+"""Tests of the range in which a robot was identified."""
 
 import json
 from dataclasses import replace
@@ -53,7 +53,7 @@ def test_learned_range_has_a_margin_of_five_per_cent(tmp_path):
 def test_full_turn_of_a_joint_is_inside_the_learned_range(
     variables, form, name, outside, tmp_path
 ):
-    """Except for functions of the angle that are not periodic."""
+    """Functions of the angle that are not periodic are an exception."""
     robot = read_robot(robot_file(tmp_path))
     if variables:
         one = Function("base", ("tx",), variables, form, {name: 1e-6})
@@ -66,7 +66,7 @@ def test_full_turn_of_a_joint_is_inside_the_learned_range(
     assert [one.rows for one in beyond(robot, read_commands(half, robot))] == [1]
 
 
-def test_unrecorded_covariate_is_not_outside_the_learned_range(tmp_path):
+def test_missing_covariate_is_not_outside_the_learned_range(tmp_path):
     path = tmp_path / "learned.toml"
     path.write_text('learned_range = { "cov.tilt" = [0.2, 0.4] }\n' + ARM)
     robot = read_robot(path)
@@ -74,7 +74,7 @@ def test_unrecorded_covariate_is_not_outside_the_learned_range(tmp_path):
     assert beyond(robot, read_commands(folder, robot)) == ()
 
 
-def test_robot_file_preserves_the_learned_range(tmp_path):
+def test_learned_range_is_saved_in_the_robot_file(tmp_path):
     robot = read_robot(robot_file(tmp_path))
     write_robot(robot, tmp_path / "again.toml")
     again = read_robot(tmp_path / "again.toml")
@@ -82,7 +82,7 @@ def test_robot_file_preserves_the_learned_range(tmp_path):
 
 
 @pytest.mark.parametrize("command", ["predict", "compensate"])
-def test_commands_warn_of_rows_beyond_the_learned_range(tmp_path, run, command):
+def test_commands_report_rows_outside_the_learned_range(tmp_path, run, command):
     table = tmp_path / "new.csv"
     table.write_text("id,q.one,q.two,cov.tilt\na,0.3,0.1,0.2\nb,0.3,0.5,0.9\n")
     out, answer = tmp_path / "out.csv", tmp_path / "answer.json"

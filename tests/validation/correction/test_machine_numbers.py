@@ -1,4 +1,4 @@
-"""Robot parameters in a new session: prior and readings weighted by hand."""
+"""Tests of the robot parameters that are fitted to a new session."""
 
 from dataclasses import replace
 
@@ -34,8 +34,7 @@ SIGMA = 1e-5
 
 
 def wet_post(readings, wet, covariance, folder, numbers=("0", "1")):
-    """Return a post that shifts along x with ``wet``, of which its file declares
-    nothing."""
+    """Return campaigns of a post that moves along x with the covariate ``wet``."""
     measured = np.full((len(readings), 6), np.nan)
     measured[:, 3] = readings
     campaign = campaign_of(measured, SIGMA, wet=np.array(wet, dtype=float))
@@ -50,8 +49,8 @@ def wet_post(readings, wet, covariance, folder, numbers=("0", "1")):
     return replace(campaign, robot=saved), campaign
 
 
-def test_refitted_parameter_is_the_weighted_mean_of_prior_and_readings(tmp_path):
-    """The prior is 0 +- s and the n readings are y +- sigma (conjugate normals)."""
+def test_fitted_parameter_is_the_mean_of_prior_and_readings(tmp_path):
+    """The prior is normal with mean 0, and all n readings are y."""
     y, s, n = 4e-5, 3e-5, 8
     saved, declared = wet_post([y] * 12, [1] * 12, [[s**2]], tmp_path, ("1",))
     carried = carry(saved, declared, np.arange(12) < n, ())
@@ -65,8 +64,8 @@ def test_refitted_parameter_is_the_weighted_mean_of_prior_and_readings(tmp_path)
     assert known.covariance[0, 0] == pytest.approx(1 / (told + prior), rel=1e-6)
 
 
-def test_known_sum_of_two_parameters_is_preserved(tmp_path):
-    """Only a + b was known; the new rows determine a, and b adapts."""
+def test_known_sum_of_two_parameters_is_unchanged(tmp_path):
+    """Only a + b was known, and the new rows determine a."""
     s, little, a = 1e-4, 1e-9, 5e-5
     C = s**2 * np.array([[1, -1], [-1, 1]]) + little**2 * np.eye(2)
     wet = [0] * 8 + [1] * 8
@@ -80,10 +79,10 @@ def test_known_sum_of_two_parameters_is_preserved(tmp_path):
     assert numbers["0"] + numbers["1"] == pytest.approx(0.0, abs=0.01 * a)
 
 
-def test_prior_is_widened_if_a_parameter_changes_by_twenty_standard_deviations(
+def test_prior_covariance_increases_for_a_large_parameter_change(
     tmp_path,
 ):
-    """The refitted parameter then follows the readings."""
+    """The fitted parameter then agrees with the readings."""
     s, y = 2e-6, 4e-5
     saved, declared = wet_post([y] * 40, [1] * 40, [[s**2]], tmp_path, ("1",))
     carried = carry(saved, declared, np.arange(40) < 20, ())
@@ -94,7 +93,7 @@ def test_prior_is_widened_if_a_parameter_changes_by_twenty_standard_deviations(
     assert day.suffices
 
 
-def test_machine_parameters_exclude_those_of_a_session(tmp_path):
+def test_machine_parameters_exclude_session_parameters(tmp_path):
     saved, _ = wet_post([0.0] * 12, [1] * 12, np.eye(2) * 1e-12, tmp_path)
     clock = Function("reading", ("tx",), ("time",), "powers", {"1": 1e-9})
     robot = replace(
@@ -116,9 +115,8 @@ def test_machine_parameters_exclude_those_of_a_session(tmp_path):
     assert len(own) == 2
 
 
-def test_refitted_compliance_stays_positive():
-    """At least one thousandth of the compliance remains, and a rigid joint stays
-    rigid."""
+def test_fitted_compliance_is_positive():
+    """At least one thousandth of a compliance remains."""
     robot = campaign_of(np.zeros((1, 6))).robot
     K = np.diag([np.inf, np.inf, np.inf, 1e6, np.inf, np.inf])
     soft = replace(robot, frames=(replace(robot.frames[0], joint_stiffness=K),))
@@ -134,8 +132,10 @@ def test_refitted_compliance_stays_positive():
     ("base", "ry", "screw"), ("reading", "ry", "screw"), ("reading", "tz", "screw"),
     ("j2", "rz", "screw"), ("j2", "rz", "compliance"),
 ])  # fmt: skip
-def test_slopes_of_functions_equal_finite_differences(where, component, kind, tmp_path):
-    """The differences are those of predictions under load with a registered device."""
+def test_derivatives_of_functions_equal_finite_differences(
+    where, component, kind, tmp_path
+):
+    """The predictions include a load and the pose of the device."""
     robot, rng = with_errors(arm()), np.random.default_rng(2)
     lines = ["id,q.j1,q.j2,q.j3,load.fx,load.fz,load.mz"]
     for i, q in enumerate(rng.uniform(-1, 1, (5, 6))):
@@ -159,13 +159,13 @@ def test_slopes_of_functions_equal_finite_differences(where, component, kind, tm
         for by in (step, -step)
     ]
     expected = (ends[0] - ends[1]) / (2 * step)
-    # The rotation of a reading's rotation vector by the device is of second order here.
+    # The rotation of the device changes rotation vectors only to second order.
     assert J[:, :, 0] == pytest.approx(expected, abs=1e-3 * np.abs(expected).max())
 
 
 @pytest.mark.slow
-def test_softer_spring_is_identified_in_a_new_session_from_twenty_rows(tmp_path):
-    """After the diagnosis, a drive of the machine becomes a quarter softer."""
+def test_softer_drive_is_identified_in_a_new_session(tmp_path):
+    """After the diagnosis, the stiffness of a drive decreases by a fifth."""
     springs = {"monday": 5e4, "tuesday": 4e4}
     days = {}
     for day, stiffness in springs.items():

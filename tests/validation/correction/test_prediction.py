@@ -1,4 +1,4 @@
-"""Predicted readings and their names."""
+"""Tests of predicted readings and their names."""
 
 import csv
 from math import cos, sin
@@ -35,8 +35,7 @@ def rows_of(path):
 
 
 def test_predict_reads_a_table_of_commands(tmp_path, run):
-    """An additional rotation a sin q of the first joint moves the tool about the
-    base."""
+    """The first joint has an additional rotation a sin q."""
     table = tmp_path / "new.csv"
     table.write_text("id,q.one,q.two\na,0.3,0.0\nb,-0.4,0.5\n")
     out = tmp_path / "readings.csv"
@@ -53,12 +52,12 @@ def test_predict_reads_a_table_of_commands(tmp_path, run):
         turn = 1e-3 * sin(q1)
         x, y = cos(q1) + 0.8 * cos(q1 + q2), sin(q1) + 0.8 * sin(q1 + q2)
         found = [float(row[f"meas.{name}"]) for name in ("rz", "tx", "ty")]
-        # To first order; the rotation of the platform is exact.
+        # the translation is exact to first order
         assert found == pytest.approx([turn, -turn * y, turn * x], abs=2e-7)
 
 
-def test_table_of_a_prediction_has_measured_and_predicted_readings(tmp_path):
-    """The first joint rotates by an additional a sin q, which is read at the tool."""
+def test_prediction_table_has_measured_and_predicted_readings(tmp_path):
+    """The first joint has an additional rotation a sin q."""
     pytest.importorskip("xarray")
     folder = write_campaign(tmp_path / "campaign")
     commands = read_commands(folder, load_robot(robot_file(tmp_path)))
@@ -68,7 +67,7 @@ def test_table_of_a_prediction_has_measured_and_predicted_readings(tmp_path):
     np.testing.assert_array_equal(table["reading"], commands.measured)
 
 
-def test_predict_preserves_the_names_of_a_campaign(tmp_path, run):
+def test_predicted_readings_have_the_names_of_the_campaign(tmp_path, run):
     head = "id,q.one,q.two,meas.A.tx,meas.B.ty"
     folder = write_campaign(
         tmp_path / "c", head, ["m1,0.1,0.2,1e-4,2e-4", "m2,0.4,0.2,0,"],
@@ -81,7 +80,7 @@ def test_predict_preserves_the_names_of_a_campaign(tmp_path, run):
     assert "rms of measured minus predicted" in text
     rows = rows_of(out)
     assert list(rows[0]) == ["id", "meas.A.tx", "meas.B.ty"]
-    # Point A is 0.1 m farther along the tool.
+    # The distance of point A from the tool frame is 0.1 m along the tool.
     turn, angle = 1e-3 * sin(0.1), 0.3
     y = sin(0.1) + 0.8 * sin(angle) + 0.1 * sin(angle)
     assert float(rows[0]["meas.A.tx"]) == pytest.approx(-turn * y, abs=2e-8)
@@ -105,7 +104,7 @@ def test_predict_rejects_a_missing_covariate(tmp_path, run):
 
 
 def test_each_session_is_registered_separately(tmp_path):
-    """The tracker is relocated in each session; the residual is zero."""
+    """The tracker is relocated in each session."""
     robot = load_robot("arm6")
     write_robot(robot, tmp_path / "robot.toml")
     rng = np.random.default_rng(1)
