@@ -27,11 +27,11 @@ _MOST_PAIRS = 2000  # largest number of evaluated pairs of positions
 
 @dataclass(frozen=True)
 class PoseFigures:
-    """ISO 9283 characteristics for one pose, load and side of approach.
+    """ISO 9283 characteristics of a pose for one load and direction of approach.
 
     Attributes:
         label: id of the first row of the pose.
-        cycles: number n of cycles.
+        cycles: number of cycles.
         accuracy: AP_P [m]; None if no positions were measured.
         repeatability: RP_l [m]; None if no positions were measured.
         angles: AP_a, AP_b, AP_c [rad]; None if no rotations were measured.
@@ -72,12 +72,12 @@ class StandardFigures:
     Attributes:
         campaign: name of the campaign.
         registration: ``"known"`` or ``"unknown"``.  AP includes registration errors.
-        poses: poses measured at least twice.
+        poses: characteristics of the poses that were measured at least twice.
         distances: characteristics of pairs of poses with equal load, session, point and
-            side of approach.
-        axes: mapping from name to the ISO 230-2 characteristics of each reading that
-            was approached from both sides.  Each load, session and point is evaluated
-            separately.  The name contains the id of the first row.
+            direction of approach.
+        axes: mapping from name to the ISO 230-2 characteristics of a component that was
+            approached from both directions.  Loads, sessions and points are evaluated
+            separately, and the name contains the id of the first row.
     """
 
     campaign: str
@@ -139,7 +139,7 @@ def standard_figures(campaign: Campaign) -> StandardFigures:
         campaign: campaign with rows measured more than once.
 
     Returns:
-        The characteristics.  For ISO 9283, the two sides of approach are evaluated
+        The characteristics.  For ISO 9283, the two directions of approach are evaluated
         separately.
 
     Raises:
@@ -170,7 +170,7 @@ def _in_time(campaign: Campaign, rows: NDArray) -> NDArray:
 
 
 def _pose(campaign: Campaign, rows: NDArray) -> PoseFigures:
-    """Return the ISO 9283 characteristics of one set of repeats."""
+    """Return the ISO 9283 characteristics of the repeats of a pose."""
     turns, shifts = campaign.measured[rows, :3], campaign.measured[rows, 3:]
     turns, shifts = (d[np.isfinite(d).all(axis=1)] for d in (turns, shifts))
     placed, turned = len(shifts) > 1, len(turns) > 1
@@ -188,7 +188,7 @@ def _pose(campaign: Campaign, rows: NDArray) -> PoseFigures:
 
 
 def _circumstances(campaign: Campaign) -> NDArray:
-    """Return the index (R,) of each row's combination of load, session and point."""
+    """Return the number of each row's combination of load, session and point, (R,)."""
     names = [
         np.unique(column, return_inverse=True)[1]
         for column in (campaign.session, campaign.point)
@@ -200,9 +200,8 @@ def _circumstances(campaign: Campaign) -> NDArray:
 def _distances(campaign: Campaign, sets: list[NDArray]) -> Iterator[DistanceFigures]:
     """Yield the ISO 9283 characteristics of the distances between poses.
 
-    In the standard, the cycles alternate between two poses under one load.  Only poses
-    with the same load and session are compared: a different load would add a
-    deflection, and a different session a displacement of the device.
+    Only poses with the same load and session are compared, because another load would
+    add a deflection, and another session a displacement of the device.
 
     Yields:
         The characteristics of each pair.
@@ -237,7 +236,7 @@ def _axes(campaign: Campaign) -> Iterator[tuple[str, AxisFigures]]:
 
 
 def _axis(campaign: Campaign, k: int) -> AxisFigures | None:
-    """Return the characteristics of a reading repeated from both sides, or None."""
+    """Return the characteristics of a component with repeats from both directions."""
     side, values = campaign.covariates.get("approach"), campaign.measured[:, k]
     if side is None:
         return None

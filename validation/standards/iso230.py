@@ -3,7 +3,7 @@
 Sources:
     ISO 230-2:2014, Test code for machine tools, part 2: determination of accuracy and
     repeatability of positioning of numerically controlled axes; clause 3 defines the
-    figures, coverage factor 2.
+    characteristics, with coverage factor 2.
 """
 
 from collections.abc import Sequence
@@ -44,9 +44,9 @@ def axis_figures(
     """Return the ISO 230-2 characteristics from repeated approaches to m positions.
 
     Args:
-        forward: for each position, at least two deviations [m or rad] on approach from
+        forward: at least two deviations [m or rad] at each position, approached from
             below.
-        backward: for each position, at least two deviations on approach from above.
+        backward: at least two deviations at each position, approached from above.
 
     Returns:
         The characteristics.
@@ -70,6 +70,6 @@ def axis_figures(
 
 
 def _moments(positions: Sequence[ArrayLike]) -> tuple[NDArray, NDArray]:
-    """Return the mean (m,) and the standard deviation (m,) at each position."""
+    """Return the mean and the standard deviation at each position, (m,) each."""
     rows = [np.asarray(row, dtype=float) for row in positions]
     return np.array([r.mean() for r in rows]), np.array([r.std(ddof=1) for r in rows])

@@ -3,19 +3,18 @@
 Sources:
     ISO 9283:1998, Manipulating industrial robots, performance criteria and related test
     methods: 7.2 (AP, RP), 7.3 (AD, RD), 7.6 (drift of AP).  The standard requires 30
-        cycles; these functions accept any number.
+        cycles, whereas these functions accept any number.
 """
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-# Number of cycles in a block.  AP of later blocks is compared with AP of the first
-# block.
+# Number of cycles per block in the computation of drift.
 DRIFT_CYCLES = 10
 
 
 def position_accuracy(deviations: ArrayLike) -> float:
-    """Return AP_P [m], the distance from the commanded to the mean attained position.
+    """Return AP_P [m], the distance between commanded and mean attained position.
 
     Args:
         deviations: (n, 3) [m] attained minus commanded positions.
@@ -41,25 +40,25 @@ def position_repeatability(deviations: ArrayLike) -> float:
 
 
 def orientation_accuracy(angles: ArrayLike) -> NDArray:
-    """Return AP_a, AP_b, AP_c (3,) [rad], the mean attained minus commanded angles.
+    """Return AP_a, AP_b, AP_c, the mean attained minus commanded angles.
 
     Args:
         angles: (n, 3) [rad] attained minus commanded angles.
 
     Returns:
-        The signed differences [rad].
+        The differences (3,) [rad].
     """
     return np.mean(np.asarray(angles, dtype=float), axis=0)
 
 
 def orientation_repeatability(angles: ArrayLike) -> NDArray:
-    """Return RP_a, RP_b, RP_c (3,) [rad]: three standard deviations of each angle.
+    """Return RP_a, RP_b, RP_c, which are three standard deviations of each angle.
 
     Args:
         angles: (n, 3) [rad] attained minus commanded angles, n >= 2.
 
     Returns:
-        Half-width of each range [rad].
+        Half of each range, (3,) [rad].
     """
     return 3 * np.std(np.asarray(angles, dtype=float), axis=0, ddof=1)
 
@@ -67,16 +66,16 @@ def orientation_repeatability(angles: ArrayLike) -> NDArray:
 def distance_accuracy(
     first: ArrayLike, second: ArrayLike, commanded: float
 ) -> tuple[float, float]:
-    """Return AD_P and RD [m] of the distance between two positions.
+    """Return accuracy and repeatability of the distance between two positions.
 
     Args:
-        first: (n, 3) [m] attained positions, one per cycle.
-        second: (n, 3) [m] attained positions, n >= 2.
+        first: (n, 3) [m] attained first positions in n >= 2 cycles.
+        second: (n, 3) [m] attained second positions.
         commanded: [m] commanded distance.
 
     Returns:
-        The mean attained minus commanded distance, and three standard deviations of the
-        distance.
+        AD_P [m], the mean attained minus commanded distance, and RD [m], three standard
+        deviations of the distance.
     """
     lengths = np.linalg.norm(np.asarray(first) - np.asarray(second), axis=1)
     return float(lengths.mean() - commanded), float(3 * lengths.std(ddof=1))
@@ -87,7 +86,7 @@ def accuracy_drift(deviations: ArrayLike, cycles: int = DRIFT_CYCLES) -> float |
 
     Args:
         deviations: (n, 3) [m] attained minus commanded positions, in measuring order.
-        cycles: number of cycles per block; an incomplete last block is ignored.
+        cycles: number of cycles per block.  An incomplete last block is ignored.
 
     Returns:
         The change [m]; None if there are fewer than two blocks.

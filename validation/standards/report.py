@@ -9,7 +9,7 @@ from forcefit.page.page import Page, Provenance, Tile, page, paragraph, section
 from forcefit.page.tables import Cell, Column, Value, table
 from forcefit.validation.standards.figures import PoseFigures, StandardFigures
 
-CYCLES = 30  # cycles that ISO 9283 requires for each pose
+CYCLES = 30  # number of cycles that ISO 9283 requires for each pose
 _LISTED = 20  # largest number of poses in a chart
 _ASSUMED = (
     "Every set of repeats is evaluated separately for each load and side of approach.",
@@ -53,7 +53,7 @@ def standards_page(figures: StandardFigures, provenance: Provenance) -> str:
 
 
 def _verdict(figures: StandardFigures) -> str:
-    """State the worst accuracy and repeatability over all poses."""
+    """Return a sentence with the worst accuracy and repeatability over all poses."""
     worst = [
         f"{words} {Value(max(known), unit).text}"
         for words, unit, known in (
@@ -63,7 +63,7 @@ def _verdict(figures: StandardFigures) -> str:
         if known
     ]
     if not worst:
-        return f"No position was measured twice at one of {len(figures.poses)} poses"
+        return f"No position was measured twice at any of {len(figures.poses)} poses"
     return f"Worst of {len(figures.poses)} poses: {' and '.join(worst)}"
 
 
@@ -74,7 +74,7 @@ def _known(figures: StandardFigures, key: str) -> list[float]:
 
 
 def _reservations(figures: StandardFigures) -> list[str]:
-    """State the limitations of the characteristics."""
+    """Return phrases on the limitations of the characteristics."""
     found = []
     fewest = min(pose.cycles for pose in figures.poses)
     if fewest < CYCLES:
@@ -111,7 +111,7 @@ def _tiles(figures: StandardFigures) -> list[Tile]:
 
 
 def _poses(figures: StandardFigures) -> str:
-    """Tabulate the ISO 9283 characteristics at every pose."""
+    """Return charts and a table of the ISO 9283 characteristics at every pose."""
     turns = [f"{kind} about {axis}" for kind in ("AP", "RP") for axis in "xyz"]
     head: list[str | Column] = [
         "pose", Column("cycles"), *(Column(name, "rad") for name in turns),
@@ -146,7 +146,7 @@ def _number(value: float | None) -> float:
 
 
 def _distances(figures: StandardFigures) -> str:
-    """Tabulate the distances between poses; return an empty text if there are none."""
+    """Return a table of the distances between poses, or an empty string."""
     rows: Cells = [
         [f"{a} to {b}", one.commanded, one.accuracy, one.repeatability]
         for one in figures.distances
@@ -162,13 +162,13 @@ def _distances(figures: StandardFigures) -> str:
 
 
 def _axes(figures: StandardFigures) -> str:
-    """Tabulate the readings approached from both sides, if there are any."""
+    """Return a table of the ISO 230-2 characteristics, or an empty string."""
     if not figures.axes:
         return ""
     rows: Cells = []
     for name, axis in figures.axes.items():
         unit, values = "rad" if name.startswith("r") else "m", asdict(axis)
         rows.append([name, *(Value(values[key], unit) for key in _AXIS_WORDS)])
-    text = paragraph("Readings approached from both sides, coverage factor 2.")
+    text = paragraph("Components approached from both directions, coverage factor 2.")
     head = ["reading", *_AXIS_WORDS.values()]
     return section("Axes, ISO 230-2", text, table(head, rows, "axes"))

@@ -1,4 +1,4 @@
-"""ISO 9283 and ISO 230-2 characteristics, compared with hand calculations."""
+"""Tests of ISO 9283 and ISO 230-2 characteristics against hand calculations."""
 
 import json
 
@@ -21,7 +21,7 @@ from tests.pages_for_tests import parse, tiles
 
 
 def test_pose_accuracy_and_repeatability_equal_hand_calculation():
-    """Barycentre (3, 4, 0): AP = 5; l = 1, 1, 2, 2: mean 1.5, S = sqrt(1/3)."""
+    """The mean position is (3, 4, 0), and the distances from it are 1, 1, 2 and 2."""
     d = np.array([[4, 4, 0], [2, 4, 0], [3, 6, 0], [3, 2, 0]], dtype=float)
     assert position_accuracy(d) == pytest.approx(5.0, rel=1e-15)
     expected = 1.5 + 3 * np.sqrt(1 / 3)
@@ -36,7 +36,7 @@ def test_orientation_accuracy_and_repeatability_equal_hand_calculation():
 
 
 def test_distance_accuracy_equals_hand_calculation():
-    """Distances 5, 7, 6 for a commanded distance of 5.5: AD = 0.5, S = 1."""
+    """The distances are 5, 7 and 6 for a commanded distance of 5.5."""
     first = np.zeros((3, 3))
     second = [[3, 4, 0], [0, 0, 7], [6, 0, 0]]
     accuracy, repeatability = distance_accuracy(first, second, 5.5)
@@ -52,11 +52,10 @@ def test_drift_is_the_largest_change_from_the_first_block():
 
 
 def test_reversal_and_repeatability_of_an_axis_equal_hand_calculation():
-    """Two positions, three approaches a side; s = 1 and 2 up, 1 and 0 down.
+    """Two positions are approached three times from each direction.
 
-    Means up 1, 4; down 0, 6.  B_i = 1, -2: B = 2, mean -0.5.  R up = 4 x 2, down 4 x 1;
-    R_1 = max(2 + 2 + 1, 4, 4) = 5, R_2 = max(4 + 0 + 2, 8, 0) = 8.  E = 6 - 0,
-    M = 5 - 0.5, A = max(3, 8, 2, 6) - min(-1, 0, -2, 6).
+    The means are 1 and 4 upward, 0 and 6 downward.  The standard deviations are 1 and 2
+    upward, 1 and 0 downward.
     """
     figures = axis_figures([[0, 1, 2], [2, 4, 6]], [[-1, 0, 1], [6, 6, 6]])
     assert figures.reversal == pytest.approx(2)
@@ -73,13 +72,12 @@ HEAD = "id,q.one,q.two,meas.tx,meas.ty,meas.tz,cov.time,cov.approach"
 
 
 def campaign(tmp_path, rows):
-    """A folder of the two-joint arm with these rows."""
+    """Write a campaign of the two-joint arm and return its folder."""
     return write_campaign(tmp_path / "lab", head=HEAD, rows=rows)
 
 
-def test_iso_command_reports_the_figures_of_the_standards(run, tmp_path):
-    """The arm of 1 m and 0.8 m, stretched along x and along y:
-    poses 1.8 sqrt(2) m apart."""
+def test_iso_command_reports_characteristics_of_both_standards(run, tmp_path):
+    """The arm of length 1.8 m is stretched along x and along y."""
     quarter = repr(np.pi / 2)
     rows = [
         f"{name}{k}{side},{angle},0,{x + side * 1e-5 + k * 1e-6},0,0,{t},{side}"
@@ -98,14 +96,14 @@ def test_iso_command_reports_the_figures_of_the_standards(run, tmp_path):
     poses = {pose["label"]: pose for pose in table["iso_9283"]["poses"]}
     assert set(poses) == {"a01", "a0-1", "b01", "b0-1"}
     assert poses["a01"]["accuracy"] == pytest.approx(1e-4 + 1e-5 + 1e-6, rel=1e-9)
-    # l = 1, 0, 1 um: mean 2/3, S = sqrt(1/3)
+    # the distances from the mean position are 1, 0 and 1 um
     spread = (2 / 3 + 3 * np.sqrt(1 / 3)) * 1e-6
     assert poses["a01"]["repeatability"] == pytest.approx(spread, rel=1e-6)
     pair = next(
         p for p in table["iso_9283"]["distances"] if p["labels"] == ["a01", "b01"]
     )
     assert pair["commanded"] == pytest.approx(1.8 * np.sqrt(2), rel=1e-12)
-    # b moves by 1e-4 in x away from a's own shift: towards a along the line by cosine
+    # b moves by 1e-4 m more than a along x, at 45 degrees to the line between them
     assert pair["accuracy"] == pytest.approx(-1e-4 / np.sqrt(2), rel=1e-3)
     axis = table["iso_230_2"]["tx"]
     assert axis["reversal"] == pytest.approx(2e-5, rel=1e-9)
@@ -114,7 +112,7 @@ def test_iso_command_reports_the_figures_of_the_standards(run, tmp_path):
 
 
 def shown(run, folder, registration):
-    """The page of three readings of a pose, of 1, 2 and 3 times 1e-5 m."""
+    """Return the page for a pose with the readings 1e-5, 2e-5 and 3e-5 m."""
     rows = [f"a{k},0,0,{k}e-5,0,0,{k},1" for k in (1, 2, 3)]
     toml = {"registration": f'"{registration}"'}
     write_campaign(folder / "lab", head=HEAD, rows=rows, toml=toml)
@@ -127,7 +125,7 @@ def shown(run, folder, registration):
 
 
 def test_iso_report_shows_accuracy_and_repeatability_of_the_poses(run, tmp_path):
-    """AP is 2e-5 m; the distances are 1, 0 and 1e-5 m: RP 2/3 + 3 sqrt(1/3)."""
+    """The distances from the mean position 2e-5 m are 1e-5, 0 and 1e-5 m."""
     text = shown(run, tmp_path, "known")
     (row,) = parse(text).table("pose", "cycles")[1:]
     assert row[1].value == 3
@@ -137,7 +135,7 @@ def test_iso_report_shows_accuracy_and_repeatability_of_the_poses(run, tmp_path)
 
 
 @pytest.mark.parametrize("registration", ["known", "unknown"])
-def test_iso_report_has_a_reservation_for_few_cycles(run, tmp_path, registration):
+def test_iso_report_warns_of_too_few_cycles(run, tmp_path, registration):
     """ISO 9283 requires 30 cycles."""
     text = shown(run, tmp_path, registration)
     assert "<p class='verdict mixed'>" in text
@@ -154,7 +152,7 @@ def test_iso_command_rejects_a_campaign_without_repeats(run, tmp_path):
 
 
 def test_repeatability_does_not_depend_on_the_device_frame(tmp_path, rng):
-    """Rotated and shifted readings have the same RP and distances."""
+    """The deviations are rotated and translated."""
     d = rng.normal(size=(30, 3))
     Q = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     assert position_repeatability(d @ Q + 5) == pytest.approx(position_repeatability(d))
@@ -165,7 +163,7 @@ def test_repeatability_does_not_depend_on_the_device_frame(tmp_path, rng):
 
 
 def distances(folder):
-    """Ids of each pair, and its AD_P [m]."""
+    """Return a mapping from the ids of two poses to their AD_P [m]."""
     figures = standard_figures(read_campaign(folder))
     return {pair.labels: pair.accuracy for pair in figures.distances}
 
@@ -173,8 +171,8 @@ def distances(folder):
 TWO_POSES = [("a", "0"), ("b", repr(np.pi / 2))]
 
 
-def test_distance_accuracy_pairs_poses_of_one_load_only(tmp_path):
-    """A load moves both poses by 1 mm: every distance is the commanded one."""
+def test_distances_are_computed_separately_for_each_load(tmp_path):
+    """A load moves both poses by 1 mm, so the distances equal the commanded ones."""
     rows = [
         f"{name}{fx}{k},{angle},0,{0.001 * (fx > 0)},0,0,{fx}"
         for name, angle in TWO_POSES for fx in (0, 100) for k in range(2)
@@ -184,8 +182,8 @@ def test_distance_accuracy_pairs_poses_of_one_load_only(tmp_path):
     assert found == pytest.approx({("a00", "b00"): 0, ("a1000", "b1000"): 0}, abs=1e-15)
 
 
-def test_distance_accuracy_pairs_poses_of_one_session_only(tmp_path):
-    """In the second session the device is 2 m elsewhere."""
+def test_distances_are_computed_separately_for_each_session(tmp_path):
+    """The device is displaced by 2 m in the second session."""
     rows = [
         f"{name}{day}{k},{day},{angle},0,{shift},0,0"
         for name, angle in TWO_POSES
@@ -199,9 +197,8 @@ def test_distance_accuracy_pairs_poses_of_one_session_only(tmp_path):
     assert np.abs(list(found.values())).max() < 1e-15
 
 
-def test_positioning_of_an_axis_is_separate_for_each_load(tmp_path):
-    """A deflection of 1 mm under a load is not a deviation along the axis:
-    E = 20 um."""
+def test_axis_characteristics_are_computed_separately_for_each_load(tmp_path):
+    """The deflection of 1 mm under a load must not increase the deviation of 20 um."""
     rows = [
         f"{name}{fx}{side}{k},{angle},0,{1e-5 * (fx + side)},0,0,{side},{fx}"
         for name, angle in TWO_POSES
