@@ -1,4 +1,4 @@
-"""Estimate the errors in pose and stiffness caused by each modelling assumption.
+"""Compute the errors in pose and stiffness that each modelling assumption causes.
 
 Start with ``assumptions.py``.
 """

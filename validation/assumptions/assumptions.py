@@ -40,10 +40,10 @@ def assumption_costs(
     gravity: ArrayLike | None = None,
     solids: bool = False,
 ) -> dict[str, Cost | str]:
-    """Return the error caused by each modelling assumption at one posture.
+    """Return the error that each modelling assumption causes at one posture.
 
-    The error of linearised closures is computed without clearances, because only then
-    is the platform pose unique.
+    The error of linearised closures is computed without clearances, so that the
+    platform pose is unique.
 
     Args:
         posture: the robot's configuration.
@@ -76,13 +76,13 @@ def assumption_costs(
 
 
 class _NotApplicable(Exception):
-    """Exception raised if an assumption does not apply or its error is unknown."""
+    """Exception raised if the error of an assumption is unknown."""
 
 
 def _pieces_cost(
     posture: Posture, load: ArrayLike | None, gravity: ArrayLike | None
 ) -> Cost:
-    """Return the error of replacing each beam by one spring."""
+    """Return the error of replacing each beam by a single spring."""
     if not any(isinstance(frame.link, BeamLink) for frame in posture.robot.frames):
         raise _NotApplicable("no beam")
     unloaded = load is None and gravity is None and not driven(posture.robot)
@@ -94,7 +94,7 @@ def _pieces_cost(
 def _weight_cost(
     posture: Posture, gravity: ArrayLike | None, load: ArrayLike | None
 ) -> Cost:
-    """Return the error of lumping the weight of a link at its two ends."""
+    """Return the error of replacing the weight of a link by loads at its ends."""
     if gravity is None or not energy_between_ends(posture, gravity):
         raise _NotApplicable("there is no gravity, or no beam has a density")
     return spread_cost(posture, gravity, load)
@@ -118,14 +118,14 @@ def stiffness_costs(
     """Return the errors in platform stiffness caused by beam theory.
 
     Args:
-        postures: configurations of one robot, at least one.
+        postures: one or more configurations of a robot.
         solids: whether to mesh the links.
 
     Returns:
         The errors, or the reason why they are unknown.
 
     Raises:
-        BadInput: a surface or an interface is unusable.
+        BadInput: a surface or an interface cannot be used.
     """
     if not solids:
         return _NOT_MESHED

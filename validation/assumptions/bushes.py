@@ -1,17 +1,16 @@
-"""Model a pin in two bushes instead of bounding translation and tilt independently.
+"""Model a pin in two bushes instead of independent bounds on translation and tilt.
 
-The paper bounds a pin's radial clearance |(TX, TY)| <= c and its tilt |(RX, RY)| <= t
-independently.  A pin in two bushes of clearance c, at z = +-h with h = c / t, is
-bounded by the position of its axis there:
+In the paper, the translation |(TX, TY)| <= c and the tilt |(RX, RY)| <= t of a pin have
+independent bounds.  For a pin in two bushes of clearance c, at z = +-h with h = c / t,
+the position of the pin's axis is bounded in each bush:
 
-    |(TX + h RY, TY - h RX)| <= c   and   |(TX - h RY, TY + h RX)| <= c,
+    |(TX + h RY, TY - h RX)| <= c   and   |(TX - h RY, TY + h RX)| <= c
 
-Each bound confines the pin's axis to a circle in one bush, so that a pin translated by
-c cannot tilt.  A motion that satisfies the paper's bounds with half the clearances also
-satisfies the bounds of the bushes.  A motion that satisfies the bounds of the bushes
-also satisfies the paper's bounds.  Therefore the energy with bushes is at least the
-energy with the paper's bounds, and at most the energy with half the clearances.  The
-zone margin with bushes is at most twice the margin with the paper's bounds.
+A motion that satisfies these bounds also satisfies the paper's bounds.  A motion that
+satisfies the paper's bounds with half the clearances satisfies these bounds.  Therefore
+the energy with bushes is at least the energy with the paper's bounds, and at most the
+energy with half the clearances.  The zone margin with bushes is at most twice the
+margin with the paper's bounds.
 """
 
 from dataclasses import replace
@@ -27,17 +26,16 @@ from forcefit.assembly.linear.reference.energy import solve_with
 
 
 def bush_joints(joints: VirtualJoints) -> VirtualJoints:
-    """Return virtual joints with each radially loose, tilting pin held in two bushes.
+    """Return virtual joints with two bushes for each pin with clearance and tilt.
 
     Args:
         joints: virtual joints with the paper's bounds.
 
     Returns:
-        The virtual joints, with bush columns in place of the paper's columns.
+        The virtual joints with the bounds of bushes.
     """
     cones = joints.cones.copy()
-    # Each column of a bounded clearance contains one nonzero entry, the inverse of its
-    # bound.
+    # Each column contains a single nonzero entry, the inverse of a bound.
     rows = np.abs(joints.cones).argmax(axis=0)
     column = {int(row): k for k, row in enumerate(rows)}
     for i in range(len(joints.robot.frames)):
@@ -54,11 +52,11 @@ def bush_joints(joints: VirtualJoints) -> VirtualJoints:
 
 
 def solve_bushes(posture: Posture, load: ArrayLike | None = None) -> Assembly:
-    """Return the minimum-energy assembly with each pin held in two bushes.
+    """Return the minimum-energy assembly with each pin in two bushes.
 
     Args:
-        posture: the robot's configuration; limits of passive joints are ignored.
-        load: (6,) [N m, N] on the platform at its origin, base axes.
+        posture: the robot's configuration.  Limits of passive joints are ignored.
+        load: (6,) [N m, N] load on the platform at its origin, base axes.
 
     Returns:
         The assembly.  Its ``clearance_excess`` is computed with the paper's bounds.

@@ -1,4 +1,4 @@
-"""Create report pages of the errors that the model's assumptions cause."""
+"""Create report pages of the errors that modelling assumptions cause."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -15,10 +15,10 @@ from forcefit.validation.assumptions.validity import ENERGY_LIMIT, POSITION_LIMI
 
 _LIMITS = f"{1e6 * POSITION_LIMIT:g} µm or {100 * ENERGY_LIMIT:g} %"
 _ASSUMED = (
-    "Each assumption is compared alone with a model that does not make it.",
+    "Each assumption is tested separately against a model without this assumption.",
     "Poses are compared at the minimum-energy solution.",
-    f"An error is significant above {_LIMITS} of the energy, the accuracy required of "
-    "the paper's robot.",
+    f"An error is significant above {_LIMITS} of the energy.  The limit of the position "
+    "is the required accuracy of the IRSBot-2.",
 )
 _HALVES = (("rotation", "rad"), ("position", "m"))
 _LISTED = 20  # largest number of links in a chart
@@ -59,7 +59,7 @@ def costs_page(
 
 
 def _known(costs: CostsOverPoses) -> dict[str, list[tuple[Mapping[str, float], Cost]]]:
-    """Return the poses and errors of each assumption whose error is known."""
+    """Return the poses and known errors of each assumption."""
     pairs = {
         name: [
             (pose, cost)
@@ -72,7 +72,7 @@ def _known(costs: CostsOverPoses) -> dict[str, list[tuple[Mapping[str, float], C
 
 
 def _significant(costs: CostsOverPoses) -> list[str]:
-    """Return the assumptions with a significant error at one or more poses."""
+    """Return the assumptions that have a significant error at a pose."""
     return [
         name for name, found in _known(costs).items()
         if any(cost.matters for _, cost in found)
@@ -80,7 +80,7 @@ def _significant(costs: CostsOverPoses) -> list[str]:
 
 
 def _verdict(costs: CostsOverPoses) -> str:
-    """State which assumptions cause significant errors."""
+    """Return a sentence on the assumptions that cause significant errors."""
     known, found = len(_known(costs)), _significant(costs)
     if not known:
         return "No error is known: there is nothing to compare."
@@ -122,7 +122,7 @@ def _tiles(costs: CostsOverPoses) -> list[Tile]:
 
 
 def _assumptions(costs: CostsOverPoses) -> list[str]:
-    """Tabulate the largest error of each assumption, or why it is unknown."""
+    """Return a table of the largest errors and a table of unknown errors."""
     known = _known(costs)
     rows: Cells = []
     for name, found in known.items():
@@ -163,7 +163,7 @@ def _assumptions(costs: CostsOverPoses) -> list[str]:
 
 
 def _platform(costs: CostsOverPoses) -> list[str]:
-    """Tabulate the relative differences in platform compliance."""
+    """Return a table of the relative differences in platform compliance."""
     platform = costs.platform
     if isinstance(platform, str):
         return [paragraph(f"Not known: {platform}.")]
@@ -190,7 +190,7 @@ def _platform(costs: CostsOverPoses) -> list[str]:
 
 
 def _poses(costs: CostsOverPoses) -> str:
-    """Tabulate the errors at every pose; return an empty text for a single pose."""
+    """Return a table of the errors at every pose, or an empty string for one pose."""
     if len(costs.asked) < 2:
         return ""
     head = ["pose [m, rad]", *(f"{name}, position" for name in costs.assumptions)]
@@ -202,12 +202,12 @@ def _poses(costs: CostsOverPoses) -> str:
 
 
 def _position(cost: Cost | str) -> Cell:
-    """Format the position error, or return a dash if it is unknown."""
+    """Return the position error, or a dash if it is unknown."""
     return "-" if isinstance(cost, str) else Value(cost.position, "m", 3)
 
 
 def _unreached(costs: CostsOverPoses) -> Sequence[str]:
-    """Tabulate the unreachable poses and the reasons."""
+    """Return a table of the unreachable poses with the reasons."""
     rows = [
         [pose_text(pose), why]
         for pose, why in zip(costs.asked, costs.unreached, strict=True) if why

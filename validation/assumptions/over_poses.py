@@ -25,12 +25,12 @@ class CostsOverPoses:
 
     Attributes:
         robot: robot with its geometric errors.
-        asked: for each of the k requested poses, the prescribed pose components [m or
-            rad].
-        unreached: (k,) reason why a pose is unreachable; empty if it is reachable.
-        costs: error of each assumption at each of the r reached poses, or the reason
-            why it is unknown.
-        platform: errors in platform stiffness at the reached poses, or the reason why
+        asked: prescribed components [m or rad] of each requested pose.
+        unreached: reason why each requested pose is unreachable; empty if it is
+            reachable.
+        costs: error of each assumption at each reachable pose, or the reason why it is
+            unknown.
+        platform: errors in platform stiffness at the reachable poses, or the reason why
             they are unknown.
     """
 
@@ -44,7 +44,7 @@ class CostsOverPoses:
 
     @property
     def reached(self) -> tuple[Mapping[str, float], ...]:
-        """Prescribed pose components of the r reached poses."""
+        """Prescribed components of each reachable pose."""
         return tuple(
             asked
             for asked, why in zip(self.asked, self.unreached, strict=True)
@@ -58,7 +58,7 @@ class CostsOverPoses:
 
     @property
     def known(self) -> bool:
-        """Whether any error was computed at any pose."""
+        """Whether at least one error is known."""
         return isinstance(self.platform, PlatformCosts) or any(
             isinstance(cost, Cost) for at in self.costs for cost in at.values()
         )
@@ -82,7 +82,7 @@ def costs_over_poses(
         solids: whether to compare the links with meshed solids.  Meshes are computed
             once for all poses.
         progress: function called after each pose with the number of finished poses and
-            the total.
+            the number of all poses.
 
     Returns:
         The errors of all assumptions at every pose.

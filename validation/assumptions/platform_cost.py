@@ -1,25 +1,22 @@
 r"""Compute the error in platform stiffness caused by modelling links as beams.
 
-Four models of one robot are compared at many postures.  All clearances and geometric
-errors are zero:
+Four models of a robot are compared at many postures, without clearances and geometric
+errors:
 
 ==============  ==================================================================
 model           stiffness of the links
 ==============  ==================================================================
 beams           virtual joints with the K_E that the robot declares
-meshed          virtual joints with K_E by finite elements, ends held rigidly
-solids          the finite elements themselves, both ends free to move: the
-                displacement method over all bodies, without virtual joints
-spread          virtual joints with K_E of the same mesh, wrenches spread over ends
+meshed          virtual joints with K_E by finite elements and rigid ends
+solids          finite elements with two movable ends, without virtual joints
+spread          virtual joints with K_E of the same mesh and distributed wrenches
 ==============  ==================================================================
 
 The models ``meshed`` and ``solids`` must agree up to round-off, because static
-condensation is exact if joints hold the ends rigidly.  The difference between
-``spread`` and ``meshed`` is the error of assuming rigid ends.  A real interface lies
-between these two models.  Each difference is the largest relative difference of the
-compliance over all directions of the wrench.  This measure is independent of reference
-point and reference length.  The stiffness of a link does not depend on the pose, so
-each link is meshed once, and computing one pose then takes milliseconds.
+condensation is exact for rigid ends.  The stiffness of a real interface is between
+those of ``meshed`` and ``spread``.  Each difference is the largest relative difference
+of the compliance over all wrenches, which does not depend on reference point and
+reference length.
 """
 
 from collections.abc import Mapping, Sequence
@@ -37,8 +34,7 @@ from forcefit.assembly.platform_stiffness.platform_stiffness import platform_sti
 from forcefit.stiffness.screws import screw_map
 from forcefit.validation.assumptions.solid_links import SolidLink, solid_links
 
-# [-] Singular values that are smaller than this fraction of the largest one count as
-# zero.
+# [-] Fraction of the largest singular value below which a singular value is set to 0.
 _RANK = 1e-9
 
 
@@ -54,17 +50,14 @@ class PlatformCosts:
 
     Attributes:
         beams: (k,) [-] difference between the models ``beams`` and ``solids``.
-        meshed: (k,) [-] difference between the models ``meshed`` and ``solids``, caused
-            by round-off.
-        ends: (k,) [-] difference between the models ``meshed`` (rigid ends) and
-            ``spread`` (wrenches distributed over the ends).
-        by_link: for each link, (k,) [-] difference between two robots: one with only
-            this link modelled as a beam, and one with all links as solids.  The link
-            with the largest difference is first.
-        left: names of links without a known shape, whose declared stiffness is used in
-            all four models.
-        mesh_error: [-] estimated largest error of a solid's K_E, each entry divided by
-            sqrt(K_ii K_jj).  Discretisation can cause differences up to this size.
+        meshed: (k,) [-] difference between the models ``meshed`` and ``solids``.
+        ends: (k,) [-] difference between the models ``meshed`` and ``spread``.
+        by_link: mapping from link to the difference (k,) [-] caused by modelling only
+            this link as a beam.  The link with the largest difference is first.
+        left: names of links without a known shape.  Their declared stiffness is used in
+            all models.
+        mesh_error: [-] estimated largest error of the entries of a solid's K_E, divided
+            by sqrt(K_ii K_jj).
     """
 
     beams: NDArray
@@ -79,7 +72,7 @@ def platform_costs(postures: Sequence[Posture]) -> PlatformCosts:
     """Compare the platform stiffness for links modelled as beams and as solids.
 
     Args:
-        postures: configurations of one robot, at least one.
+        postures: one or more configurations of a robot.
 
     Returns:
         The relative errors at each pose.
@@ -121,7 +114,7 @@ def platform_costs(postures: Sequence[Posture]) -> PlatformCosts:
 def _compliances(
     postures: Sequence[Posture], stiffness: Mapping[str, NDArray]
 ) -> NDArray:
-    """Return compliances (k, 6, 6); ``stiffness`` overrides K_E of some links."""
+    """Return the platform compliances for given K_E of links, (k, 6, 6)."""
     links = {name: MatrixLink(K) for name, K in stiffness.items()}
     robot = postures[0].robot.with_links({**links})
     linked = [replace(posture, robot=robot) for posture in postures]
@@ -129,7 +122,7 @@ def _compliances(
 
 
 def _differences(C: NDArray, other: NDArray) -> NDArray:
-    """Return the largest relative differences (k,); NaN where unknown."""
+    """Return the largest relative difference at each pose, (k,); NaN if unknown."""
     known = np.isfinite(C).all(axis=(1, 2)) & np.isfinite(other).all(axis=(1, 2))
     values = np.full(len(C), np.nan)
     for i in np.flatnonzero(known):
@@ -138,14 +131,14 @@ def _differences(C: NDArray, other: NDArray) -> NDArray:
 
 
 def difference(C: NDArray, other: NDArray) -> float:
-    """Return the largest relative difference of two compliances over all wrenches.
+    """Return the largest relative difference between two compliances.
 
     Args:
         C: (6, 6) compliance, symmetric and positive semidefinite.
         other: (6, 6) reference compliance.
 
     Returns:
-        [-] the maximum of abs(w.C w / w.C_other w - 1) over all wrenches w.
+        The maximum of abs(w.C w / w.C_other w - 1) over all wrenches w [-].
     """
     size = np.sqrt(np.diag(other))
     size = np.where(size > 0.0, size, 1.0)
@@ -160,16 +153,15 @@ def solid_compliance(posture: Posture, solids: Mapping[str, SolidLink]) -> NDArr
     """Return the platform compliance with solid links, by the displacement method.
 
     The unknowns are the displacement of each link's tip relative to its base, the
-    deformations of joint springs, and the motions of free joints.  The elastic energy
-    of a solid depends on the displacements of both its ends.
+    deformations of joint springs, and the motions of free joints.
 
     Args:
-        posture: the robot's configuration; clearances are taken as zero.
-        solids: solids by frame name; the links of all other frames are springs with
-            stiffness K_E.
+        posture: the robot's configuration.  Its clearances are ignored.
+        solids: mapping from frame to solid.  Other links are springs with stiffness
+            K_E.
 
     Returns:
-        (6, 6) [rad/(N m) .. m/N] compliance at the platform's origin, in base axes.
+        Compliance at the platform's origin in base axes, (6, 6) [rad/(N m) .. m/N].
     """
     robot, T = posture.robot, posture.transforms
     joints, count = virtual_joints(robot), len(robot.frames)
@@ -179,7 +171,7 @@ def solid_compliance(posture: Posture, solids: Mapping[str, SolidLink]) -> NDArr
     other = np.ones(joints.elastic.shape[1], dtype=bool)
     owner = np.abs(joints.elastic).argmax(axis=0) // 6
     other[joints.links & np.isin(owner, rows)] = False
-    # Columns are ordered as: springs other than solids, free joints, ends of solids.
+    # The columns are other springs, free joints and ends of solids, in this order.
     columns = np.hstack([joints.elastic[:, other], joints.free])
     steps = columns.reshape(count, 6, columns.shape[1])
     first = steps.shape[2]
@@ -196,8 +188,7 @@ def solid_compliance(posture: Posture, solids: Mapping[str, SolidLink]) -> NDArr
     springs = int(other.sum())
     K[:springs, :springs] = np.eye(springs)
     for i, solid in zip(rows, solids.values(), strict=True):
-        # The frame's own joint moves the part that follows the solid's tip in the
-        # chain.
+        # The joint of the frame follows the tip of the solid in the chain.
         own = steps[i].copy()
         own[:, :first] = 0.0
         turn = T[i, :3, :3] @ solid.turn
@@ -213,7 +204,7 @@ def solid_compliance(posture: Posture, solids: Mapping[str, SolidLink]) -> NDArr
 
 
 def _closed(robot: Robot, ends: NDArray) -> NDArray:
-    """Return an orthonormal basis of the motions that preserve loop closure."""
+    """Return an orthonormal basis of the motions that do not open the loops."""
     pairs = [
         ends[robot.index(one)] - ends[robot.index(two)] for one, two in robot.closures
     ]
@@ -228,7 +219,7 @@ def _closed(robot: Robot, ends: NDArray) -> NDArray:
 
 
 def _loaded(K: NDArray, basis: NDArray, platform: NDArray) -> NDArray:
-    """Return the platform compliance (6, 6), ignoring unresisted motions."""
+    """Return the platform compliance (6, 6) without unresisted motions."""
     H, moved = basis.T @ K @ basis, platform @ basis
     size = np.sqrt(np.diag(H))
     size[size == 0.0] = 1.0

@@ -12,7 +12,7 @@ from forcefit.validation.assumptions.report import COMPARED
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_BARS = 12  # largest number of links shown; links with smaller errors are omitted
+_BARS = 12  # largest number of links in the figure
 
 
 def platform_cost_figure(
@@ -22,13 +22,13 @@ def platform_cost_figure(
 
     Args:
         costs: errors at k poses.
-        asked: for each of the k poses, the prescribed pose components [m or rad].
+        asked: prescribed components [m or rad] of each pose.
         robot: name of the robot.
 
     Returns:
-        The figure.  Curves show the errors over the varied pose component, or over the
-        pose index.  Bars show the median and the largest error of each link.  For a
-        single pose, the figure contains only the bars.
+        The figure.  Bars show the median and the largest error of each link.  For
+        several poses, curves show the errors over the varied pose component or over the
+        pose index.
     """
     from matplotlib.figure import Figure
 

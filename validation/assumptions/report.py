@@ -13,19 +13,19 @@ from forcefit.validation.assumptions.over_poses import CostsOverPoses
 from forcefit.validation.assumptions.platform_cost import PlatformCosts
 from forcefit.validation.assumptions.validity import ENERGY_LIMIT, POSITION_LIMIT, Cost
 
-# Each error in platform compliance is the difference between these two models.
+# Names of the compared models for each error in platform compliance.
 COMPARED = {
     "beams": "beams, not solids",
     "meshed": "meshed K_E, not solids",
     "ends": "rigid ends, compared with wrenches spread over them",
 }
 _LIMITS = {"position": POSITION_LIMIT, "energy": ENERGY_LIMIT}
-_NAMED = 3  # largest number of links named in the text
+_NAMED = 3  # largest number of links in the text
 _Pose = Mapping[str, float]
 
 
 def costs_table(costs: CostsOverPoses) -> dict[str, Any]:
-    """Return each error at one pose in rad, m and [-], or why it is unknown."""
+    """Return the errors at one pose, or the reasons why they are unknown."""
     return {
         "robot": costs.robot.name, "pose": costs.asked[0], "limits": _LIMITS,
         **_at(costs, 0),
@@ -33,7 +33,7 @@ def costs_table(costs: CostsOverPoses) -> dict[str, Any]:
 
 
 def over_poses_table(costs: CostsOverPoses) -> dict[str, Any]:
-    """Return the errors at every pose, with their median and maximum."""
+    """Return the errors at every pose, their medians and their maxima."""
     poses: list[dict[str, Any]] = []
     for asked, why in zip(costs.asked, costs.unreached, strict=True):
         row: dict[str, Any] = {"asked": asked, "status": "ok"}
@@ -64,7 +64,7 @@ def _at(costs: CostsOverPoses, i: int) -> dict[str, Any]:
 
 
 def _values(cost: Cost | str) -> dict[str, Any]:
-    """Return one error as plain values, or the reason why it is unknown."""
+    """Return an error as plain values, or the reason why it is unknown."""
     if isinstance(cost, str):
         return {"reason": cost}
     values = {k: v for k, v in vars(cost).items() if v is not None}
@@ -72,7 +72,7 @@ def _values(cost: Cost | str) -> dict[str, Any]:
 
 
 def _platform(costs: PlatformCosts, shown: Callable[[NDArray], Any]) -> dict[str, Any]:
-    """Return the errors [-] in platform compliance, maximised over all wrenches."""
+    """Return the largest errors in platform compliance over all wrenches."""
     return {
         "compliance": {name: shown(getattr(costs, name)) for name in COMPARED},
         "by_link": {name: shown(values) for name, values in costs.by_link.items()},
@@ -81,7 +81,7 @@ def _platform(costs: PlatformCosts, shown: Callable[[NDArray], Any]) -> dict[str
 
 
 def spread(values: NDArray, where: Sequence[_Pose]) -> dict[str, Any]:
-    """Return median and maximum of the finite values, and the pose of the maximum."""
+    """Return the median of finite values, their maximum, and its pose."""
     known = np.isfinite(values)
     if not known.any():
         return {"median": np.nan, "largest": np.nan, "at": None}
@@ -92,7 +92,7 @@ def spread(values: NDArray, where: Sequence[_Pose]) -> dict[str, Any]:
 
 
 def _summary(costs: CostsOverPoses, name: str) -> dict[str, Any]:
-    """Summarise the errors of one assumption over all poses."""
+    """Return a summary of the errors of one assumption over all poses."""
     pairs = [
         (asked, at[name]) for asked, at in zip(costs.reached, costs.costs, strict=True)
     ]
@@ -127,7 +127,7 @@ def costs_text(costs: CostsOverPoses) -> str:
 
 
 def over_poses_text(costs: CostsOverPoses) -> str:
-    """Format median and largest error of each assumption, one line each."""
+    """Format the median and largest error of each assumption as text."""
     count = len(costs.reached)
     lines = [
         f"{costs.robot.name}: errors due to the model's assumptions over {count} of "

@@ -2,9 +2,9 @@
 
 The solid of a beam is a straight bar with the cross-section of the beam.  The stiffness
 of a bar of unit length and unit modulus depends only on the proportions of the
-cross-section and on Poisson's ratio, so links of equal proportions are solved only
-once.  Two versions of K_E are computed: with rigidly held ends, as for virtual joints,
-and with wrenches distributed over the ends.
+cross-section and on Poisson's ratio, so links of equal proportions are solved once.
+K_E is computed with rigid ends, as for virtual joints, and with wrenches distributed
+over the ends.
 """
 
 from collections.abc import Mapping
@@ -23,7 +23,7 @@ from forcefit.stiffness.fem.material import Material
 from forcefit.stiffness.fem.two_ends import two_ends
 from forcefit.stiffness.link import scaled
 
-_KEPT = 32  # largest number of cross-section shapes in the cache
+_KEPT = 32  # largest number of cross-sections in the cache
 _OPTIONS = FemOptions(
     # At this accuracy, the error of K_E is below 1e-3 of sqrt(K_ii K_jj).
     accuracy=5e-4,
@@ -36,13 +36,13 @@ class SolidLink:
     """Stiffness matrices of a link modelled as a solid, in the axes of its mesh.
 
     Attributes:
-        ends: (12, 12) [N m/rad .. N/m] stiffness of both ends: the wrenches at the
-            centres of base and tip that cause unit displacements of base and tip.
-        distributing: (6, 6) [N m/rad .. N/m] K_E at the tip if the wrenches are
-            distributed over both ends.
+        ends: (12, 12) [N m/rad .. N/m] stiffness matrix of base and tip, at the centres
+            of their interfaces.
+        distributing: (6, 6) [N m/rad .. N/m] K_E at the tip for wrenches distributed
+            over both ends.
         span: (3,) [m] vector from base to tip.
-        turn: (3, 3) rotation from the axes of the mesh to the axes of the frame.
-        error: [-] estimated largest error of the mesh's K_E, each entry divided by
+        turn: (3, 3) rotation matrix from mesh axes to frame axes.
+        error: [-] estimated largest error of the entries of the mesh's K_E, divided by
             sqrt(K_ii K_jj).
     """
 
@@ -54,12 +54,12 @@ class SolidLink:
 
     @property
     def condensed(self) -> NDArray:
-        """(6, 6) K_E at the frame, in its axes, with the base fixed."""
+        """K_E with rigid ends at the frame in its axes, (6, 6)."""
         return self._in_frame(self.ends[6:, 6:])
 
     @property
     def spread(self) -> NDArray:
-        """(6, 6) K_E at the frame, in its axes, with distributed wrenches."""
+        """K_E with distributed wrenches at the frame in its axes, (6, 6)."""
         return self._in_frame(self.distributing)
 
     def _in_frame(self, K: NDArray) -> NDArray:
@@ -74,12 +74,12 @@ def solid_link(frame: Frame) -> SolidLink | None:
         frame: frame of a robot.
 
     Returns:
-        The solid.  None if the frame has no link or the link has no known shape, as for
-        a stiffness matrix, a library link, or a beam given by section constants.
+        The solid.  None if the frame has no link or the shape of the link is unknown,
+        as for a stiffness matrix, a library link, or a beam with section constants.
 
     Raises:
-        BadInput: the link cannot be meshed, or its mesh was not solved when the robot
-            was loaded.
+        BadInput: the link cannot be meshed, or K_E of its mesh was not computed when
+            the robot was loaded.
     """
     link = frame.link
     if isinstance(link, MeshLink):
@@ -113,23 +113,23 @@ def solid_links(robot: Robot) -> Mapping[str, SolidLink]:
     """Return the solids of all links with a known shape.
 
     Args:
-        robot: robot whose meshes have been solved.
+        robot: robot.  K_E of its meshes must have been computed.
 
     Returns:
-        Mapping from the frame's name to the solid.
+        Mapping from frame to solid.
 
     Raises:
-        BadInput: a link cannot be meshed, or its mesh was not solved when the robot was
-            loaded.
+        BadInput: a link cannot be meshed, or K_E of its mesh was not computed when the
+            robot was loaded.
     """
     solids = {frame.name: solid_link(frame) for frame in robot.frames}
     return {name: solid for name, solid in solids.items() if solid is not None}
 
 
 def _mesh_error(solved: MeshedLink) -> float:
-    """Return the estimated largest error [-] of the mesh's own K_E."""
-    # link.stiffness is the middle of an error interval; the mesh's K_E is its upper
-    # end.
+    """Return the estimated largest error [-] of the mesh's K_E."""
+    # link.stiffness is the middle of an error interval, and K_E of the mesh is the
+    # upper end of this interval.
     K = solved.link.stiffness
     above = np.abs(scaled(solved.level.solution.stiffness - K, K))
     return float((above + solved.link.relative_errors).max())
@@ -137,7 +137,7 @@ def _mesh_error(solved: MeshedLink) -> float:
 
 @lru_cache(maxsize=_KEPT)
 def _bar(shape: tuple[tuple[str, float], ...], poisson: float) -> MeshedLink:
-    """Return the finite-element solution of a bar with length 1 and modulus 1."""
+    """Return the finite-element solution of a bar with unit length and modulus."""
     return solve_bar(dict(shape), Material(1.0, poisson), _OPTIONS)
 
 

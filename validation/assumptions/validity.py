@@ -1,6 +1,6 @@
 """Compute the errors caused by the assumptions of the virtual-joint model.
 
-Each of five assumptions is tested against a model that does not make it:
+Each of five assumptions is tested against a model without this assumption:
 
 ==================  ==================================================================
 assumption          compared with
@@ -9,17 +9,16 @@ linear closures     loop closure with finite motions, :func:`.solve_exact`
 beams               solids with rigid ends, computed by finite elements
 loads at the ends   a weight that is distributed over its link
 disc and cone       a pin in two bushes, :mod:`forcefit.validation.assumptions.bushes`
-one spring a beam   a beam cut into more and more pieces, with finite motions
+one spring a beam   a beam divided into many elements, with finite motions
 ==================  ==================================================================
 
-Two numbers measure the error of an assumption: the difference of the platform's pose
-and the relative difference of the elastic energy.  The error is significant if the
-energy differs by more than one per cent.  It is also significant if the position
-differs by more than 20 um, the required accuracy of the paper's robot.  If no energy is
-stored and the platform does not move in either model, the error is unknown.
+The error of an assumption consists of the difference of the platform pose and the
+relative difference of the elastic energy.  It is significant if the energy differs by
+more than 1 % or the position by more than 20 um, the required accuracy of the IRSBot-2.
+The error is unknown if neither model has deformations or platform motions.
 
-Poses are taken from the minimum-energy solutions.  Such a pose is not unique if a
-clearance carries no load, see ``docs/validity.md``.
+Poses are those of the minimum-energy solutions.  They are not unique if a joint with
+clearance carries no load; see ``docs/validity.md``.
 """
 
 import math
@@ -37,21 +36,21 @@ from forcefit.validation.assumptions.bushes import solve_bushes
 from forcefit.validation.crosscheck.limits import FLOOR, HALVES, energy_floor
 from forcefit.validation.crosscheck.spread_weight import energy_between_ends
 
-POSITION_LIMIT = 20e-6  # [m] required accuracy of the paper's robot
+POSITION_LIMIT = 20e-6  # [m] required accuracy of the IRSBot-2
 ENERGY_LIMIT = 0.01  # [-] smallest significant relative error of the energy
 
 
 @dataclass(frozen=True)
 class Cost:
-    """Error of an assumption; NaN where both models differ only by rounding errors.
+    """Error of an assumption; NaN for a difference that is only round-off.
 
     Attributes:
         rotation: [rad] error of the platform's orientation.
         position: [m] error of the position of the platform's origin.
         energy: [-] error of the elastic energy, relative to the energy of the more
             accurate model.
-        pieces: number of pieces into which every beam must be cut for errors below the
-            limits; None for other assumptions.
+        pieces: number of elements per beam for errors below the limits; None for other
+            assumptions.
     """
 
     rotation: float
@@ -66,25 +65,23 @@ class Cost:
 
     @property
     def known(self) -> bool:
-        """Whether both models could be compared."""
+        """Whether the error is known."""
         return not (math.isnan(self.position) and math.isnan(self.energy))
 
 
 def cost_between(
     model: Assembly, better: Assembly | ExactAssembly, missing: float = 0.0
 ) -> Cost:
-    """Return the difference between a solution and a more accurate one.
+    """Return the difference between a solution and a more accurate solution.
 
     Args:
         model: solution with the assumption.
         better: solution without the assumption.
-        missing: [J] part of the more accurate model's energy that neither solution
-            contains.
+        missing: [J] energy of the more accurate model that neither solution contains.
 
     Returns:
-        The error.  Without loads, energies below a limit are replaced by this limit:
-        1e-6 of the energy without clearances.  Inside an assembly zone both energies
-        are rounding errors below the limit.
+        The error.  Without loads, energies below 1e-6 of the energy without clearances
+        are replaced by this value, because they are round-off.
     """
     energy = better.energy + missing
     least = 0.0 if model.frame_loads else 1e-6 * model.energy_without_clearance
@@ -105,7 +102,7 @@ def cost_between(
 
 
 def closure_cost(posture: Posture, load: ArrayLike | None = None) -> Cost:
-    """Return the error of linearising the loop closure, compared with finite motions.
+    """Return the error of linearised loop closures relative to finite motions.
 
     Args:
         posture: the robot's configuration.
@@ -127,12 +124,11 @@ def link_cost(
     stiffness: Mapping[str, NDArray],
     load: ArrayLike | None = None,
 ) -> Cost:
-    """Return the error of beam theory, compared with given link stiffnesses.
+    """Return the error of beam theory relative to given link stiffnesses.
 
     Args:
         posture: the robot's configuration.
-        stiffness: mapping from frame name to the reference K_E, (6, 6) [N m/rad ..
-            N/m].
+        stiffness: mapping from frame to the reference K_E, (6, 6) [N m/rad .. N/m].
         load: (6,) [N m, N] on the platform at its origin, base axes.
 
     Returns:
@@ -152,8 +148,8 @@ def spread_cost(
 ) -> Cost:
     """Return the error of replacing the weights of links by loads at their ends.
 
-    These equivalent loads (:mod:`forcefit.assembly.linear.load`) cause the correct pose
-    of the platform.  The energy that a beam stores between its ends is missing.
+    With these loads (:mod:`forcefit.assembly.linear.load`), the platform pose is
+    correct, but the energy between the ends of a beam is missing.
 
     Args:
         posture: the robot's configuration.
@@ -172,7 +168,7 @@ def spread_cost(
 
 
 def bush_cost(posture: Posture, load: ArrayLike | None = None) -> Cost:
-    """Return the error of the paper's bounds, compared with pins in two bushes.
+    """Return the error of the paper's bounds relative to pins in two bushes.
 
     Args:
         posture: the robot's configuration.
@@ -191,11 +187,11 @@ def bush_cost(posture: Posture, load: ArrayLike | None = None) -> Cost:
 def pieces_cost(
     posture: Posture, load: ArrayLike | None = None, gravity: ArrayLike | None = None
 ) -> Cost:
-    """Return the error of modelling a beam as one spring, compared with many pieces.
+    """Return the error of modelling a beam as a single spring.
 
-    The error of n pieces decreases as 1 / n^2 (``docs/proofs.md``).  The solutions with
-    one and two pieces therefore determine the solution for infinitely many pieces.
-    They also determine the number of pieces for which the errors are not significant.
+    The error of n elements is proportional to 1 / n^2 (``docs/proofs.md``).  The
+    solution for infinitely many elements is therefore extrapolated from the solutions
+    with one and two elements.
 
     Args:
         posture: the robot's configuration.
@@ -203,7 +199,7 @@ def pieces_cost(
         gravity: (3,) [m/s^2] base axes.
 
     Returns:
-        The error, with the number of pieces that every beam needs.
+        The error, with the number of elements for which it is not significant.
 
     Raises:
         CannotAssemble: the robot cannot be assembled.
@@ -223,7 +219,7 @@ def pieces_cost(
 
 
 def _in_pieces(posture: Posture, count: int) -> Posture:
-    """Return the configuration with every beam cut into ``count`` pieces."""
+    """Return the configuration with every beam divided into ``count`` elements."""
     links = {
         frame.name: replace(frame.link, pieces=count)
         for frame in posture.robot.frames

@@ -1,4 +1,4 @@
-"""Use coarse meshes of solid links, for quick tests."""
+"""Fixtures with coarse meshes of solid links, for quick tests."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Report page of the errors caused by modelling assumptions."""
+"""Tests of the report page of errors caused by modelling assumptions."""
 
 import pytest
 
@@ -28,7 +28,7 @@ def shown(*errors):
     (Cost(1e-3, 21e-6, 0.0), "mixed"),
     (Cost(1e-3, 1e-6, 0.011), "mixed"),
 ])  # fmt: skip
-def test_error_above_20_um_or_1_per_cent_turns_the_verdict_amber(second, kind):
+def test_verdict_is_amber_for_significant_errors(second, kind):
     text = shown(Cost(2e-3, 1e-6, 0.0), second)
     assert f"<p class='verdict {kind}'>" in text
     assert "(1 more errors are unknown)" in text

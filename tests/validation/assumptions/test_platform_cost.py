@@ -1,4 +1,4 @@
-"""Platform compliance by virtual joints compared with finite-element links."""
+"""Tests of the platform compliance with links as beams and as solids."""
 
 import json
 
@@ -25,8 +25,7 @@ SPRINGS = np.diag([3e5, 2e5, 1e5, 1e8, 2e8, 3e8])
 
 
 def triangle():
-    """Two short round bars of different thickness between a wall and a sprung
-    platform."""
+    """Return a platform on two short round bars of different thickness."""
     short = BeamLink({"radius": 0.08}, 70e9, 0.3)
     frames = (
         Frame("slim", translation=[0.3, 0.1, 0.0], link=ROUND),
@@ -49,8 +48,8 @@ def posture():
     return posture
 
 
-def test_solid_link_has_nearly_beam_stiffness_and_resists_no_rigid_motion():
-    """For a 1 x 2 section and length 6, clamped ends add a few per cent to K_E."""
+def test_solid_link_has_nearly_the_stiffness_of_a_beam():
+    """Rigid ends increase K_E by a few per cent."""
     link = BeamLink({"width": 0.05, "height": 0.1}, 70e9, 0.3, up=(0, 1, 1))
     frame = Frame("tip", translation=[0.1, 0.2, -0.2], link=link)
     solid = solid_link(frame)
@@ -64,18 +63,21 @@ def test_solid_link_has_nearly_beam_stiffness_and_resists_no_rigid_motion():
 
 
 @pytest.mark.slow
-def test_virtual_joints_reproduce_solids_that_are_loaded_at_their_ends(posture):
-    """Condensed K_E matches the displacement method over all bodies to round-off."""
+def test_virtual_joints_agree_with_solids_with_rigid_ends(posture):
+    """Static condensation is exact for rigid ends."""
     costs = platform_costs([posture])
     assert costs.meshed[0] < 1e-9
     assert 1e-3 < costs.beams[0] < 0.1
     assert 1e-3 < costs.ends[0] < 0.3
-    assert list(costs.by_link) == ["stout", "slim"]  # the shorter for its thickness
+    assert list(costs.by_link) == [
+        "stout",
+        "slim",
+    ]  # the bar of larger diameter has the larger error
     assert 1e-4 < costs.mesh_error < 2e-2
 
 
 @pytest.mark.slow
-def test_error_from_a_single_link_model_equals_the_error_of_the_platform():
+def test_error_of_a_cantilever_equals_the_error_of_its_link():
     frame = Frame("tip", translation=[0.3, 0.0, 0.0], link=ROUND)
     posture = home_posture(Robot("cantilever", "tip", (frame,)))
     solid = solid_link(frame)
@@ -114,8 +116,7 @@ def test_validity_command_names_the_link_with_the_largest_error(run, tmp_path):
 
 
 def test_validity_over_poses_reports_the_median_and_the_largest_error(run, tmp_path):
-    """One of three poses is unreachable; a list of the same poses gives the same
-    result."""
+    """One of three poses is unreachable."""
     listed = tmp_path / "poses.csv"
     listed.write_text("id,pose.tx,pose.tz\na,0,-0.5\nb,0.2,-0.5\nc,3,-0.5\n")
     words = ["validation", "validity", "irsbot2", "--solids", "--json", "-"]

@@ -1,4 +1,4 @@
-"""Errors caused by modelling assumptions, compared with closed forms and simulation."""
+"""Tests of the errors caused by modelling assumptions."""
 
 import json
 from dataclasses import replace
@@ -40,7 +40,7 @@ def cantilever(link=FLAT, length=0.5):
 
 
 def pin(error):
-    """A pin with clearance between two rigid parts that are misaligned by an error."""
+    """Return a pin with clearance between two misaligned rigid bodies."""
     frames = (
         Frame("pin", clearance=LOOSE, geometric_error=error),
         Frame("end", "pin"),
@@ -51,24 +51,23 @@ def pin(error):
 
 @pytest.fixture(scope="module")
 def posture():
-    """The robot of the paper with errors of the size stated there."""
+    """Return the IRSBot-2 with the errors of the paper."""
     return place_robot(irsbot2_with(NUMBERS["cases"][0]), {"tx": 0.1, "tz": -0.45})
 
 
 @pytest.mark.parametrize(
     ("shift", "tilt"), [((2e-5, 0), (0, 3e-4)), ((0, 1e-5), (-6e-4, 0))]
 )
-def test_margin_of_two_bushes_is_the_sum_of_the_disc_and_cone_ratios(shift, tilt):
-    """By hand, the margin is max(r / c, theta / t) for disc and cone, and r / c + theta
-    / t for bushes, whether or not shift and tilt are coplanar."""
+def test_margin_of_two_bushes_is_the_sum_of_the_ratios(shift, tilt):
+    """With independent bounds, the margin is the larger of the two ratios."""
     at = pin([*tilt, 0, *shift, 0])
     r, theta = np.hypot(*shift) / 3e-5, np.hypot(*tilt) / 7.5e-4
     assert zone_margin(at).margin == pytest.approx(max(r, theta), rel=1e-9)
     assert bush_margin(at) == pytest.approx(r + theta, rel=1e-9)
 
 
-def test_two_bushes_lie_between_disc_and_cone_of_full_and_half_size(posture):
-    """This holds for both energy and margin."""
+def test_two_bushes_agree_with_bounds_of_full_and_half_clearances(posture):
+    """Energy and margin are between those of the paper's bounds."""
     frames = tuple(
         replace(f, clearance=replace(
             f.clearance, radial=f.clearance.radial / 2, tilt=f.clearance.tilt / 2
@@ -85,17 +84,15 @@ def test_two_bushes_lie_between_disc_and_cone_of_full_and_half_size(posture):
 
 
 def test_bushes_do_not_change_joints_without_tilt_clearance():
-    robot = load_robot("hexapod")  # ball joints and cardans: radial and axial clearance
+    robot = load_robot("hexapod")  # its joints have radial and axial clearance
     joints = virtual_joints(robot)
     np.testing.assert_array_equal(bush_joints(joints).cones, joints.cones)
 
 
 @pytest.mark.exudyn
 @pytest.mark.slow
-def test_simulation_with_two_bushes_has_the_same_energy_ratio(posture):
-    """Compare the energy ratio of bushes to disc and cone in the limit of small errors.
-    At a sixteenth of the errors, both contact models differ from finite rotations by
-    0.2 per cent, but their ratio only by about 1e-4."""
+def test_energy_ratio_of_two_bushes_agrees_with_simulation(posture):
+    """The energies with and without bushes are compared at small errors."""
     expected = solve_bushes(posture).energy / solve_assembly(posture).energy
     scale = 1 / 16
     disc, bushes = (
@@ -108,24 +105,22 @@ def test_simulation_with_two_bushes_has_the_same_energy_ratio(posture):
     assert bushes / disc == pytest.approx(expected, rel=2e-3)
 
 
-def test_half_weights_overestimate_the_sag_of_a_cantilever_by_a_third():
-    """The deflection is q L^4 / 6 EI instead of q L^4 / 8 EI, with equal shear, and the
-    slope q L^3 / 4 EI instead of q L^3 / 6 EI."""
+def test_half_weights_at_the_ends_overestimate_the_sag():
+    """The deflection is q L^4 / 6 EI instead of q L^4 / 8 EI."""
     L, g = 0.5, 9.81
     link = replace(FLAT, theory="euler")
     cost = halves_cost(cantilever(link), [0, 0, -g])
-    second = 0.02**3 * 0.05 / 12  # the height, 0.05 m, is along y
+    second = 0.02**3 * 0.05 / 12  # the height of 0.05 m is along y
     q = RHO * 1e-3 * g
     sag, slope = q * L**4 / (8 * E * second), q * L**3 / (6 * E * second)
     assert cost.position == pytest.approx(sag / 3, rel=1e-9)
     assert cost.rotation == pytest.approx(slope / 2, rel=1e-9)
-    # energies: (qL/2)^2 L^3 / 6 EI against q^2 L^5 / 40 EI, the whole cantilever's
+    # the energies are (qL/2)^2 L^3 / 6 EI and q^2 L^5 / 40 EI
     assert cost.energy == pytest.approx((1 / 24) / (1 / 40) - 1, rel=1e-9)
 
 
-def test_energy_of_a_heavy_cantilever_is_that_of_end_loads_plus_the_inner_load():
-    """The total is q^2 L^5 / 40 EI, of which q^2 L^5 / 1440 EI is stored between the
-    ends."""
+def test_energy_of_a_heavy_cantilever_equals_closed_form():
+    """The energy is q^2 L^5 / 40 EI, with q^2 L^5 / 1440 EI between the ends."""
     L, g = 0.5, 9.81
     at = cantilever(replace(FLAT, theory="euler"))
     second, q = 0.02**3 * 0.05 / 12, RHO * 1e-3 * g
@@ -138,11 +133,10 @@ def test_energy_of_a_heavy_cantilever_is_that_of_end_loads_plus_the_inner_load()
 
 @pytest.mark.exudyn
 @pytest.mark.parametrize("elements", [1, 2, 8])
-def test_energy_of_simulated_elements_is_that_of_end_loads_plus_the_inner_load(
+def test_energy_of_a_heavy_cantilever_agrees_with_simulation(
     elements,
 ):
-    """This holds in all directions, with shear.  Exudyn neglects the energy within an
-    element. Gravity is scaled down to 1e-3 m/s^2, where bending is linear to 1e-8."""
+    """Exudyn neglects the energy within an element."""
     at, g = cantilever(), 1e-3 * np.array([3.0, -5.0, 8.0])
     model = SimulationModel(elements=elements)
     energy = simulate_assembly(at, model=model, gravity=g).energy
@@ -153,7 +147,7 @@ def test_energy_of_simulated_elements_is_that_of_end_loads_plus_the_inner_load(
 
 
 def test_error_of_a_link_model_is_zero_for_equal_stiffness(posture):
-    """Giving the beam's K_E as a matrix causes no error, halving it a large one."""
+    """A matrix equal to K_E of the beam causes no error."""
     beams = {
         f.name: np.linalg.inv(link_compliance(f))
         for f in posture.robot.frames
@@ -166,20 +160,21 @@ def test_error_of_a_link_model_is_zero_for_equal_stiffness(posture):
     assert link_cost(posture, {k: K / 2 for k, K in beams.items()}).matters
 
 
-def test_error_from_linear_closures_grows_with_the_square_of_the_geometric_errors(
+def test_error_of_linear_closures_is_of_second_order(
     posture,
 ):
-    """Halving errors and clearances reduces the position error to a quarter."""
+    """Half of the errors and clearances cause a quarter of the position error."""
     full, half = closure_cost(posture), closure_cost(scaled(posture, 0.5))
     assert full.position / half.position == pytest.approx(4, rel=0.1)
     assert full.matters
 
 
 @pytest.mark.usefixtures("coarse_solids")
-def test_thick_bar_with_held_ends_is_stiffer_than_its_beam_in_bending_only(posture):
-    """Bending stiffness grows by 1 + c r / L with c about 0.2, because a clamped end
-    cannot warp; torsional stiffness does not.  At L / r = 5 this is 4 per cent, which a
-    mesh accurate to 1 per cent resolves."""
+def test_thick_bar_with_rigid_ends_is_stiffer_in_bending(posture):
+    """A rigid end prevents warping in bending, but not in torsion.
+
+    The bending stiffness is larger by the factor 1 + c r / L with c about 0.2.
+    """
     thick = with_bars(posture.robot, 5.0).frame("leg1.link_a")
     assert isinstance(thick.link, BeamLink)
     thick = replace(thick, link=replace(thick.link, theory="timoshenko"))
@@ -187,7 +182,7 @@ def test_thick_bar_with_held_ends_is_stiffer_than_its_beam_in_bending_only(postu
     assert K[0, 0] == pytest.approx(beam[0, 0], rel=2e-3)  # x is along the link
     for row in (1, 2):
         assert 1.01 < K[row, row] / beam[row, row] < 1.08
-    # couplings have the beam's signs: no direction is softer than the beam's
+    # the solid is not more compliant than the beam in any direction
     stretch = np.linalg.eigvals(np.linalg.solve(beam, K)).real
     assert stretch.min() > 0.99
     assert stretch.max() < 1.15
@@ -197,7 +192,7 @@ def test_thick_bar_with_held_ends_is_stiffer_than_its_beam_in_bending_only(postu
 
 
 def test_errors_of_assumptions_are_unknown_without_errors_and_load(run, tmp_path):
-    """Both models then store only round-off, whose ratio is meaningless."""
+    """The energies of both models are round-off."""
     target = tmp_path / "costs.json"
     words = ["validity", "irsbot2", "--pose", "tx=0,tz=-0.5", "--json", target]
     status, out, _ = run("validation", *words)
@@ -209,9 +204,8 @@ def test_errors_of_assumptions_are_unknown_without_errors_and_load(run, tmp_path
     assert "nothing to compare" in costs["disc and cone, not two bushes"]["reason"]
 
 
-def test_position_error_of_an_assumption_is_known_without_stored_energy():
-    """If a serial bar is rotated by t at its base, the tip position is off by l t^2 /
-    2."""
+def test_position_error_is_known_without_energy():
+    """For a bar of length l rotated by t, the position error is l t^2 / 2."""
     frames = (
         Frame("a", geometric_error=[0, 0, 0.01, 0, 0, 0]),
         Frame("b", "a", translation=[0.5, 0, 0]),
@@ -224,7 +218,7 @@ def test_position_error_of_an_assumption_is_known_without_stored_energy():
 
 
 def test_validity_command_marks_assumptions_with_errors_above_the_limits(run, tmp_path):
-    """Disc and cone matter for the robot of the paper; unknown errors have a reason."""
+    """Unknown errors have a reason."""
     target, file = tmp_path / "costs.json", tmp_path / "robot.toml"
     write_robot(irsbot2_with(NUMBERS["cases"][0]), file)
     words = ["validity", file, "--pose", "tx=0.1,tz=-0.45", "--load", "fz=-100"]
@@ -237,10 +231,11 @@ def test_validity_command_marks_assumptions_with_errors_above_the_limits(run, tm
     assert "above 20 um or 1 %" in out
 
 
-def test_suggested_pieces_of_a_beam_leave_an_error_below_20_um():
-    """A moment M bends a beam to an arc with its tip at L (sin a / a - 1, (1 - cos a) /
-    a), a = M L / EI, so the error of a single spring is known.  The suggested number of
-    pieces leaves a smaller error than the limit, and half as many a larger one."""
+def test_suggested_number_of_beam_elements_has_an_error_below_20_um():
+    """A moment bends the beam to a circular arc, so the exact solution is known.
+
+    With half of the suggested number of elements, the error exceeds 20 um.
+    """
     length, stiffness, angle = 1.0, 1e3, 0.2
     link = BeamLink({"width": 0.1, "height": 0.1}, 1.2e5 * stiffness, 0.0,
                     theory="euler")  # fmt: skip
