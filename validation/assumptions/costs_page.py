@@ -17,8 +17,8 @@ _LIMITS = f"{1e6 * POSITION_LIMIT:g} µm or {100 * ENERGY_LIMIT:g} %"
 _ASSUMED = (
     "Each assumption is tested separately against a model without this assumption.",
     "Poses are compared at the minimum-energy solution.",
-    f"An error is significant above {_LIMITS} of the energy.  The limit of the position "
-    "is the required accuracy of the IRSBot-2.",
+    f"An error is significant above {_LIMITS} of the energy.  The position limit is "
+    "the required accuracy of the IRSBot-2.",
 )
 _HALVES = (("rotation", "rad"), ("position", "m"))
 _LISTED = 20  # largest number of links in a chart

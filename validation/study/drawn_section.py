@@ -9,7 +9,7 @@ from forcefit.validation.study.study import StudyResults
 
 
 def drawn_section(results: StudyResults) -> str:
-    """Return statistics, importance and worst case of randomly drawn parts as HTML."""
+    """Return the statistics and worst case of parts within tolerance as HTML."""
     found = results.statistics
     if found is None:
         return ""
@@ -21,7 +21,7 @@ def drawn_section(results: StudyResults) -> str:
         "errors of the study and the mean clearance of fits."
     )
     left_out = found.get("worst_case_left_out")
-    why = paragraph(f"The worst case was left out: {left_out}.") if left_out else ""
+    why = paragraph(f"The worst case was not computed: {left_out}.") if left_out else ""
     title = section("Tolerances of the drawing", about, why)
     return "".join([title, *draws_sections(found, results.draws)])
 
@@ -35,7 +35,7 @@ def drawn_tiles(found: dict[str, Any] | None, worst: dict[str, Any]) -> list[Til
             :func:`forcefit.validation.study.headline.worst_clearance`.
 
     Returns:
-        A list of one tile; empty if there is no such bound.
+        A list with the tile, or an empty list without such a bound.
     """
     if found is None or "drawn" not in worst:
         return []

@@ -1,7 +1,7 @@
 """Compute statistics and the worst case of drawing tolerances at a study's pose.
 
-The table ``[statistics]`` of a study file overrides the defaults.  Errors of randomly
-drawn parts replace the errors in the study file.
+The table ``[statistics]`` of a study file overrides the defaults.  In the statistics,
+random errors within the tolerances replace the errors of the study file.
 """
 
 from collections.abc import Callable
@@ -44,10 +44,10 @@ class DrawnTolerances:
     """Results requested for the robot's drawing tolerances.
 
     Attributes:
-        draws: number of randomly drawn machines.
-        seed: seed of the random draws.
+        draws: number of random machines.
+        seed: seed of the random numbers.
         importance: number of base draws for Sobol indices; 0 for no indices.
-        limits: mapping from each quantity to its limit [rad, m, J, ..].
+        limits: mapping from quantity to its limit [rad, m, J, ..].
     """
 
     draws: int = 1000
@@ -64,20 +64,19 @@ def read_statistics(root: Table, robot: Robot) -> DrawnTolerances | None:
         robot: robot of the study.
 
     Returns:
-        The requested results, with defaults for an absent table.  None if the robot has
-        no drawing tolerances, or if the table is absent and the study closes the
-        robot's loops.
+        The requested results.  None if the robot has no drawing tolerances, or if the
+        table is absent and the study file contains ``rest`` or ``mismatch``.
 
     Raises:
-        BadInput: the table is invalid, the robot has no tolerances, or the study closes
-            the robot's loops by errors that are not part errors.
+        BadInput: the table is invalid, the robot has no tolerances, or the study file
+            also contains ``rest`` or ``mismatch``.
     """
     drawn = bool(robot.callouts or robot.fits)
     closing = [key for key in ("rest", "mismatch") if root.has(key)]
     if not root.has("statistics"):
         return DrawnTolerances() if drawn and not closing else None
     if closing:
-        fault = f'found this table and "{closing[0]}", whose errors are not part errors'
+        fault = f'found this table and "{closing[0]}", which adds other errors'
         raise root.bad("statistics", f"{fault}; expected only one of the two")
     table = root.table("statistics")
     if not drawn:
@@ -118,18 +117,17 @@ def _limits(table: Table) -> dict[str, float]:
 def drawn_at_pose(
     posture: Posture, asked: DrawnTolerances, progress: Callable[[int, int], None]
 ) -> tuple[dict[str, Any], "xarray.Dataset"]:
-    """Return statistics, importance and worst case of random parts at a pose.
+    """Return statistics and worst case of parts within the tolerances at a pose.
 
     Args:
-        posture: the robot's configuration; its geometric errors are not used.
+        posture: the robot's configuration.  Its geometric errors are not used.
         asked: requested results.
-        progress: function called with the number of finished draws and the total
-            number.
+        progress: function called with the number of finished draws and the number of
+            all draws.
 
     Returns:
         The summary, with the keys of ``assembly statistics``, and the draws.  If no
-        worst case can be computed, ``worst_case_left_out`` states the reason instead of
-        ``worst_case``.
+        worst case can be computed, ``worst_case_left_out`` contains the reason.
 
     Raises:
         BadInput: a limit refers to a quantity that is not computed for this robot.
@@ -160,17 +158,17 @@ def drawn_at_pose(
 def bounds_over_grid(
     maps: "xarray.Dataset", robot: Robot, progress: Callable[[int, int], None]
 ) -> "xarray.Dataset":
-    """Return a study's maps with bounds over all parts within tolerance added.
+    """Add bounds over all parts within tolerance to the maps of a study.
 
     Args:
         maps: data set over the grid.
         robot: robot of the study, with drawing tolerances or fits.
-        progress: function called with the number of finished points and the total
-            number.
+        progress: function called with the number of finished points and the number of
+            all points.
 
     Returns:
-        The maps, with certified upper bounds on rotation and translation over all parts
-        and clearances at every point; NaN at points without a solution.
+        The maps with certified upper bounds on rotation and translation over all parts
+        and clearances.  Bounds are NaN at points without a solution.
     """
     sources, axes = sources_of(robot), [str(axis) for axis in maps["status"].dims]
     bounds = np.full((maps["status"].size, len(POSE_ERRORS)), np.nan)

@@ -1,4 +1,4 @@
-"""Compute certified error bounds of a robot in which one part is perfect."""
+"""Compute the certified pose error bounds of a robot with one perfect part."""
 
 from dataclasses import replace
 from typing import Any
@@ -24,20 +24,19 @@ ERROR, CLEARANCE = "geometric error", "clearance"
 
 
 def governing(posture: Posture, assumption: str = "frozen") -> list[dict[str, Any]]:
-    """Return the bounds of problem (27) with one imperfection removed at a time.
+    """Return the bounds of problem (27) without each of the imperfections.
 
-    The given errors of the robot are used.  If two errors compensate each other,
-    removing one of them increases the bound.
+    If two errors compensate each other, removing one of them increases the bound.
 
     Args:
         posture: configuration of a robot with errors or clearances.
         assumption: assumption of problem (27).
 
     Returns:
-        One mapping for each frame with errors and each joint with clearances, sorted by
-        translation in ascending order.  It contains the name (``part``), the removed
-        imperfection (``what``), and the upper bounds ``rotation`` [rad] and
-        ``translation`` [m] without this imperfection, or None if there is no solution.
+        One mapping for each frame with errors and each joint with clearances, with the
+        smallest translation first.  It contains the name of the frame or joint
+        (``part``), the removed imperfection (``what``), and the upper bounds
+        ``rotation`` [rad] and ``translation`` [m], or None without a solution.
     """
     rows: list[dict[str, Any]] = []
     for part, what, robot in _improved(posture.robot):
@@ -56,14 +55,14 @@ def governing(posture: Posture, assumption: str = "frozen") -> list[dict[str, An
 
 
 def _by_translation(row: dict[str, Any]) -> tuple[float, float]:
-    """Return a sort key that puts the smallest bound first and missing bounds last."""
+    """Return a sort key, with the smallest bound first and missing bounds last."""
     if row["translation"] is None:
         return (np.inf, np.inf)
     return (row["translation"], row["rotation"])
 
 
 def _improved(robot: Robot) -> list[tuple[str, str, Robot]]:
-    """Return copies of the robot, each lacking one of its imperfections."""
+    """Return copies of the robot without one of its imperfections."""
     cases = []
     declared = robot.declared_errors
     for i, frame in enumerate(robot.frames):
@@ -92,7 +91,7 @@ def _loose_parts(robot: Robot) -> dict[str, list[int]]:
 
 
 def _finite_bounds(frame: Frame) -> dict[str, float]:
-    """Return the finite clearances of a joint; infinite ones are free motions."""
+    """Return the finite clearances of a joint."""
     if frame.clearance is None:
         return {}
     own = own_cone(frame)
@@ -104,7 +103,7 @@ def _finite_bounds(frame: Frame) -> dict[str, float]:
 
 
 def _tight(frame: Frame) -> Frame:
-    """Remove the clearances of a joint."""
+    """Return the frame without the finite clearances of its joint."""
     assert frame.clearance is not None
     tight = replace(frame.clearance, **dict.fromkeys(_finite_bounds(frame)))
     return replace(frame, clearance=tight)

@@ -26,13 +26,13 @@ _UNITS = {"tx": "m", "ty": "m", "tz": "m", "rx": "rad", "ry": "rad", "rz": "rad"
 
 
 class Mapped(NamedTuple):
-    """A quantity mapped over the grid.
+    """A quantity over the grid.
 
     Attributes:
         key: name of the quantity in the results.
         words: name of the quantity on the page.
         unit: SI unit.
-        values: values at the points; NaN without a solution.
+        values: values at the grid points; NaN without a solution.
     """
 
     key: str
@@ -42,7 +42,7 @@ class Mapped(NamedTuple):
 
 
 def mapped(maps: Any) -> Iterator[Mapped]:
-    """Yield the quantities of a study's maps; pose errors are upper bounds."""
+    """Yield the quantities of a study's maps, with upper bounds of pose errors."""
     for key, words in MAPPED.items():
         one = maps[key].sel(bound="upper") if "bound" in maps[key].dims else maps[key]
         yield Mapped(key, words, unit_of(key), one)
@@ -74,7 +74,10 @@ def mapped(maps: Any) -> Iterator[Mapped]:
 
 
 def finite(one: Mapped) -> NDArray:
-    """Return the values of a map, NaN where unsolved and infinite where unbounded."""
+    """Return the known values of a map.
+
+    Pose errors may be infinite, and other values are finite.
+    """
     values = np.asarray(one.values, dtype=float).ravel()
     if one.key.endswith("_error"):
         return values[~np.isnan(values)]
@@ -90,8 +93,8 @@ def maps_section(maps: Any, summary: dict[str, Any]) -> str:
 
     Returns:
         HTML with counts, a table of smallest, median and largest values, and the map.
-        If the grid has more than two axes, the map is a section along two of them at
-        fixed values of the others.
+        If the grid has more than two axes, the map shows two of them at fixed values of
+        the other axes.
     """
     title = "Over the workspace"
     counts = ", ".join(f"{k}: {v}" for k, v in summary["status"].items())
@@ -107,8 +110,8 @@ def maps_section(maps: Any, summary: dict[str, Any]) -> str:
     return section(
         title,
         paragraph(
-            f"{counts}. Assembles rigidly with compliant joints free at "
-            f"{100 * share:.1f} % of the points with a solution."
+            f"{counts}. If compliant joints rotate freely, the robot assembles "
+            f"without force at {100 * share:.1f} % of the points with a solution."
         ),
         table(["quantity", "least", "median", "largest", "largest at"], rows, "maps"),
         _drawn(maps, known[0]) if known else "",
@@ -116,11 +119,11 @@ def maps_section(maps: Any, summary: dict[str, Any]) -> str:
 
 
 def _drawn(maps: Any, first: Mapped) -> str:
-    """Draw the map over two axes, and state the values of the other axes."""
+    """Return the map over two axes, and a paragraph on the values of other axes."""
     names = [str(d) for d in maps["energy"].dims if maps.sizes[d] > 1]
     if not names:
         return ""
-    # The map shows the two axes with the most values; ties go to the first axis.
+    # The map shows the two axes with the largest numbers of values.
     axes = sorted(sorted(names, key=lambda n: -maps.sizes[n])[:2], key=names.index)
     at = {name: i for name, i in _largest(first).items() if name not in axes}
     held = {name: i for name, i in at.items() if name in names}
@@ -138,7 +141,7 @@ def _drawn(maps: Any, first: Mapped) -> str:
     return paragraph(
         f"The grid has {len(names)} axes: the map is drawn over {axes[0]} and "
         f"{axes[1]}, with {_place(maps, held)}, where the {first.words} is largest. "
-        "The table covers all points."
+        "The table contains all points."
     ) + drawn  # fmt: skip
 
 

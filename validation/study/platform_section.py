@@ -17,14 +17,14 @@ from forcefit.stiffness.screws import WRENCH
 
 
 def platform_section(stiffness: dict[str, Any]) -> str:
-    """Return K_C at the study's pose and the most compliant parts as HTML.
+    """Return the section with K_C at the study's pose and the most compliant parts.
 
     Args:
         stiffness: result of
             :func:`forcefit.assembly.report.platform_stiffness.stiffness_of`.
 
     Returns:
-        HTML with tables and a chart of each part's contribution to the compliance.
+        HTML with tables and a chart of the contributions to the compliance.
     """
     K = np.asarray(stiffness["stiffness"])
     eigen = ", ".join(f"{one['stiffness']:.4g}" for one in stiffness["eigen"])

@@ -17,7 +17,7 @@ from forcefit.assembly.model.statuses import (
 from forcefit.validation.crosscheck.verdict import Check
 
 TOLERANCE = 1e-6  # [-] relative tolerance of energies and margins
-# Numerical noise of cvxpy's solver: [J] for energies, [-] for margins.
+# Numerical noise of energies [J] and margins [-] in cvxpy.
 _NOISE_ENERGY, _NOISE_MARGIN = 1e-12, 1e-10
 
 
@@ -33,10 +33,10 @@ def compare_printed(
 
     Returns:
         Plain values: ``energy``, ``platform_screw``, ``margin`` and ``margin_free``
-            computed by cvxpy; the ``relative_difference`` of each, or NaN if there is
-            nothing to compare; the verdict of each comparison (``checks``); ``verdict``
-            and ``passed``. If cvxpy finds no solution, the mapping contains only the
-            ``reason``.
+            computed by cvxpy, the ``relative_difference`` of each quantity, the verdict
+            of each comparison (``checks``), ``verdict`` and ``passed``.  Differences
+            are NaN if there is nothing to compare.  If cvxpy finds no solution, the
+            mapping contains only the ``reason``.
     """
     from forcefit.assembly.linear.reference.as_printed import (
         energy_as_printed,
@@ -72,7 +72,7 @@ def compare_printed(
 
 
 def _energy_check(assembly: Assembly, energy: float) -> Check:
-    """Return the check that both energies agree; inside a zone both are about 0."""
+    """Return the check that both energies agree."""
     tight = assembly.energy_without_clearance
     scale = max(assembly.energy, 1e-6 * tight, _NOISE_ENERGY / TOLERANCE)
     return Check(
@@ -82,7 +82,7 @@ def _energy_check(assembly: Assembly, energy: float) -> Check:
 
 
 def _margin_check(ours: float | None, theirs: float | None) -> Check:
-    """Return the check that two margins agree; it has no signal without a margin."""
+    """Return the check that two margins agree."""
     if ours is None or theirs is None:
         value = 0.0 if ours is theirs else math.inf
         return Check(value, TOLERANCE, signal=False)

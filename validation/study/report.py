@@ -105,7 +105,7 @@ def results_table(results: StudyResults) -> dict[str, Any]:
 
 
 def map_summary(maps: Any) -> dict[str, Any]:
-    """Return the minimum, median and maximum of each map, and counts of statuses."""
+    """Return the minimum, median and maximum of each map, and the status counts."""
     names, counts = np.unique(maps["status"].values.astype(str), return_counts=True)
     summary: dict[str, Any] = {"status": dict(zip(names, counts.tolist(), strict=True))}
     for one in mapped(maps):
@@ -162,7 +162,7 @@ def report_page(results: StudyResults) -> str:
 
 
 def _verdict(results: StudyResults) -> str:
-    """State how the robot assembles and which checks did not pass."""
+    """Return a sentence on the assembly and the checks that did not pass."""
     first = conclusions(results)[0].removesuffix(".")
     missed = [
         f"{in_words(name)} {outcome}"
@@ -173,10 +173,10 @@ def _verdict(results: StudyResults) -> str:
 
 
 def _good(results: StudyResults) -> bool | None:
-    """Return True if the robot assembles without force and all checks passed.
+    """Return whether the robot assembles without force and all checks passed.
 
-    The result is None if assembly requires force or a check has no outcome, and False
-    if there is no solution or a check failed.
+    The result is None if assembly requires force or a check has no outcome.  It is
+    False if there is no solution or a check failed.
     """
     if results.solution["status"] != OK or FAILED in results.verdicts.values():
         return False
@@ -184,7 +184,7 @@ def _good(results: StudyResults) -> bool | None:
 
 
 def _tiles(results: StudyResults) -> list[Tile]:
-    """Return tiles: worst case, governing part, tolerance to tighten, force, checks."""
+    """Return the tiles of the report."""
     if results.assembly is None:
         return [Tile("Assembly", [results.solution["status"]])]
     worst, study_robot = worst_clearance(results), results.robot
@@ -215,7 +215,7 @@ def _tiles(results: StudyResults) -> list[Tile]:
 
 
 def _force_tile(assembly: Assembly) -> Tile:
-    """Return the tile of the largest moment and the largest force through any body."""
+    """Return the tile of the largest moment and the largest force of all bodies."""
     wrenches = without_rounding(assembly.tip_wrenches)
     shown: list[str | Value] = []
     names = []
@@ -231,7 +231,7 @@ def _force_tile(assembly: Assembly) -> Tile:
 
 
 def _governing_tiles(results: StudyResults, worst: dict[str, float]) -> list[Tile]:
-    """Return tiles for the governing part and the tolerance to tighten."""
+    """Return the tiles of the governing part and the tolerance to tighten."""
     known = [
         one for one in results.governing
         if one["translation"] is not None and np.isfinite(one["translation"])
@@ -242,7 +242,7 @@ def _governing_tiles(results: StudyResults, worst: dict[str, float]) -> list[Til
     best = known[0]
     won = 1 - best["translation"] / whole
     if won < 0.01:
-        none = "No single part: none alone changes it by 1 % or more."
+        none = "No single part changes the worst case by 1 % or more."
         return [Tile("Governing part", ["many parts"], [none])]
     further = ", ".join(
         f"{one['part']} ({one['what']}, {_percent(one['translation'] / whole)})"
@@ -259,5 +259,5 @@ def _governing_tiles(results: StudyResults, worst: dict[str, float]) -> list[Til
 
 
 def _percent(ratio: float) -> str:
-    """Format the change that a factor causes, in per cent."""
+    """Format a factor as a relative change in per cent."""
     return f"{100 * (ratio - 1):+.0f} %"

@@ -1,4 +1,4 @@
-"""Read a study file, run every check and write the report in a single call."""
+"""Read a study file, run every check, and write the report."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -21,7 +21,7 @@ def run_study(
     Args:
         study: path of a study file (TOML), or a study read from such a file.
         progress: function called with the name of a check, the number of finished steps
-            and the total number.
+            and the number of all steps.
         output: folder for ``report.html``, ``results.json`` and ``results.nc``; None to
             write no files.
 

@@ -32,7 +32,7 @@ _UNITS = {"rx": "rad", "ry": "rad", "rz": "rad", "tx": "m", "ty": "m", "tz": "m"
 
 
 def unchecked_section(results: StudyResults) -> str:
-    """Return the section on checks that were not run, with the reasons."""
+    """Return the section with the checks that were not possible."""
     rows = [[in_words(name), why] for name, why in results.unchecked.items()]
     if not rows:
         return ""
@@ -58,7 +58,7 @@ def robot_section(results: StudyResults) -> str:
 
 
 def _error_body(results: StudyResults) -> ErrorBody | None:
-    """Return a 3-D body of the possible platform translations, or None if unbounded."""
+    """Return the body of possible platform translations, or None if unbounded."""
     assert results.assembly is not None
     reach = reachable_screws(results.assembly, WORST)
     if reach.unbounded(3):
@@ -70,7 +70,7 @@ def _error_body(results: StudyResults) -> ErrorBody | None:
 
 
 def governing_section(results: StudyResults) -> str:
-    """Return the section on the certified worst case with one part made perfect."""
+    """Return the section on the certified worst case with one perfect part."""
     worst = worst_clearance(results)["pose"]
     if worst is None or not results.governing:
         return ""
@@ -87,15 +87,15 @@ def governing_section(results: StudyResults) -> str:
         paragraph(
             "The certified bound at this pose is ",
             *rotation_and_translation(worst["rotation"], worst["translation"]),
-            ". The table lists the bound with one imperfection removed. It rises if "
-            "the removed error compensated another one.",
+            ". The table lists the bound without one of the imperfections. The bound "
+            "increases if the removed error compensated another error.",
         ),
         table(head, flat, "governing parts"),
     )  # fmt: skip
 
 
 def _change(one: dict[str, Any], worst: dict[str, float], part: str) -> list[Any]:
-    """Return the bound without one imperfection, and its change in per cent."""
+    """Return the bound without an imperfection, and its change in per cent."""
     value = one[part]
     if value is None or not np.isfinite([value, worst[part]]).all():
         return ["none" if value is None else Value(value, unit_of(part)), "-"]
@@ -153,7 +153,7 @@ def _linearisation_rows(error: dict[str, Any]) -> list[list[Any]]:
 
 
 def _pose_error(results: StudyResults) -> str:
-    """Tabulate the bounds of problem (27) under each assumption."""
+    """Return a table of the bounds of problem (27) under each assumption."""
     rows = [
         [
             assumption,
@@ -177,7 +177,7 @@ def _pose_error(results: StudyResults) -> str:
 
 
 def _wrenches(results: StudyResults) -> str:
-    """Tabulate the wrench through each elastic link."""
+    """Return a table of the wrench through each elastic link."""
     frames = results.solution["frames"]
     elastic = [f.name for f in results.robot.frames if f.link is not None]
     wrenches = without_rounding(
@@ -191,7 +191,7 @@ def _wrenches(results: StudyResults) -> str:
         *(Column(n, u) for n, u in zip(WRENCH, WRENCH_UNITS, strict=True)),
     ]
     return paragraph(
-        "Wrench that each elastic link transmits, at its tip in its axes:"
+        "Wrench that each elastic link transmits, at the tip in link axes:"
     ) + table(head, rows, "wrenches")
 
 
@@ -214,8 +214,8 @@ def reference_section(results: StudyResults) -> str:
     return section(
         title,
         paragraph(
-            "Every screw of every frame is a variable and every constraint is an "
-            "equation of the paper; differences must be below "
+            "The variables are the screws of all frames, and the constraints are the "
+            "equations of the paper. Differences must be below "
             f"{reference['tolerance']:g}."
         ),
         table(["quantity", "reduced problem", "cvxpy", "relative difference"], rows),
@@ -241,10 +241,10 @@ def stiffness_section(results: StudyResults) -> str:
         "Link stiffness K_E: beam and finite elements",
         paragraph(
             f"Link {name}{shared}, {count} cubic tetrahedra, estimated error "
-            f"{100 * compared['relative_error_estimate']:.2g} %. A solid clamped at a "
-            "rigid face is stiffer than a beam by a fraction of about r/L, and an "
-            "Euler-Bernoulli beam is stiffer than one with shear: differences of a "
-            "few per cent between the columns are physical, not numerical errors."
+            f"{100 * compared['relative_error_estimate']:.2g} %. A solid with rigid "
+            "ends is stiffer than a beam by a fraction of about r/L, and an "
+            "Euler-Bernoulli beam is stiffer than a beam with shear. Differences of a "
+            "few per cent between the columns are therefore not numerical errors."
         ),
         table(
             ["entry", "Euler-Bernoulli", "Timoshenko", "finite elements",
@@ -260,7 +260,7 @@ def stiffness_section(results: StudyResults) -> str:
 
 
 def _significant(K: NDArray) -> NDArray:
-    """Return a mask (6, 6) of entries above one thousandth of sqrt(K_ii K_jj)."""
+    """Return a mask (6, 6) of the entries above 0.001 sqrt(K_ii K_jj)."""
     size = np.sqrt(np.diag(K))
     return np.abs(K) > 1e-3 * np.outer(size, size)
 
@@ -283,5 +283,5 @@ def crosscheck_section(results: StudyResults) -> str:
 
 
 def _number(value: float | None, unit: str, digits: int = 6) -> str | Value:
-    """Format a number with its unit, or return "none" if there is no number."""
+    """Format a number with its unit, or return "none" for None."""
     return "none" if value is None else Value(value, unit, digits)

@@ -58,8 +58,7 @@ def read_service(root: Table, robot: Robot, links: bool = True) -> Service | Non
     Args:
         root: root table of the file.
         robot: robot of the study.
-        links: whether the stiffness of meshed links is computed, which determines their
-            masses.
+        links: whether the stiffness and mass of meshed links are computed.
 
     Returns:
         The requested results.
@@ -90,7 +89,7 @@ def read_service(root: Table, robot: Robot, links: bool = True) -> Service | Non
 
 
 def at_pose(posture: Posture, service: Service, unloaded: Mapping) -> dict[str, Any]:
-    """Return the results for the robot under load at a single pose.
+    """Return the results for the robot under load at a pose.
 
     Args:
         posture: the robot's configuration.
@@ -98,11 +97,11 @@ def at_pose(posture: Posture, service: Service, unloaded: Mapping) -> dict[str, 
         unloaded: solution without loads, with the keys of ``assembly solve``.
 
     Returns:
-        Mapping with ``status`` and, on failure, ``reason``; ``load`` and ``gravity``;
-        and ``frequencies`` with the keys of ``assembly frequencies``.  With a load or
+        Mapping with ``status``, ``reason`` on failure, ``load``, ``gravity``, and
+        ``frequencies`` with the keys of ``assembly frequencies``.  With a load or
         gravity, it also contains ``solution`` with the keys of ``assembly solve``, and
-        ``deflection`` (6,), the platform screw with loads minus the screw without
-        loads, both from minimum-energy solutions.
+        ``deflection`` (6,), the difference of the platform screws with and without
+        loads.
     """
     found: dict[str, Any] = {
         "status": OK, "load": service.load, "gravity": service.gravity
@@ -126,20 +125,19 @@ def over_grid(
     maps: "xarray.Dataset", robot: Robot, service: Service,
     grid: Mapping[str, NDArray], progress: Callable[[int, int], None],
 ) -> "xarray.Dataset":  # fmt: skip
-    """Return the maps of a study with those of the robot under load added.
+    """Add maps of the robot under load to the maps of a study.
 
     Args:
         maps: maps without loads.
         robot: robot of the study.
         service: the requested results.
         grid: axes of the maps.
-        progress: function called with the number of finished points and the total
-            number.
+        progress: function called with the number of finished points and the number of
+            all points.
 
     Returns:
-        The maps with ``deflection`` as in :func:`at_pose`, and ``loaded_status``.  If
-        requested, they also contain ``stiffness`` with its accompanying variables, and
-        ``frequency``.
+        The maps with ``deflection`` as in :func:`at_pose`, ``loaded_status``, and, if
+        requested, ``stiffness`` and ``frequency``.
     """
     targets = grid_targets(grid)
     question = Question(

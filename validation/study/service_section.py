@@ -30,7 +30,7 @@ def service_section(service: dict[str, Any] | None) -> str:
 
 
 def _loaded(service: dict[str, Any]) -> list[str]:
-    """Tabulate the platform's pose error under load and weight."""
+    """Return a table of the platform's pose error under load and weight."""
     load = ", ".join(f"{v:.6g}" for v in service["load"])
     weight = ", ".join(f"{v:.6g}" for v in service["gravity"])
     about = paragraph(
@@ -52,7 +52,7 @@ def _loaded(service: dict[str, Any]) -> list[str]:
 
 
 def _frequencies(found: dict[str, Any]) -> str:
-    """Tabulate natural frequencies and the parts that deform in each mode."""
+    """Return a table of natural frequencies with the parts that deform in each mode."""
     if "frequencies" not in found:
         return paragraph(f"Frequencies: {found['status']}, {found['reason']}.")
     rows: list[list[Cell]] = []
@@ -67,7 +67,7 @@ def _frequencies(found: dict[str, Any]) -> str:
 
 
 def service_tile(service: dict[str, Any] | None) -> list[Tile]:
-    """Return a tile with the deflection under load, or else the lowest frequency."""
+    """Return a tile with the deflection under load or the lowest frequency."""
     if service is None:
         return []
     tiles = []

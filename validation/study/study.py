@@ -59,15 +59,15 @@ _PACKAGES = {  # packages that each check requires
 
 @dataclass(frozen=True, eq=False)
 class StudyResults:
-    """Results of a study; those that were not requested are None.
+    """Results of a study.  Results that were not requested are None.
 
     Attributes:
         study: content of the study file.
         robot: robot with the link stiffnesses used in the computations.
         solution: solution at the study's pose, with the keys of ``assembly solve``.
         assembly: assembly of this solution; None if the robot cannot be assembled.
-        error: bounds of problem (27) by assumption, with the keys of ``assembly
-            error``.
+        error: mapping from assumption of problem (27) to bounds, with the keys of
+            ``assembly error``.
         reference: result of
             :func:`forcefit.validation.study.printed_problems.compare_printed`.
         stiffness: mapping from frame to K_E of the beam and of the finite elements.
@@ -75,15 +75,15 @@ class StudyResults:
         crosscheck: comparison with the multibody simulation.
         crosscheck_failure: reason why the simulation failed; empty if it did not.
         platform_stiffness: K_C at the pose, with the keys of ``assembly stiffness``.
-        governing: bounds of problem (27) with one part made perfect, from
+        governing: bounds of problem (27) with one perfect part, from
             :func:`forcefit.validation.study.governing.governing`.
-        service: the robot under load, from
+        service: results for the robot under load, from
             :func:`forcefit.validation.study.service.at_pose`.
-        statistics: statistics of randomly drawn parts at the pose, with the keys of
+        statistics: statistics of parts within tolerance at the pose, with the keys of
             ``assembly statistics``; None for a robot without drawing tolerances.
         draws: data set of the random draws, or None.
-        closing: (k, n, 4, 4) poses of the frames while the simulation closes the loops;
-            None if the simulation failed.
+        closing: (k, n, 4, 4) poses of the frames while the loops are closed in the
+            simulation; None if the simulation failed.
     """
 
     study: Study
@@ -109,8 +109,8 @@ class StudyResults:
     def verdicts(self) -> dict[str, str]:
         """Verdicts of the requested independent checks.
 
-        The verdict is ``"passed"``, ``"failed"``, ``"not decided"``, ``"no signal"`` if
-        there is nothing to compare, or ``"not run"`` if there is no assembly to check.
+        The verdict is ``"passed"``, ``"failed"`` or ``"not decided"``.  It is ``"no
+        signal"`` if there is nothing to compare, and ``"not run"`` without an assembly.
         """
         independent = ("reference", "crosscheck")
         verdicts = {n: NOT_RUN for n in independent if n in self.study.checks}
@@ -124,7 +124,7 @@ class StudyResults:
 
     @property
     def unchecked(self) -> dict[str, str]:
-        """Checks that were not run, with the reasons."""
+        """Reasons why checks were not possible, by name of the check."""
         silent = "at this pose its errors engage neither springs nor clearances"
         if not self.robot.errors.any():
             silent = "the robot has no geometric errors; [errors] would give it some"
@@ -144,8 +144,8 @@ class StudyResults:
     def passed(self) -> bool:
         """Whether a certified solution exists and every check passed.
 
-        A check without a signal counts as not passed if it was requested, or if no
-        other check was run.
+        A check without a signal has not passed if it was requested, or if no other
+        check was run.
         """
         verdicts, missing = self.verdicts, self.unchecked
         ran = [v for v in verdicts.values() if v != NO_SIGNAL]
@@ -163,17 +163,17 @@ def run_study(study: Study, progress: Progress = lambda *_: None) -> StudyResult
     Args:
         study: study from :func:`forcefit.validation.study.study_file.read_study`.
         progress: function called with the name of a check, the number of finished steps
-            and the total number.
+            and the number of all steps.
 
     Returns:
-        The results; no file is written.
+        The results.  No file is written.
 
     Raises:
         BadInput: the pose is unreachable, or a surface cannot be meshed.
         ModuleNotFoundError: a package that a check requires is missing.
     """
     wanted = set(study.checks)
-    # Missing packages and unreachable poses are reported before the long computations.
+    # Missing packages and unreachable poses are reported before long computations.
     need(*(one for check in sorted(wanted) for one in _PACKAGES.get(check, ())))
     place_robot(study.robot, pose=study.pose)
     stiffness, robot = None, study.robot
@@ -245,7 +245,7 @@ def points_solved(maps: Any) -> int:
 
 
 def _closing(posture: Posture) -> NDArray | None:
-    """Return the frame poses during closing, or None without link stiffnesses."""
+    """Return the frame poses while the loops are closed, or None on failure."""
     tight = replace(posture, robot=without_clearance(posture.robot))
     try:
         return closing_sequence(tight)
@@ -256,7 +256,7 @@ def _closing(posture: Posture) -> NDArray | None:
 def _compare_links(
     study: Study, progress: Progress
 ) -> tuple[dict[str, dict[str, Any]], Robot]:
-    """Return K_E by beam theory and finite elements, and replace links if requested."""
+    """Return K_E by beam theory and finite elements, and the robot of the study."""
     compared: dict[str, dict[str, Any]] = {}
     links: dict[str, MatrixLink] = {}
     for done, (name, mesh) in enumerate(study.meshes.items()):

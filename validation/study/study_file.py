@@ -1,7 +1,7 @@
-"""Read a study file, which names a robot and the checks to run on it.
+"""Read a study file, which contains a robot and the checks to run.
 
-The file format (TOML) is described in ``docs/study.md``; see ``examples/irsbot2.toml``
-for an example.  The whole file is validated before any computation.
+The file format (TOML) is described in ``docs/study.md``.  An example is
+``examples/irsbot2.toml``.  The whole file is validated before any computation.
 """
 
 import os.path
@@ -49,22 +49,21 @@ class Study:
     Attributes:
         title: title of the report.
         robot: robot with its errors and its original links.
-        errors: sentence that states the origin of the errors.
-        source: source of the link stiffness, ``"beam"`` (declared) or ``"fea"``.
-        meshes: mapping from frame to meshed link, for comparison and for ``"fea"``.
+        errors: sentence on the origin of the errors.
+        source: source of the link stiffness, ``"beam"`` (as declared) or ``"fea"``.
+        meshes: mapping from frame to meshed link.
         accuracy: required accuracy of the finite elements.
         pose: nominal platform pose for the detailed checks.
         grid: mapping from pose component to its values in the maps; empty without maps.
         scales: scales of the errors in the cross-check; empty without a cross-check.
         checks: names of the checks to run.
-        asked: names of the checks that the file requests explicitly, through a grid or
-            through scales.
+        asked: names of the checks that the file requests.
         folder: folder of the report.
         files: files that were read: the study file, a robot file, surfaces.
-        service: results requested for the robot under load; None if there is no table
+        service: results requested for the robot under load; None without a table
             ``[service]``.
-        statistics: results requested for the robot's drawing tolerances; None if it has
-            none.
+        statistics: results requested for the drawing tolerances; None for a robot
+            without them.
     """
 
     title: str
@@ -93,9 +92,8 @@ def read_study(
 
     Args:
         path: path of the TOML file.
-        folder: folder of the report, which overrides the one in the file.
-        links: whether to compute the stiffness of meshed links, which running the study
-            requires.
+        folder: folder of the report; None for the folder in the file.
+        links: whether to compute the stiffness of meshed links.  The study requires it.
 
     Returns:
         The validated study.
@@ -166,7 +164,7 @@ def _files(path: Path, root: Table, meshes: dict[str, MeshLink]) -> tuple[Path, 
 
 
 def _robot(root: Table, folder: Path, links: bool) -> Robot:
-    """Load the robot, built in or from a file, and close its kinematic loops."""
+    """Load a built-in robot or a robot file, and close its kinematic loops."""
     if not root.has("robot") and (root.has("frame") or root.has("body")):
         line = f'robot = "{Path(root.file).name}"'
         expected = f"a study file, in the simplest case with the one line {line}"
@@ -183,7 +181,7 @@ def _robot(root: Table, folder: Path, links: bool) -> Robot:
 
 
 def _closed(root: Table, name: Path | str, links: bool) -> Robot:
-    """Close the loops of the robot as the study file requests."""
+    """Return the robot with closed loops, as requested by ``rest`` or ``mismatch``."""
     rest = root.text("rest") if root.has("rest") else None
     mismatch = root.choice("mismatch", ("spring",)) if root.has("mismatch") else None
     own_errors = not root.has("errors")
@@ -206,7 +204,7 @@ def _closed(root: Table, name: Path | str, links: bool) -> Robot:
 
 
 def _errors(root: Table, robot: Robot) -> tuple[Robot, str]:
-    """Apply the requested errors to the robot, and state their origin."""
+    """Return the robot with the requested errors, and their origin as text."""
     if not root.has("errors"):
         return robot, "geometric errors as in the robot file"
     closing = root.has("rest") or root.has("mismatch")
@@ -248,7 +246,7 @@ def _frames(table: Table, robot: Robot, default: list[str]) -> tuple[str, ...]:
 
 
 def _known(table: Table, key: str, robot: Robot, names: list[str]) -> tuple[str, ...]:
-    """Return the full names of frames; raise BadInput if a name is unknown."""
+    """Return the full names of frames, and raise BadInput for an unknown name."""
     try:
         return frames_named(robot, names)
     except BadInput as error:
@@ -256,7 +254,7 @@ def _known(table: Table, key: str, robot: Robot, names: list[str]) -> tuple[str,
 
 
 def _links(root: Table, robot: Robot) -> tuple[str, dict[str, MeshLink], float]:
-    """Read the source of the link stiffness and the meshes to compare with beams."""
+    """Read the source of the link stiffness and the meshed links."""
     if not root.has("links"):
         return "beam", {}, 0.005
     table = root.table("links")
@@ -291,7 +289,7 @@ def _links(root: Table, robot: Robot) -> tuple[str, dict[str, MeshLink], float]:
 
 
 def _pose(root: Table) -> dict[str, float]:
-    """Read the pose of the detailed checks, which defaults to the home pose."""
+    """Read the pose of the detailed checks; the default is the home pose."""
     if not root.has("pose"):
         return {}
     table = root.table("pose")
@@ -320,7 +318,7 @@ def _scales(root: Table) -> tuple[float, ...]:
 def _checks(
     root: Table, meshes: bool, grid: bool, scales: bool
 ) -> tuple[tuple[str, ...], set[str]]:
-    """Return the checks to run, and the names of those requested in [checks]."""
+    """Return the checks to run, and the checks that the file requests."""
     possible = {"stiffness": meshes, "maps": grid, "crosscheck": scales}
     if not root.has("checks"):
         return tuple(c for c in _CHECKS if possible.get(c, True)), set()

@@ -1,4 +1,4 @@
-"""Studies of robots with drawing tolerances: statistics and worst case."""
+"""Tests of studies of robots with drawing tolerances."""
 
 import json
 
@@ -34,8 +34,8 @@ def results(tmp_path_factory):
     return found, page, json.loads((folder / "out" / "results.json").read_text())
 
 
-def test_worst_case_of_a_drawing_in_a_study_equals_hand_calculation(results):
-    """0.1903 mrad: 20 um times the sum of the coefficients over the lever."""
+def test_worst_case_of_drawing_tolerances_equals_hand_calculation(results):
+    """The rotation is 20 um times the sum of the coefficients over the lever."""
     _, _, table = results
     worst = table["statistics"]["worst_case"]["rotation"]
     by_hand = 20e-6 * sum(COEFFICIENTS.values()) / LEVER
@@ -43,13 +43,13 @@ def test_worst_case_of_a_drawing_in_a_study_equals_hand_calculation(results):
     assert worst["attained"] <= worst["bound"] <= 1.001 * worst["attained"]
 
 
-def test_contributions_of_callouts_in_a_study_equal_hand_calculation(results):
-    """Errors add linearly, so a share is c^2 over the sum; intervals hold 95 %."""
+def test_contributions_of_callouts_equal_hand_calculation(results):
+    """Errors add linearly, so the contribution is c^2 over the sum of all c^2."""
     _, _, table = results
     shares = table["statistics"]["importance"]["quantities"]["rotation"]["total_index"]
     total = sum(c**2 for c in COEFFICIENTS.values())
     assert len(shares) == 4
-    # |RZ| folds at zero, so only the shares of the signed motion are known by hand
+    # the indices of abs(RZ) have no closed form
     parts = table["statistics"]["importance"]["platform"]
     whole = sum(one["rotation_part"] ** 2 for one in parts.values())
     for name, one in parts.items():
@@ -59,7 +59,7 @@ def test_contributions_of_callouts_in_a_study_equal_hand_calculation(results):
         assert one["rotation_part"] ** 2 / whole == pytest.approx(expected, abs=0.03)
 
 
-def test_numbers_on_the_page_of_a_drawn_study_equal_its_results(results):
+def test_page_of_drawing_tolerances_shows_the_results(results):
     found, page, table = results
     rows = {row[0].text: row for row in page.table("error", "attained")[1:]}
     worst = table["statistics"]["worst_case"]
@@ -81,7 +81,7 @@ def test_numbers_on_the_page_of_a_drawn_study_equal_its_results(results):
     assert "Of 4000 randomly drawn machines, 4000 assemble." in text
 
 
-def test_study_of_fits_states_that_bounds_use_their_mean(tmp_path):
+def test_study_of_fits_reports_bounds_for_mean_clearances(tmp_path):
     """The largest radial clearance of 12 H7/g6 is 1.71 times its mean."""
     study = study_of(tmp_path, 'fit = "12 H7/g6"', STATISTICS.format(draws=20, base=0))
     found = run_study(study)
@@ -91,12 +91,12 @@ def test_study_of_fits_states_that_bounds_use_their_mean(tmp_path):
     assert "tolerances, with fits at their mean clearance, and for" in verdict(found)
     worst = found.statistics["worst_case"]["rotation"]
     alone = 20e-6 * sum(COEFFICIENTS.values()) / LEVER
-    # 0.1692 mrad by four pins of 10 um, at 17.5 um each
+    # four pins with 10 um cause 0.1692 mrad, and each pin has 17.5 um
     assert worst["attained"] == pytest.approx(alone + 0.1692e-3 * 1.75, rel=2e-3)
 
 
 def turned_by_hand(tx):
-    """Sum of the coefficients over the lever where the coupler's point is at x."""
+    """Return the sum of the coefficients over the lever for a coupler position."""
 
     def coupler(theta):
         B = 0.1 * np.array([np.cos(theta), np.sin(theta)])
@@ -115,9 +115,8 @@ def turned_by_hand(tx):
     return (abs(e2 @ e4) + abs(e3 @ e4) + 1 + abs(e4[0])) / abs(lever)
 
 
-def test_bound_of_the_rotation_in_the_map_of_a_study_equals_hand_calculation(tmp_path):
-    """At each pose 20 um times the sum of the coefficients of that pose over the lever;
-    bounds are within 1e-3 above it."""
+def test_rotation_bounds_over_the_map_equal_hand_calculation(tmp_path):
+    """The rotation is 20 um times the sum of the coefficients over the lever."""
     assert turned_by_hand(0.13949) == pytest.approx(
         sum(COEFFICIENTS.values()) / LEVER, rel=2e-3
     )
@@ -138,7 +137,7 @@ def test_bound_of_the_rotation_in_the_map_of_a_study_equals_hand_calculation(tmp
     assert f"At all 4 poses of the map, it is at most {size}" in verdict(found)
     page = (tmp_path / "out" / "report.html").read_text()
     assert "largest rotation over all parts within tolerance" in page
-    # a four-bar closes one loop; this one has no description
+    # the four-bar has one closure and no description
     assert ">four_bar. " in page
     assert " frames, 1 closure; " in page
 
@@ -163,7 +162,7 @@ def test_study_without_tolerances_has_no_statistics(tmp_path):
     ("[statistics]\ndraw = 5\n", 'statistics: unknown key "draw"; did you mean'),
     ('mismatch = "spring"\n[statistics]\n', 'found this table and "mismatch"'),
 ])  # fmt: skip
-def test_mistake_in_the_statistics_of_a_study_is_reported(tmp_path, table, message):
+def test_invalid_statistics_table_is_rejected(tmp_path, table, message):
     with pytest.raises(BadInput) as error:
         study_of(tmp_path, "", table)
     assert message in str(error.value)

@@ -1,4 +1,4 @@
-"""Governing imperfections: bounds with one imperfection removed."""
+"""Tests of the bounds without one of the imperfections."""
 
 from dataclasses import replace
 
@@ -13,7 +13,7 @@ from tests.guided_stage_for_tests import STAGE
 
 
 def chain(*parts):
-    """Frames on top of each other, with the errors along x and the axial clearances."""
+    """Return a chain of coincident frames with errors along x and axial clearances."""
     frames, parent = [], "base"
     for k, (shift, clearance) in enumerate(parts):
         frames.append(Frame(
@@ -24,24 +24,23 @@ def chain(*parts):
     return home_posture(Robot("chain", f"f{len(parts) - 1}", tuple(frames)))
 
 
-def test_governing_rows_are_bounds_without_one_imperfection():
-    """Errors 3 and -1 along x and clearances 4 along z:
-    sqrt(2^2 + 4^2) times 0.1 mm."""
+def test_governing_bounds_equal_hand_calculation():
+    """The robot has errors of 0.3 and -0.1 mm along x and 0.4 mm clearance along z."""
     rows = governing(chain((3e-4, None), (-1e-4, None), (0.0, 4e-4)))
     seen = [(one["part"], one["what"], one["translation"]) for one in rows]
     expected = [
-        ("f2", CLEARANCE, 2e-4),  # 3 - 1
+        ("f2", CLEARANCE, 2e-4),  # sum of both errors
         ("f0", ERROR, np.hypot(1e-4, 4e-4)),
-        ("f1", ERROR, np.hypot(3e-4, 4e-4)),  # the error it compensated is back
+        ("f1", ERROR, np.hypot(3e-4, 4e-4)),  # the other error is not compensated
     ]
     assert [one[:2] for one in seen] == [one[:2] for one in expected]
-    # Upper bounds to the requested accuracy of problem (27), 1 um.
+    # The accuracy of the bounds is 1 um.
     for (*_, bound), (*_, size) in zip(seen, expected, strict=True):
         assert size * (1 - 1e-9) <= bound <= size + 1e-6
     assert [one["rotation"] for one in rows] == pytest.approx([0.0] * 3, abs=1e-12)
 
 
-def test_governing_rows_exclude_the_free_motion_of_a_joint():
+def test_free_motion_of_a_joint_is_not_a_governing_clearance():
     posture = chain((0.0, None), (1e-4, None))
     first, second = posture.robot.frames
     hinge = replace(first, joint="revolute", clearance=Clearance(spin=0.1))
@@ -50,8 +49,8 @@ def test_governing_rows_exclude_the_free_motion_of_a_joint():
     assert [(one["part"], one["what"]) for one in rows] == [("f1", ERROR)]
 
 
-def test_a_ball_is_one_governing_clearance():
-    """Without the ball only the error remains, and vice versa."""
+def test_ball_is_one_governing_clearance():
+    """The bound without one of two imperfections equals the other imperfection."""
     posture = chain((3e-4, None), (0.0, None))
     first, second = posture.robot.frames
     ball = replace(second, clearance=Clearance(ball=1e-4))
@@ -63,12 +62,12 @@ def test_a_ball_is_one_governing_clearance():
         assert size * (1 - 1e-9) <= one["translation"] <= size + 1e-6
 
 
-def test_perfect_robot_has_no_governing_rows():
+def test_perfect_robot_has_no_governing_part():
     assert governing(chain((0.0, None), (0.0, None))) == []
 
 
-def test_contacts_of_one_joint_are_one_governing_clearance(tmp_path):
-    """Slabs and octahedra of the other two joints in cvxpy, from 12 starts."""
+def test_parallel_contacts_are_one_governing_clearance(tmp_path):
+    """The expected values were computed in cvxpy."""
     path = tmp_path / "stage.toml"
     path.write_text(STAGE)
     rows = governing(home_posture(read_robot(path)))

@@ -1,4 +1,4 @@
-"""Study of a loaded robot: deflection, stiffness, frequencies and maps."""
+"""Tests of studies of a loaded robot."""
 
 import json
 from dataclasses import replace
@@ -27,8 +27,8 @@ def study_of(folder, text):
     return results, parse((folder / "out" / "report.html").read_text())
 
 
-def test_deflection_of_parallel_springs_is_the_load_over_their_sum(tmp_path):
-    """400 N on 1e6 and 3e6 N/m: 0.1 mm, separate from the 0.05 mm of the errors."""
+def test_deflection_of_parallel_springs_equals_closed_form(tmp_path):
+    """The deflection by 400 N is 0.1 mm, and does not include that by errors."""
     write_robot(coaxial_beams(np.zeros(6), (1e6, 3e6)), tmp_path / "beams.toml")
     text = (
         'robot = "beams.toml"\n[errors.explicit]\ntwo = [0, 0, 0, 2e-4, 0, 0]\n'
@@ -65,7 +65,7 @@ def test_study_with_an_unresisted_load_does_not_pass(tmp_path):
 
 @pytest.fixture(scope="module")
 def five_bar(tmp_path_factory):
-    """Return a five-bar study without clearances, so that it is linear in the load."""
+    """Return a study of the five-bar without clearances, linear in the load."""
     folder = tmp_path_factory.mktemp("service")
     robot = ff.load_robot("five_bar")
     tight = tuple(replace(frame, clearance=None) for frame in robot.frames)
@@ -80,7 +80,7 @@ def five_bar(tmp_path_factory):
 
 
 def test_deflection_over_the_grid_is_compliance_times_load(five_bar):
-    """K_C^-1 w, by a method independent of the equilibrium under load."""
+    """The compliance is computed independently of the equilibrium under load."""
     robot, _, results, _ = five_bar
     for tx, ty in ((-0.02, 0.13), (0.02, 0.14)):
         posture = ff.place_robot(robot, {"tx": tx, "ty": ty})
@@ -106,8 +106,8 @@ def test_service_maps_on_the_page_equal_those_in_the_file(five_bar):
     assert results_table(results)["maps"]["stiffness.FX"][2] == along.max()
 
 
-def test_frequencies_at_the_pose_equal_closed_form_and_grid(tmp_path):
-    """k / m: a mass of 4 kg on 1e6 and 3e6 N/m, along each axis."""
+def test_frequencies_at_the_pose_equal_closed_form(tmp_path):
+    """A mass of 4 kg is on springs of 1e6 and 3e6 N/m along each axis."""
     robot = coaxial_beams(np.zeros(6), (1e6, 3e6))
     write_robot(robot, tmp_path / "beams.toml")
     file = tmp_path / "beams.toml"
@@ -123,7 +123,7 @@ def test_frequencies_at_the_pose_equal_closed_form_and_grid(tmp_path):
     assert page.table("mode")[1][1].value == pytest.approx(expected, rel=1e-6)
 
 
-def test_grid_of_three_axes_is_drawn_at_its_largest_error(tmp_path):
+def test_map_of_three_axes_is_drawn_at_the_largest_error(tmp_path):
     text = (
         'robot = "orthoglide"\n'
         'grid = "tx=-0.05:0.05:0.05,ty=-0.05:0.05:0.05,tz=-0.05:0.05:0.1"\n'
@@ -163,11 +163,11 @@ def test_invalid_service_keys_are_rejected_in_one_line(tmp_path, line, message):
     assert str(path) in str(error.value)
 
 
-def test_contributions_of_all_charted_parts_add_up_to_100_per_cent(tmp_path):
-    """All twelve parts of a hexapod, not only the eight largest."""
+def test_contributions_of_all_parts_add_up_to_100_per_cent(tmp_path):
+    """The table contains all twelve parts of the hexapod."""
     _, page = study_of(tmp_path, 'robot = "hexapod"\n')
     rows = page.table("part", "rx")[1:]
     for column in range(1, 7):
         total = sum(float(row[column].text) for row in rows)
-        # each is printed to 0.05 %
+        # the contributions are rounded to 0.1 %
         assert total == pytest.approx(100.0, abs=0.05 * len(rows))

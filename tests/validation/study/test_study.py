@@ -1,4 +1,4 @@
-"""Study files, the output folder of a study, and messages for invalid files."""
+"""Tests of study files, the output of studies, and messages about invalid files."""
 
 import json
 from dataclasses import replace
@@ -100,14 +100,14 @@ def test_study_folder_has_a_self_contained_report_and_results(results):
 
 
 @pytest.mark.exudyn
-def test_numbers_on_the_study_page_equal_the_results(results):
+def test_study_page_shows_the_results(results):
     outcome, folder, _ = results
     seen = parse((folder / "report.html").read_text())
     table = json.loads((folder / "results.json").read_text())
     worst = table["worst_clearance"]["pose"]
     tile = [number.value for number in seen.numbers[:2]]
     assert tile == [worst["rotation"], worst["translation"]]
-    assert seen.numbers[1].text == "0.794 mm"  # of the 0.7943345850 mm in the README
+    assert seen.numbers[1].text == "0.794 mm"  # 0.7943345850 mm in the README
     rows = seen.table("part", "made perfect")[1:]
     assert len(rows) == len(table["governing"]) == 12 + 8  # errors, clearances
     for row, one in zip(rows, table["governing"], strict=True):
@@ -119,7 +119,7 @@ def test_numbers_on_the_study_page_equal_the_results(results):
     assert solution["energy, eq. (22)"] == table["solution"]["energy"]
     for name, *wrench in seen.table("link")[1:]:
         expected = table["solution"]["frames"][name.text]["wrench"]
-        # Values at the round-off of the largest are shown as 0.
+        # Round-off is shown as 0.
         shown = [cell.value for cell in wrench]
         assert shown == pytest.approx(expected, rel=0.0, abs=1e-5)
     (scene,) = (one for one in seen.figures if "bodies" in one)
@@ -160,10 +160,8 @@ QUIET = "[checks]\npicture = false\n"
     name if name == "four_bar" else pytest.param(name, marks=SLOW)
     for name in BUILT_IN
 ])  # fmt: skip
-def test_study_of_a_robot_without_errors_reports_that_nothing_was_checked(
-    tmp_path, name
-):
-    """For every built-in robot."""
+def test_study_without_errors_reports_that_nothing_was_checked(tmp_path, name):
+    """Every built-in robot is tested."""
     text = f'robot = "{name}"\nscales = [1.0, 0.5]\n{QUIET}'
     if name == "irsbot2":
         text += "[pose]\ntx = 0.0\ntz = -0.5\n"
@@ -191,13 +189,13 @@ most = [1e-3, 1e-3, 1e-3, 1e-4, 1e-4, 1e-4]
 
 
 @pytest.mark.exudyn
-def test_study_of_a_just_constrained_robot_reports_the_unchecked_parts(tmp_path):
-    """Its errors store no energy: only the simulation can check it."""
+def test_study_of_an_exactly_constrained_robot_reports_unchecked_results(tmp_path):
+    """The errors cause no energy, so only the simulation can check the study."""
     text = JUST_CONSTRAINED + QUIET
     results = run_study(read_study(study_file(tmp_path, text)))
     assert results.verdicts == {"reference": "no signal", "crosscheck": "passed"}
     assert set(results.unchecked) == {"reference"}
-    assert results.passed  # the reference was not requested by name
+    assert results.passed  # the file does not request the reference check
     sentences = verdict(results)
     assert (
         "Checked independently: pose without clearances, by a multibody "
@@ -234,9 +232,8 @@ def test_study_whose_reference_has_no_solution_does_not_pass(tmp_path, monkeypat
     assert "Not compared: cvxpy: the problem" in report_page(results)
 
 
-def test_headline_of_a_study_is_the_worst_clearance_over_the_map(tmp_path):
-    """At a pose it is the bound of ``assembly error``,
-    over the map the largest of these bounds."""
+def test_headline_contains_the_bounds_at_the_pose_and_over_the_map(tmp_path):
+    """At the pose, the bound equals that of ``assembly error``."""
     text = 'robot = "five_bar"\ngrid = "tx=-0.01:0.01:0.01,ty=0.15"\n'
     text += QUIET + "crosscheck = false\nreference = false\n"
     text += "[pose]\ntx = 0.0\nty = 0.15\n"
@@ -260,12 +257,12 @@ def test_headline_of_a_study_is_the_worst_clearance_over_the_map(tmp_path):
     assert "No bound on the pose error within the clearances was found." in lost
     assert least in lost
     page = report_page(results)
-    assert page.count("minimum energy") >= 6  # a row for each component
+    assert page.count("minimum energy") >= 6  # one row per component
     assert "any position without a change of deformation" in page
     assert "largest translation, eq. (27), over all clearances" in page
 
 
-def test_study_reports_a_manipulator_that_cannot_be_assembled(tmp_path):
+def test_study_of_a_robot_that_cannot_be_assembled_does_not_pass(tmp_path):
     frames = (Frame("a"), Frame("b", geometric_error=[0, 0, 0, 1e-3, 0, 0]))
     write_robot(Robot("stuck", "a", frames, (("a", "b"),)), tmp_path / "stuck.toml")
     results = run_study(read_study(study_file(tmp_path, 'robot = "stuck.toml"\n')))
@@ -276,7 +273,7 @@ def test_study_reports_a_manipulator_that_cannot_be_assembled(tmp_path):
     )
 
 
-def test_message_about_a_robot_file_given_as_a_study_states_the_missing_line(tmp_path):
+def test_robot_file_as_study_file_is_rejected(tmp_path):
     path = tmp_path / "arm.toml"
     robot = BUILT_IN["five_bar"]()
     write_robot(robot, path)
@@ -338,9 +335,8 @@ def test_unreachable_study_pose_is_rejected_before_computation(tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.exudyn
-def test_example_study_with_finite_elements_has_the_converged_stiffness(tmp_path):
-    """K_RX of the solid cylinder by finite elements is 1 032 277 N m/rad, converged;
-    its beam, without shear, 1 067 585."""
+def test_stiffness_of_the_finite_element_study_has_converged(tmp_path):
+    """The converged K_RX is 1 032 277 N m/rad, and that of the beam is 1 067 585."""
     study = read_study(EXAMPLE, tmp_path / "out")
     results = run_study(study)
     write_study(results)
