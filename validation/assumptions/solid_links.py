@@ -113,7 +113,7 @@ def solid_links(robot: Robot) -> Mapping[str, SolidLink]:
     """Return the solids of all links with a known shape.
 
     Args:
-        robot: robot.  K_E of its meshes must have been computed.
+        robot: robot with computed K_E of its meshes.
 
     Returns:
         Mapping from frame to solid.

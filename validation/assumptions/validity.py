@@ -106,7 +106,7 @@ def closure_cost(posture: Posture, load: ArrayLike | None = None) -> Cost:
 
     Args:
         posture: the robot's configuration.
-        load: (6,) [N m, N] on the platform at its origin, base axes.
+        load: (6,) [N m, N] load on the platform at its origin, base axes.
 
     Returns:
         The error.
@@ -129,7 +129,7 @@ def link_cost(
     Args:
         posture: the robot's configuration.
         stiffness: mapping from frame to the reference K_E, (6, 6) [N m/rad .. N/m].
-        load: (6,) [N m, N] on the platform at its origin, base axes.
+        load: (6,) [N m, N] load on the platform at its origin, base axes.
 
     Returns:
         The error.
@@ -153,8 +153,8 @@ def spread_cost(
 
     Args:
         posture: the robot's configuration.
-        gravity: (3,) [m/s^2] base axes.
-        load: (6,) [N m, N] on the platform at its origin, base axes.
+        gravity: (3,) [m/s^2] gravity in base axes.
+        load: (6,) [N m, N] load on the platform at its origin, base axes.
 
     Returns:
         The error.  The poses of both models are equal to first order.
@@ -172,7 +172,7 @@ def bush_cost(posture: Posture, load: ArrayLike | None = None) -> Cost:
 
     Args:
         posture: the robot's configuration.
-        load: (6,) [N m, N] on the platform at its origin, base axes.
+        load: (6,) [N m, N] load on the platform at its origin, base axes.
 
     Returns:
         The error.
@@ -195,8 +195,8 @@ def pieces_cost(
 
     Args:
         posture: the robot's configuration.
-        load: (6,) [N m, N] on the platform at its origin, base axes.
-        gravity: (3,) [m/s^2] base axes.
+        load: (6,) [N m, N] load on the platform at its origin, base axes.
+        gravity: (3,) [m/s^2] gravity in base axes.
 
     Returns:
         The error, with the number of elements for which it is not significant.

@@ -53,8 +53,7 @@ class Carried:
             rows.
         uncertainty: [m] rms uncertainty of the predicted points of the other rows.
         left: [m] rms residual of the set-up rows.
-        held: [m] rms residual of the set-up rows if the robot's parameters are fixed at
-            their saved values.
+        held: [m] rms residual of the set-up rows with the saved robot parameters.
         open_: names of the most uncertain parameters; empty if the set-up rows suffice.
         left_behind: changes with time in the original session that cannot be fitted,
             because the new session has no column ``cov.time``.

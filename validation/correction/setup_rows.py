@@ -55,4 +55,6 @@ def _range(part: str, order: list[str]) -> list[str]:
             f"--setup: found {quoted(part)}, expected rows 1 to {len(order)}"
         )
     hint = nearest(part, order)
-    raise BadInput(f"--setup: found {quoted(part)}, expected a row's label{hint}")
+    raise BadInput(
+        f"--setup: found {quoted(part)}, expected a row number or a label{hint}"
+    )

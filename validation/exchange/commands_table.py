@@ -23,7 +23,7 @@ from forcefit.validation.exchange.clock import parse_time
 from forcefit.validation.exchange.reading import Writing
 
 _UNIT = re.compile(r"\s*[\[(]\s*([^\])]*?)\s*[\])]$")
-# Units of temperature differences, with their factors to K.
+# Factors that convert temperature differences to K.
 _TEMPERATURES = {"K": 1.0, "degC": 1.0, "°C": 1.0, "C": 1.0}
 _INCHES = {"cm": 1e-2, "in": 0.0254, "inch": 0.0254}
 
@@ -88,7 +88,7 @@ def read_commands(path: Path | str, robot: Robot, writing: Writing) -> Commands:
         )
     if "id" not in header:
         raise BadInput(f'{path}: line 1: missing column "id"')
-    ids: dict[str, int] = {}  # line of each label
+    ids: dict[str, int] = {}  # mapping from label to line number
     times = np.full(len(rows) - 1, np.nan)
     columns = {n: np.empty(len(rows) - 1) for n in header if n not in {"id", "time"}}
     for i, (line, cells) in enumerate(rows[1:]):

@@ -122,7 +122,7 @@ def _units_of(factor: float) -> tuple[float, str]:
     If there is no such ratio, 1 and an empty string are returned.
     """
     found = [
-        (_UNITS[b] / _UNITS[a], f"as {b} taken for {a}", a, b)
+        (_UNITS[b] / _UNITS[a], f'probably because "{b}" was read as "{a}"', a, b)
         for a, b in permutations(_UNITS, 2)
         if abs(factor * _UNITS[a] / _UNITS[b] - 1) < _UNIT and _UNITS[a] != _UNITS[b]
     ]

@@ -12,7 +12,7 @@ _GROSS = 20.0
 # Targets are regarded as exchanged if their exchange reduces the residual below this
 # fraction.
 _BETTER = 0.25
-_MOST = 6  # largest number of targets for which all orders are tried, here 720
+_MOST = 6  # largest number of targets for which every order is tried
 
 
 @dataclass(frozen=True, eq=False)

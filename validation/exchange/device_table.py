@@ -131,14 +131,14 @@ class _HeadedRows:
         return parse_time(place, stamp, self.values.writing)
 
     def _has_place(self, own: list[int]) -> bool:
-        """Return whether columns contain a point, with x, y and z once each."""
+        """Return whether the columns contain x, y and z exactly once."""
         columns = self.values.header.columns
         axes = [columns[k].axis for k in own if columns[k].kind == "axis"]
         twice = [axis for axis in axes if axes.count(axis) > 1]
         if twice:
             raise BadInput(
                 f"{self.values.sheet.file}: found {axes.count(twice[0])} columns "
-                f"{twice[0]}; expected one, or targets named in them or above"
+                f"{twice[0]}; expected one, or target names in the headings or above"
             )
         return len(axes) == 3
 

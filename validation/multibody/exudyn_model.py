@@ -1,8 +1,9 @@
 """Build an Exudyn model of bodies, springs, contacts, closures and loads.
 
-Bodies are massless for the static solver.  A ``Place`` is a coordinate frame fixed to a
-body.  Elastic parts and locked joints connect two such frames.  Screws and wrenches of
-this module are ordered [R T], although Exudyn orders them as [T R].
+Bodies are massless for the static solver.  A body frame (``Place``) is a coordinate
+frame fixed to a body.  Elastic bodies and locked joints connect two body frames.
+Screws and wrenches of this module are ordered [R T], although Exudyn orders them as
+[T R].
 """
 
 import math
@@ -111,14 +112,14 @@ class Model:
         return Place(int(self.mbs.AddObject(body)), T, np.eye(4))
 
     def add_marker(self, place: Place) -> int:
-        """Add a marker at a place on a body."""
+        """Add a marker at a body frame."""
         marker = self.item.MarkerBodyRigid(
             bodyNumber=place.body, localHT=self.transform(place.local)
         )
         return int(self.mbs.AddMarker(marker))
 
     def add_spring(self, place: Place, K: NDArray) -> Elastic:
-        """Add a body that a spring connects to a place; ``inf`` locks a component."""
+        """Add a body that a spring connects to a body frame; ``inf`` locks an axis."""
         far = self.add_body(place.built)
         markers = [self.add_marker(place), self.add_marker(far)]
         soft = np.isfinite(np.diag(K))
@@ -134,7 +135,7 @@ class Model:
         return Elastic(place, far, (spring,))
 
     def add_idle(self, place: Place, axis: int) -> Elastic:
-        """Add a body that moves along or about one axis of a place on a weak spring."""
+        """Add a body that moves along one axis of a body frame on a weak spring."""
         K = np.diag(np.where(np.arange(6) == axis, HOLDING_STIFFNESS, np.inf))
         spring = self.add_spring(place, K)
         self.idle.append((spring.parts[0], axis))
@@ -199,10 +200,10 @@ class Model:
         self, base: Place, length: float, K: NDArray, elements: int,
         inertia: NDArray,
     ) -> tuple[tuple[int, ...], tuple[Place, ...]]:  # fmt: skip
-        """Add a beam along the x axis of the place at which it is clamped.
+        """Add a beam along the x axis of a body frame, to which it is clamped.
 
         Args:
-            base: place at which the beam is clamped.
+            base: body frame to which the beam is clamped.
             length: [m] length of the beam.
             K: (6, 6) [N, N m^2] stiffness of the section.
             elements: number of elements.
@@ -210,7 +211,7 @@ class Model:
                 [kg m].  Only vibrations require them.
 
         Returns:
-            Exudyn's numbers of the elements, and the places of the nodes.
+            Exudyn's numbers of the elements, and the body frames at the nodes.
         """
         section = self.exu.BeamSection()
         section.stiffnessMatrix = K
@@ -246,7 +247,7 @@ class Model:
         return Closure(first, second, marker, connector, closed)
 
     def add_load(self, place: Place, wrench: NDArray) -> None:
-        """Add a wrench of constant direction at a place, in base axes."""
+        """Add a wrench of constant direction at a body frame, in base axes."""
         torque = self.item.LoadTorqueVector(
             markerNumber=self.add_marker(place), loadVector=wrench[:3].tolist()
         )
@@ -254,7 +255,7 @@ class Model:
         self.add_force(place, wrench[3:])
 
     def add_following_load(self, place: Place, wrench: NDArray) -> None:
-        """Add a wrench that rotates with its body, in the axes of a place."""
+        """Add a wrench that rotates with its body, at and in a body frame."""
         marker = self.add_marker(place)
         for load, vector in (
             (self.item.LoadTorqueVector, wrench[:3]),
@@ -265,7 +266,7 @@ class Model:
             )
 
     def add_force(self, place: Place, force: NDArray) -> None:
-        """Add a force (3,) [N] of constant direction at a place, in base axes."""
+        """Add a force (3,) [N] of constant direction at a body frame, in base axes."""
         load = self.item.LoadForceVector(
             markerNumber=self.add_marker(place), loadVector=force.tolist()
         )
@@ -277,7 +278,7 @@ class Model:
             raise TimeoutError
 
     def node(self, place: Place) -> Any:
-        """Return Exudyn's node number of the body of a place."""
+        """Return Exudyn's node number of the body to which a frame is fixed."""
         return self.mbs.GetObjectParameter(place.body, "nodeNumber")
 
     def transform(self, T: NDArray) -> Any:

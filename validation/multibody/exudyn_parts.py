@@ -1,4 +1,4 @@
-"""Define the places on bodies of a simulation model, and the elements between them.
+"""Define the body frames and elements of a simulation model.
 
 Numbers of objects are those of Exudyn.  Screws and wrenches are ordered [R T] as in the
 whole library.
@@ -46,24 +46,24 @@ class Place:
 
     @property
     def built(self) -> NDArray:
-        """Initial pose of the place in the base frame, (4, 4)."""
+        """Initial pose of this frame in the base frame, (4, 4)."""
         return self.start @ self.local
 
     def moved(self, T: NDArray) -> "Place":
-        """Return a place on the same body with pose ``T`` relative to this place."""
+        """Return a frame on the same body with pose ``T`` relative to this frame."""
         return replace(self, local=self.local @ T)
 
 
 @dataclass(frozen=True, eq=False)
 class Elastic:
-    """An elastic body between two places that coincide in the unstressed state.
+    """An elastic body between two body frames that coincide in the unstressed state.
 
     Attributes:
-        near: place on the inner body.
-        far: place on the outer body.
+        near: body frame on the inner body.
+        far: body frame on the outer body.
         parts: Exudyn's numbers of a connector, or of the elements of a beam.
         beam: whether the elastic body is a beam.
-        nodes: places along a beam from base to tip, at equal distances.
+        nodes: body frames along a beam from base to tip, at equal distances.
         modes: interface modes of a meshed body; None for other elastic bodies.
     """
 
@@ -125,16 +125,16 @@ class Modes:
 
 @dataclass(frozen=True, eq=False)
 class Closure:
-    """Two places that a connector moves into coincidence.
+    """Two body frames that a connector moves into coincidence.
 
     Attributes:
-        first: place on the first chain.
-        second: place on the second chain.
+        first: body frame on the first chain.
+        second: body frame on the second chain.
         marker: Exudyn's number of the connector's end on the first chain.  This end is
             moved to close the loop.
         connector: Exudyn's number of the connector.
-        closed: (4, 4) nominal pose of the second place relative to the first in the
-            closed loop.
+        closed: (4, 4) nominal pose of the second body frame relative to the first body
+            frame in the closed loop.
     """
 
     first: Place
@@ -146,11 +146,11 @@ class Closure:
 
 @dataclass(frozen=True, eq=False)
 class Contact:
-    """A joint with clearance between two places.
+    """A joint with clearance between two body frames.
 
     Attributes:
-        near: place on the inner body.
-        far: place on the outer body.
+        near: body frame on the inner body.
+        far: body frame on the outer body.
         clearance: bounds on the motions of the joint.
     """
 

@@ -18,7 +18,7 @@ from forcefit.validation.multibody.motion import inverse, logarithm, matrix
 
 
 def pose(model: Model, place: Place) -> NDArray:
-    """Return the current pose of a place in the base frame, (4, 4)."""
+    """Return the current pose of a body frame in the base frame, (4, 4)."""
     read, kind = model.mbs.GetObjectOutputBody, model.exu.OutputVariableType
     R = np.reshape(read(place.body, kind.RotationMatrix), (3, 3))
     return matrix(R, read(place.body, kind.Position)) @ place.local
@@ -31,7 +31,7 @@ def closure_error(model: Model, closure: Closure) -> NDArray:
 
 
 def screw_between(model: Model, part: Elastic | Contact) -> NDArray:
-    """Return the logarithm of the motion from near to far place, (6,) [rad, m]."""
+    """Return the logarithm of the motion from near to far frame, (6,) [rad, m]."""
     return logarithm(inverse(pose(model, part.near)) @ pose(model, part.far))
 
 
@@ -60,7 +60,7 @@ def contact_energy(model: Model, contact: Contact) -> float:
 
 
 def wrench(model: Model, part: Elastic) -> NDArray:
-    """Return the wrench on the outer body, at and in the far place, (6,) [N m, N]."""
+    """Return the wrench on the outer body, at and in the far frame, (6,) [N m, N]."""
     if part.modes is not None:
         near, far = (pose(model, p)[:3, :3] for p in (part.near, part.far))
         halves = part.modes.wrench @ _mode_coordinates(model, part.modes)

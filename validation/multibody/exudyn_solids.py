@@ -19,18 +19,18 @@ from forcefit.validation.multibody.motion import matrix, shifted
 
 
 def add_mesh(model: Model, place: Place, body: MeshBody) -> Elastic:
-    """Add a meshed body in a floating frame, with its unstressed tip at a place.
+    """Add a meshed body in a floating frame, with its unstressed tip at a body frame.
 
     The modes of the body are the static modes of its rigid interfaces
     (Hurty-Craig-Bampton).  Exudyn computes them from the full stiffness matrix.
 
     Args:
         model: model to which the body is added.
-        place: place of the tip while the body is unstressed.
+        place: body frame of the tip while the body is unstressed.
         body: the solid.
 
     Returns:
-        The elastic body from the place to the tip.
+        The elastic body.
     """
     solid = body.solid
     floating = _floating(model.fem, solid)

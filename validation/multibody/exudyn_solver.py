@@ -222,12 +222,14 @@ def static_settings(model: Model, start: float, steps: int) -> Any:
     newton.residualMode = 1
     newton.absoluteTolerance = newton.relativeTolerance = model.regularisation.tolerance
     newton.maxIterations = 25
-    newton.numericalDifferentiation.relativeEpsilon = 1e-8  # for user functions
+    newton.numericalDifferentiation.relativeEpsilon = (
+        1e-8  # for forces of user functions
+    )
     return settings
 
 
 def _record(model: Model) -> None:
-    """Record the current poses of the recorded places."""
+    """Record the current poses of the recorded body frames."""
     if model.recorded:
         model.history.append(np.array([pose(model, place) for place in model.recorded]))
 

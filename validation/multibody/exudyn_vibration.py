@@ -22,8 +22,8 @@ def set_masses(model: Model, bodies: list[tuple[Place, float, NDArray]]) -> None
 
     Args:
         model: solved model.
-        bodies: place of the centre of mass, mass [kg], and inertia tensor (3, 3) [kg
-            m^2] about this centre in the axes of the place, for each body.
+        bodies: body frame at the centre of mass, mass [kg], and inertia tensor (3, 3)
+            [kg m^2] about this centre in the axes of the body frame, for each body.
     """
     for item in range(model.mbs.systemData.NumberOfObjects()):
         if model.mbs.GetObject(item)["objectType"] == "RigidBody":

@@ -86,8 +86,8 @@ _LAW = "springForceTorqueUserFunction"
 def _freeze(model: Model, closure: Closure) -> None:
     """Replace the connector of a closed loop by a constant wrench.
 
-    The connector acts half-way between the closed place and its target, which differ by
-    the deformation of the connector.  The constant wrench acts at the closed place.
+    The connector acts half-way between the closed frame and its target, which differ by
+    the deformation of the connector.  The constant wrench acts at the closed frame.
     """
     wrench = connector_wrench(model, closure.connector)
     screw = wrench / model.regularisation.closing

@@ -120,8 +120,8 @@ class OpenTree:
 
     Attributes:
         platform: (4, 4) nominal pose of the platform in the base frame.
-        bodies: places of the frames on their bodies, before clearances and springs.
-        before: places of the frames before the motion of their joints.
+        bodies: frames of the robot on their bodies, before clearances and springs.
+        before: frames of the robot before the motion of their joints.
         links: elastic links.
         joints: joint springs.
         idle: weak springs of free motions.
@@ -187,7 +187,7 @@ def refuse_helical(robot: Robot) -> None:
 def _add_frame(
     model: Model, case: Case, frame: Frame, parent: Place, tree: OpenTree
 ) -> Place:
-    """Add a body with error, link and joint; return the place before the joint."""
+    """Add a body with error, link and joint, and return the frame before the joint."""
     error = case.scale * frame.geometric_error
     place = parent.moved(placement(frame.rotation, frame.translation))
     place = place.moved(placement(error[:3], error[3:]))
@@ -240,7 +240,7 @@ def _own_motion(frame: Frame, q: float) -> NDArray:
 
 
 def _add_beam(model: Model, place: Place, frame: Frame, elements: int) -> Elastic:
-    """Add a straight beam from a body, to which it is clamped, to a place."""
+    """Add a straight beam that ends at a body frame."""
     link = frame.link
     assert isinstance(link, BeamLink)
     length, x = beam_span(frame, link)

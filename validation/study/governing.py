@@ -24,7 +24,7 @@ ERROR, CLEARANCE = "geometric error", "clearance"
 
 
 def governing(posture: Posture, assumption: str = "frozen") -> list[dict[str, Any]]:
-    """Return the bounds of problem (27) without each of the imperfections.
+    """Return the bounds of problem (27) with each imperfection removed in turn.
 
     If two errors compensate each other, removing one of them increases the bound.
 

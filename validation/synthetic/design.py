@@ -85,7 +85,7 @@ class CampaignDesign:
         if not 0 < self.configurations <= self.rows:
             raise BadInput(
                 f"design: found {self.configurations} configurations in {self.rows} "
-                "rows; expected at least one, and no more than rows"
+                "rows; expected at least one configuration and at least as many rows"
             )
 
 

@@ -21,7 +21,7 @@ from forcefit.validation.synthetic.outside import OUTSIDE
 _SHAPES = (
     "phase", "exponent", "time_constant", "order", "at", "period", "knee",
 )  # fmt: skip
-SLIDING = ("_lead", "_lead_backlash")  # effects of prismatic joints only
+SLIDING = ("_lead", "_lead_backlash")  # effects that apply only to prismatic joints
 
 
 class NotApplicable(ValueError):
@@ -246,7 +246,7 @@ def _stepped(robot: Robot, rng: np.random.Generator, _: float) -> Parameters:
     return {f"{name}.below": soft, f"{name}.above": hard, f"{name}.knee": 4.0}
 
 
-# Functions of robot, random number generator and duration [s].
+# Functions that draw parameters from robot, random number generator and duration [s].
 _DRAWS: dict[str, Callable[[Robot, np.random.Generator, float], Parameters]] = {
     "self_weight": _weight,
     "thermal_expansion": lambda r, rng, _: dict.fromkeys(_some(_bodies(r), rng), 2e-5),

@@ -115,7 +115,7 @@ def test_validity_command_names_the_link_with_the_largest_error(run, tmp_path):
     assert "only that link a beam" in picture.read_text()
 
 
-def test_validity_over_poses_reports_the_median_and_the_largest_error(run, tmp_path):
+def test_validity_over_poses_reports_median_and_largest_error(run, tmp_path):
     """One of three poses is unreachable."""
     listed = tmp_path / "poses.csv"
     listed.write_text("id,pose.tx,pose.tz\na,0,-0.5\nb,0.2,-0.5\nc,3,-0.5\n")

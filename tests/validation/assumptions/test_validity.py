@@ -66,7 +66,7 @@ def test_margin_of_two_bushes_is_the_sum_of_the_ratios(shift, tilt):
     assert bush_margin(at) == pytest.approx(r + theta, rel=1e-9)
 
 
-def test_two_bushes_agree_with_bounds_of_full_and_half_clearances(posture):
+def test_energy_with_bushes_is_between_those_of_independent_bounds(posture):
     """Energy and margin are between those of the paper's bounds."""
     frames = tuple(
         replace(f, clearance=replace(
@@ -217,7 +217,7 @@ def test_position_error_is_known_without_energy():
     assert cost.matters
 
 
-def test_validity_command_marks_assumptions_with_errors_above_the_limits(run, tmp_path):
+def test_validity_command_marks_significant_errors(run, tmp_path):
     """Unknown errors have a reason."""
     target, file = tmp_path / "costs.json", tmp_path / "robot.toml"
     write_robot(irsbot2_with(NUMBERS["cases"][0]), file)
@@ -231,7 +231,7 @@ def test_validity_command_marks_assumptions_with_errors_above_the_limits(run, tm
     assert "above 20 um or 1 %" in out
 
 
-def test_suggested_number_of_beam_elements_has_an_error_below_20_um():
+def test_error_with_suggested_beam_elements_is_below_20_um():
     """A moment bends the beam to a circular arc, so the exact solution is known.
 
     With half of the suggested number of elements, the error exceeds 20 um.

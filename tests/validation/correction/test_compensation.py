@@ -59,9 +59,7 @@ def two_links(x, y, length):
     return first, second
 
 
-def test_compensation_of_a_longer_link_and_an_offset_equals_hand_calculation(
-    tmp_path, run
-):
+def test_compensated_commands_equal_hand_calculation(tmp_path, run):
     robot, table = written(tmp_path, LONGER + ZERO, ["a,0.3,0.9", "b,-0.2,1.2"])
     out, offsets = tmp_path / "out.csv", tmp_path / "offsets.csv"
     left = tmp_path / "diagnosis.json"

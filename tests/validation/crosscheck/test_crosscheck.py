@@ -207,7 +207,7 @@ def test_crosscheck_at_two_scales_fails_for_a_wrong_term(irsbot2, name, broken):
     assert check is None or check.table()["verdict"] == "failed"
 
 
-def test_crosscheck_without_clearances_ignores_clearances_of_the_robot():
+def test_crosscheck_without_clearances_ignores_clearances():
     """With the clearance of 10 um, an error of 8 um would require no energy."""
     check = crosscheck(triangle([0, 0, 0, 8e-6, 0, 0]))
     assert check.posture.robot.frame("a").clearance is None

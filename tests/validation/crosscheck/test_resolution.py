@@ -94,7 +94,7 @@ def test_unloaded_clearance_is_reported_as_unproved():
 @pytest.mark.slow
 @pytest.mark.exudyn
 @pytest.mark.parametrize(("share", "passed"), [(0.5, True), (2.0, False)])
-def test_clearance_error_above_the_smallest_detectable_change_fails(
+def test_crosscheck_fails_above_the_smallest_detectable_change(
     monkeypatch, share, passed
 ):
     """The change is half or twice the smallest detectable change."""

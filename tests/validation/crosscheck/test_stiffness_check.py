@@ -21,7 +21,7 @@ SLOW = ("hexapod", "orthoglide", "arm6")
     "name", ["four_bar", *(pytest.param(n, marks=pytest.mark.slow) for n in SLOW)]
 )
 @pytest.mark.parametrize("links", ["spring", "beam"])
-def test_stiffness_of_robots_without_errors_agrees_with_the_simulation(name, links):
+def test_stiffness_without_errors_agrees_with_the_simulation(name, links):
     """Without errors, beams are straight and their stiffness is K_E."""
     answer = check_stiffness(home_posture(load_robot(name)), links=links)
     assert answer.differences["linearised"] < 1e-8

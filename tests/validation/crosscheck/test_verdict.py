@@ -69,7 +69,7 @@ def test_error_of_three_thousandths_is_detected(wrong, scales):
     assert verdict(compared(scales, wrong)) == "failed"
 
 
-def test_error_that_second_order_cancels_at_a_scale_is_detected():
+def test_error_cancelled_by_a_second_order_term_is_detected():
     """At s = 0.5, the terms of -0.025 s + 0.05 s^2 cancel."""
     assert verdict(compared((1.0, 0.5), wrong=-0.025, third=0.0)) == "failed"
 
@@ -95,7 +95,7 @@ def test_undecided_check_is_reported_after_six_scales():
 @pytest.mark.parametrize(("theirs", "limit", "expected"), [
     (lambda s: 1e-14, "no signal", "no signal"), (lambda s: 1e-6 * s, "fails", "failed")
 ])  # fmt: skip
-def test_value_against_zero_fails_if_it_exceeds_the_noise(theirs, limit, expected):
+def test_difference_from_zero_fails_above_the_noise(theirs, limit, expected):
     """The virtual-joint model has the value 0."""
     scales = (1.0, 0.5, 0.25, 0.125)
     comparison = compare_scales(scales, lambda s: Scale(s, 0.0, theirs(s)), Found)

@@ -80,7 +80,7 @@ def test_frequencies_of_a_spherical_wrist_agree_with_exudyn(moment):
 
 
 @pytest.mark.parametrize("name", ["exechon", "arm6"])
-def test_frequencies_of_robots_with_moments_of_inertia_agree_with_exudyn(name):
+def test_frequencies_with_inertia_tensors_agree_with_exudyn(name):
     """Every frame has a mass, and beams are springs without mass."""
     path = ROOT / "tests" / "validation" / "multibody" / "exechon.toml"
     robot = with_inertias(load_robot(path if name == "exechon" else name),

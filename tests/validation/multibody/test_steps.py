@@ -49,7 +49,7 @@ def by_simulation(errors, load):
     return simulate_assembly(three_beams(errors, ("c", "b"), shim))
 
 
-def test_linear_assembly_steps_differ_from_finite_ones_by_second_order():
+def test_error_of_linear_assembly_steps_is_of_second_order():
     """If errors and loads are halved, the difference decreases by a factor of four."""
     errors = {
         "b": np.array([2e-3, -1e-3, 1e-3, 4e-4, -3e-4, 5e-4]),

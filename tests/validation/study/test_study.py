@@ -136,7 +136,7 @@ def test_study_page_shows_the_results(results):
         assert np.linalg.norm(force) == pytest.approx(size)
 
 
-def test_energy_in_a_study_of_explicit_errors_equals_hand_calculation(tmp_path):
+def test_energy_of_explicit_errors_equals_hand_calculation(tmp_path):
     write_robot(coaxial_beams(np.zeros(6)), tmp_path / "beams.toml")
     text = (
         'robot = "beams.toml"\n[errors.explicit]\ntwo = [0, 0, 0, 2e-4, 0, 0]\n'
@@ -189,7 +189,7 @@ most = [1e-3, 1e-3, 1e-3, 1e-4, 1e-4, 1e-4]
 
 
 @pytest.mark.exudyn
-def test_study_of_an_exactly_constrained_robot_reports_unchecked_results(tmp_path):
+def test_study_without_redundant_constraints_reports_unchecked_results(tmp_path):
     """The errors cause no energy, so only the simulation can check the study."""
     text = JUST_CONSTRAINED + QUIET
     results = run_study(read_study(study_file(tmp_path, text)))

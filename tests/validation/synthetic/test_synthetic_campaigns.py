@@ -147,7 +147,7 @@ def test_multibody_and_spring_programs_agree(name):
 
 
 @pytest.mark.parametrize("name", ["3rrr", "hexapod", "arm6"])
-def test_spring_program_agrees_with_exact_equilibrium_for_large_errors(name):
+def test_spring_program_agrees_with_the_exact_equilibrium(name):
     """Both programs use finite motions and a load that moves with the platform."""
     rng = np.random.default_rng(6)
     robot = without_clearance(load_robot(name))
