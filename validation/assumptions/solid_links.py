@@ -1,4 +1,4 @@
-"""Model links as solids of cubic finite elements whose two rigid ends can move.
+"""Model links as solids of cubic finite elements with two movable rigid ends.
 
 The solid of a beam is a straight bar with the cross-section of the beam.  The stiffness
 of a bar of unit length and unit modulus depends only on the proportions of the

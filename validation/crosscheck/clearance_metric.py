@@ -205,9 +205,9 @@ def optimality_gap(pair: Pair) -> float:
         pair: both solutions of a robot with clearances.
 
     Returns:
-        [-] Difference of the linear model's potential energy from its minimum, divided
-        by a reference energy.  The model is evaluated at the simulated motions,
-        projected onto their cones.  The reference is the largest of the energy without
+        Difference of the linear model's potential energy from its minimum, divided by a
+        reference energy.  The model is evaluated at the simulated motions, projected
+        onto their cones.  The reference is the largest of the energy without
         clearances, the energy with clearances under load, and :data:`FLOOR_ENERGY`.
     """
     best = pair.linear

@@ -115,7 +115,7 @@ class Crosscheck:
 
     @property
     def scales(self) -> NDArray:
-        """(k,) scales of the imperfections, largest first."""
+        """Scales of the imperfections, largest first, (k,)."""
         return np.array([pair.scale for pair in self.pairs])
 
     @property

@@ -20,7 +20,7 @@ from forcefit.stiffness.beam.sections import Section, declared_section
 
 @dataclass(frozen=True, eq=False)
 class HeavyBeam:
-    """A beam loaded by its own weight.
+    """A beam that is loaded by its weight.
 
     Attributes:
         index: index of the beam's frame.

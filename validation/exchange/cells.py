@@ -76,7 +76,7 @@ def read_sheet(path: Path | str, decimal: str = ".") -> Sheet:
 def _with_names_of_words(
     lines: Sequence[tuple[int, str]], rows: Sequence[tuple[int, list[str]]]
 ) -> list[tuple[int, list[str]]]:
-    """Join the words of each heading in a table whose cells are separated by blanks."""
+    """Join the words of each heading if blanks separate the cells of a table."""
     usual = Counter(len(cells) for _, cells in rows).most_common(1)[0][0]
     return [
         (number, wide)

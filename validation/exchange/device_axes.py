@@ -84,7 +84,7 @@ def check_targets(
         measured: (R, T, 3) [m] positions of the targets in each row; NaN if not read.
 
     Returns:
-        Remarks about pairs of targets whose measured and declared distances differ.
+        Remarks about pairs of targets with different measured and declared distances.
 
     Raises:
         BadInput: all distances differ by the same factor.

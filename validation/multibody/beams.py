@@ -45,7 +45,7 @@ def element_stiffness(link: BeamLink, step: float) -> NDArray:
         step: [m] length of an element.
 
     Returns:
-        (6, 6) diagonal stiffness matrix [N, N m^2].
+        Diagonal stiffness matrix, (6, 6) [N, N m^2].
     """
     section = declared_section(link.section, link.poisson)
     E, G = link.young, link.young / (2 * (1 + link.poisson))

@@ -79,7 +79,7 @@ def far_couple(screw: Sequence[float], force: Sequence[float]) -> list[float]:
         force: (3,) [N] force of :func:`middle_wrench`, in the mean axes of the ends.
 
     Returns:
-        (3,) [N m] moment on the far end, in its axes.
+        Moment on the far end, in the axes of this end, (3,) [N m].
     """
     a, b, c, *_ = screw
     w, v = (a, b, c), (screw[3], screw[4], screw[5])

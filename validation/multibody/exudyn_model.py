@@ -71,8 +71,7 @@ class Model:
         callback_error: exception raised by a user function.  Exudyn does not report
             this exception.
         idle: Exudyn's numbers of the springs on free motions, and their axes.
-        recorded: frames on bodies, of which the motion is recorded while the loops are
-            closed.
+        recorded: body frames that are recorded while the loops are closed.
         history: poses of these frames at each step, (frames, 4, 4) each.
     """
 

@@ -65,7 +65,7 @@ def exponential(screw: NDArray) -> NDArray:
         screw: (6,) [rad, m] rotation and translation ``[RX RY RZ TX TY TZ]``.
 
     Returns:
-        (4, 4) matrix of the motion.
+        Matrix of the motion, (4, 4).
     """
     return matrix(turned(screw[:3]), _mean_turn(screw[:3]) @ screw[3:])
 
@@ -77,7 +77,7 @@ def logarithm(T: NDArray) -> NDArray:
         T: (4, 4) motion with a rotation of less than pi.
 
     Returns:
-        (6,) [rad, m] screw; the inverse of :func:`exponential`.
+        Screw, (6,) [rad, m]; this function is the inverse of :func:`exponential`.
     """
     angles = turn_of(T[:3, :3])
     return np.concatenate([angles, np.linalg.solve(_mean_turn(angles), T[:3, 3])])

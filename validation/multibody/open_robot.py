@@ -84,8 +84,8 @@ def link_springs(
     Args:
         robot: robot of the simulation.
         links: ``"beam"`` or ``"spring"``.
-        given: mapping from frame to K_E (6, 6) [N m/rad .. N/m] for links of which the
-            robot contains no K_E.
+        given: mapping from frame to K_E (6, 6) [N m/rad .. N/m] for links without K_E
+            in the robot.
         meshes: mapping from frame to solid.
 
     Returns:

@@ -104,8 +104,7 @@ class SimulationModel:
             geometrically exact beams, and other links are 6 by 6 springs.
             ``"spring"``: all links are springs.
         stiffness: mapping from frame to K_E (6, 6) [N m/rad .. N/m], at the frame in
-            its axes, for links that are springs and of which the robot contains no
-            matrix.
+            its axes, for springs without a matrix in the robot.
         meshes: mapping from frame to meshed body for links that are solids of finite
             elements in a floating frame.
         elements: number of elements of each beam.

@@ -50,7 +50,7 @@ def rest_poses(
             number.
 
     Returns:
-        (k, 4, 4) poses of the platforms in the base frame.
+        Poses of the platforms in the base frame, (k, 4, 4).
 
     Raises:
         SimulationFailed: no equilibrium was found, or the iteration does not converge.

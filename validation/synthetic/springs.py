@@ -1,4 +1,4 @@
-"""Compute equilibria of machines whose links are springs.
+"""Compute equilibria of machines with links as springs.
 
 All rows are solved together, which is faster than the multibody simulation.  Motions
 are finite, and the deformed machine is in equilibrium.  A beam is represented by its
@@ -71,7 +71,7 @@ class _SpringModel:
 
 
 def rest_on_springs(machines: Sequence[Machine]) -> list[Rest]:
-    """Return the equilibria of machines whose links are modelled as springs.
+    """Return the equilibria of machines with links as springs.
 
     Args:
         machines: machines of equal structure, without clearances.

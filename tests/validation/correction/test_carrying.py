@@ -160,7 +160,7 @@ def test_drift_of_an_earlier_session_is_not_used_without_times(machine, run):
     assert load_robot(out).functions == ()
 
 
-def test_drift_is_fitted_again_to_set_up_rows(machine, run):
+def test_drift_is_fitted_to_set_up_rows(machine, run):
     """The set-up rows are every fourth row of the session."""
     folder = measured(machine, 80, 0.8, wave=(-2e-4, 1e-4))
     with_a_wave(machine, 3e-4, 1e-4)

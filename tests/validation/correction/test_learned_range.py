@@ -23,7 +23,7 @@ def robot_file(tmp_path):
     return path
 
 
-def test_learned_range_covers_variables_without_time_and_outliers(tmp_path):
+def test_learned_range_excludes_time_and_outliers(tmp_path):
     robot = read_robot(robot_file(tmp_path))
     campaign = read_commands(write_campaign(tmp_path / "c", HEAD, ROWS), robot)
     ranges = learned_range(campaign, np.array([True, True, False]))

@@ -236,7 +236,7 @@ def drawn(name, size, pose=None):
      pytest.param("irsbot2", 0.1, {"tx": 0.1, "tz": -0.5}, "passed",
                   marks=pytest.mark.slow)],
 )  # fmt: skip
-def test_energy_of_errors_within_the_clearance_is_zero(name, size, pose, said):
+def test_energy_is_zero_for_errors_within_the_clearance(name, size, pose, said):
     """Without overconstraint, the cross-check has no signal."""
     check = crosscheck(drawn(name, size, pose), (1.0, 0.5), clearances=True)
     assert check.pairs[0].linear.energy == pytest.approx(0.0, abs=1e-20)

@@ -67,7 +67,7 @@ def test_colour_of_a_page_of_poses_shows_the_worst_outcome(rows, kind):
     assert len(parse(text).table("tx [mm]")) == 1 + len(rows)
 
 
-def test_page_of_a_failed_simulation_states_the_reason():
+def test_page_of_a_failed_simulation_shows_the_reason():
     failure = {"robot": "r", "status": "simulation failed", "reason": "no equilibrium"}
     text = failure_page(failure, Provenance())
     assert "<p class='verdict bad'>" in text

@@ -80,7 +80,7 @@ def test_ros_bag_readings_are_assigned_to_commands_by_time(
     assert np.abs(campaign.measured[:, 3:]).max() < 1e-12
 
 
-def test_damaged_ros_bag_raises_a_message_of_one_line(tmp_path):
+def test_damaged_ros_bag_is_rejected(tmp_path):
     pytest.importorskip("rosbags")
     (tmp_path / "metadata.yaml").write_text("rosbag2_bagfile_information: {}\n")
     for path in (tmp_path, tmp_path / "no.bag"):

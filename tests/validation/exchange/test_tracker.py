@@ -255,7 +255,7 @@ def test_names_with_any_separator_identify_target_and_command(line, lab, run):
     ("A 1 2 3", {"robot": None}, "robot: missing"),
     ("A 1 2 3", {"windw": 3}, 'unknown key "windw"; did you mean "window"?'),
 ])  # fmt: skip
-def test_invalid_device_file_is_rejected_in_one_line(lab, run, text, targets, message):
+def test_invalid_device_file_is_rejected(lab, run, text, targets, message):
     lab.targets(**targets)
     lab.export(text)
     status, out, err = run(*lab.words())
@@ -270,7 +270,7 @@ def test_invalid_device_file_is_rejected_in_one_line(lab, run, text, targets, me
     ("id,q.one,q.two [grad]", 'found the unit "grad"'),
     ("ids,q.one,q.two", 'unknown column "ids"'),
 ])  # fmt: skip
-def test_invalid_table_of_commands_is_rejected_in_one_line(lab, run, head, message):
+def test_invalid_table_of_commands_is_rejected(lab, run, head, message):
     lab.commands(head=head)
     lab.export("\n".join(points(line=SPATIAL_ANALYZER)))
     status, _, err = run(*lab.words())

@@ -170,7 +170,7 @@ def test_error_of_a_heavy_beam_is_of_fourth_order():
         assert np.log2(left[1] / left[2]) == pytest.approx(4, abs=0.1)
 
 
-def test_couple_of_dead_forces_decreases_with_cosine_of_the_angle():
+def test_couple_of_dead_forces_is_proportional_to_cosine_of_angle():
     """For a spring of 2 N m/rad and a couple of 1 N m, 2 angle = cos(angle)."""
     frames = (
         Frame(

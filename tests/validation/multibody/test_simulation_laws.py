@@ -109,7 +109,7 @@ def test_repeated_simulations_are_bit_identical(rng):
     assert first.energy == second.energy
 
 
-def test_simulation_of_rigid_parts_that_do_not_fit_fails():
+def test_simulation_fails_for_rigid_bodies_that_do_not_fit():
     frames = (
         Frame("a", translation=[1, 0, 0]),
         Frame("b", translation=[1, 0, 0], geometric_error=[0, 0, 0, 1e-4, 0, 0]),

@@ -154,7 +154,7 @@ def test_map_of_three_axes_is_drawn_at_the_largest_error(tmp_path):
     ("frequencies = 3", "service.frequencies: irsbot2: found no moving mass"),
     ("lod = 1", 'service: unknown key "lod"; did you mean "load"?'),
 ])  # fmt: skip
-def test_invalid_service_keys_are_rejected_in_one_line(tmp_path, line, message):
+def test_invalid_service_table_is_rejected(tmp_path, line, message):
     path = tmp_path / "study.toml"
     path.write_text(f'robot = "irsbot2"\n[service]\n{line}\n')
     with pytest.raises(ff.BadInput) as error:

@@ -189,7 +189,7 @@ most = [1e-3, 1e-3, 1e-3, 1e-4, 1e-4, 1e-4]
 
 
 @pytest.mark.exudyn
-def test_study_without_redundant_constraints_reports_unchecked_results(tmp_path):
+def test_study_reports_checks_that_were_not_possible(tmp_path):
     """The errors cause no energy, so only the simulation can check the study."""
     text = JUST_CONSTRAINED + QUIET
     results = run_study(read_study(study_file(tmp_path, text)))
@@ -219,7 +219,7 @@ def test_study_without_a_reachable_point_in_its_map_does_not_pass(tmp_path):
     assert "No point has a solution" in (tmp_path / "out" / "report.html").read_text()
 
 
-def test_study_whose_reference_has_no_solution_does_not_pass(tmp_path, monkeypatch):
+def test_study_without_a_reference_solution_does_not_pass(tmp_path, monkeypatch):
     def lost(*_):
         raise RuntimeError("cvxpy: the problem is unbounded")
 
@@ -307,7 +307,7 @@ def test_robot_file_as_study_file_is_rejected(tmp_path):
     ("title", "scales = [1, -1]\ntitle", "expected at least two different fact"),
     ("title", "title = 1 #", "title: found 1, expected a string"),
 ])  # fmt: skip
-def test_invalid_study_file_is_rejected_in_one_line(tmp_path, old, new, message):
+def test_invalid_study_file_is_rejected(tmp_path, old, new, message):
     path = study_file(tmp_path, SMALL.replace(old, new, 1))
     with pytest.raises(BadInput) as error:
         read_study(path)
@@ -318,14 +318,14 @@ def test_invalid_study_file_is_rejected_in_one_line(tmp_path, old, new, message)
     assert [p.name for p in tmp_path.iterdir()] == ["study.toml"]
 
 
-def test_study_output_that_is_a_file_is_rejected_before_computation(tmp_path):
+def test_file_as_output_folder_is_rejected(tmp_path):
     (tmp_path / "taken").write_text("mine")
     path = study_file(tmp_path, SMALL)
     with pytest.raises(BadInput, match="found a file, expected a folder or nothing"):
         read_study(path, tmp_path / "taken")
 
 
-def test_unreachable_study_pose_is_rejected_before_computation(tmp_path):
+def test_unreachable_study_pose_is_rejected(tmp_path):
     path = study_file(tmp_path, SMALL.replace("tz = -0.5", "tz = -0.9"))
     seen = []
     with pytest.raises(BadInput, match="cannot be reached"):
