@@ -3,7 +3,7 @@
 Begin with ``model/robot.py``, then ``kinematics/posture.py``, ``linear/energy.py``.
 """
 
-if __name__ == "assembly":  # the name of the last release, in a checkout
+if __name__ == "assembly":  # the package name in the last release
     from forcefit.old_packages import use_present_name
 
     use_present_name(__name__)

@@ -1,4 +1,4 @@
-"""Equations (16)-(27) of the paper for small screws, at one or many postures.
+"""Equations (16)-(27) of the paper, at one or many postures.
 
 Start with ``closure.py``.  Continue with ``energy.py`` for problem (22), ``zone.py``
 for problem (21) and ``pose_error.py`` for problem (27).  These three modules call the

@@ -62,14 +62,14 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-# relative to the largest wrench: smaller components are round-off
+# Components below this fraction of the largest component are round-off.
 _ROUNDED = 1e-9
-_NOTHING = 1e-12  # [N m, N] wrench components below this are round-off
+_NOTHING = 1e-12  # [N m, N] smaller wrench components are round-off
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Assembly(Solution[N]):
-    """Minimum-energy assembly of a manipulator, at one point or at many points.
+    """Minimum-energy assembly of a manipulator, at one or many points.
 
     The arrays of many points begin with a point axis, and ``[i]`` returns point i.  If
     no solution was found at point i, ``[i]`` raises the corresponding exception.  For
@@ -89,7 +89,7 @@ class Assembly(Solution[N]):
                 "platform error": f"at most {largest(self.platform_screw[solved])}",
             }
         forces = np.linalg.norm(without_rounding(self.tip_wrenches)[:, 3:], axis=1)
-        # the first of several equal forces, as in links in series
+        # Links in series have equal forces; the first of these links is named.
         most = largest_row(forces)
         return {
             **forced_lines(self),
@@ -113,19 +113,19 @@ class Assembly(Solution[N]):
 
     @property
     def ranks(self) -> dict[str, int]:
-        """Counts of free, elastic, rigid and redundant closure equations at a point."""
+        """Numbers of free, elastic, rigid and redundant closure equations."""
         return reduce_problem(self.linearisation, self.joints, self.frame_loads).ranks
 
     @property
     def loaded(self) -> Any:
-        """(...) bool, True if a load acts on the robot."""
+        """True at points where a load acts on the robot."""
         acting = np.any(self.frame_loads.body, axis=-1)
         acting = acting | np.any(self.frame_loads.joint, axis=-1)
         return plain(np.broadcast_to(acting, np.shape(self.energy_without_clearance)))
 
     @cached_property
     def energy(self) -> N:
-        """(...) [J] elastic energy; 0 where it cannot be distinguished from zero."""
+        """Elastic energy [J]; 0 where it is not distinguishable from round-off."""
         nonzero = differs_from_zero(
             self.stored, self.duality_gap(), self.multipliers,
             self.closure_residual() + self.rounding,
@@ -134,59 +134,59 @@ class Assembly(Solution[N]):
 
     @property
     def stored(self) -> N:
-        """(...) [J] elastic energy of the springs, as computed."""
+        """Elastic energy [J] of the springs, including round-off."""
         return plain(np.vecdot(self.elastic, self.elastic) / 2)
 
     @cached_property
     def potential(self) -> N:
-        """(...) [J] potential: elastic energy minus the work of the loads."""
+        """Potential energy [J]: elastic energy minus the work of the loads."""
         on_errors = np.vecdot(self.frame_loads.body, _flat(self._errors))
         return plain(self.stored - self.work - on_errors)
 
     @cached_property
     def work(self) -> N:
-        """(...) [J] work of the loads on all small screws except the errors."""
+        """Work [J] of the loads on all small screws except the errors."""
         joints = self.clearance_screws + self.joint_screws
         on_bodies = np.vecdot(self.frame_loads.body, _flat(self.link_screws))
         return plain(on_bodies + np.vecdot(self.frame_loads.joint, _flat(joints)))
 
     @property
     def _errors(self) -> NDArray:
-        """(..., n, 6) [rad, m] geometric errors of the frames."""
+        """Geometric errors of the frames, (..., n, 6) [rad, m]."""
         return self.posture.robot.errors if self.errors is None else self.errors
 
     @cached_property
     def clearance_screws(self) -> NDArray:
-        """(..., n, 6) [rad, m] clearances and small motions of passive joints."""
+        """Screws of clearances and passive joints, (..., n, 6) [rad, m]."""
         screws = self.clearances @ self.joints.cones.T
         return _by_frames(screws + self.motions @ self.joints.free.T)
 
     @cached_property
     def link_screws(self) -> NDArray:
-        """(..., n, 6) [rad, m] deformations of the bodies."""
+        """Deformations of the bodies, (..., n, 6) [rad, m]."""
         springs = self.elastic * self.joints.links
         return _by_frames(springs @ self.joints.elastic.T)
 
     @cached_property
     def joint_screws(self) -> NDArray:
-        """(..., n, 6) [rad, m] deformations of the joints."""
+        """Deformations of the joints, (..., n, 6) [rad, m]."""
         springs = self.elastic * ~self.joints.links
         return _by_frames(springs @ self.joints.elastic.T)
 
     @cached_property
     def screws(self) -> NDArray:
-        """(..., n, 6) [rad, m] total screw at each frame, geometric error included."""
+        """Total screw at each frame with its geometric error, (..., n, 6) [rad, m]."""
         moved = self.clearance_screws + self.link_screws + self.joint_screws
         return self._errors + moved
 
     @cached_property
     def platform_screw(self) -> NDArray:
-        """(..., 6) [rad, m] platform's pose error at its origin, base axes, eq. (8)."""
+        """Pose error of the platform at its origin, base axes, (..., 6) [rad, m]."""
         return _times(self.linearisation.platform, _flat(self.screws))
 
     @cached_property
     def closure_wrenches(self) -> NDArray:
-        """(..., closures, 6) [N m, N] wrench of the second chain on the first chain.
+        """Wrench of the second chain on the first, (..., closures, 6) [N m, N].
 
         The wrenches act at the platform's origin and are expressed in base axes.  If
         rigid parts are overconstrained, the wrenches are not unique, and the
@@ -197,7 +197,7 @@ class Assembly(Solution[N]):
 
     @cached_property
     def wrenches(self) -> NDArray:
-        """(..., n, 6) [N m, N] wrench of each link's spring: K_E times its deformation.
+        """Elastic wrench of each link, K_E @ deformation, (..., n, 6) [N m, N].
 
         Each wrench acts at the frame's origin and is expressed in the frame's axes.
         Half of the link's own weight is applied at each of its ends.  See
@@ -207,7 +207,7 @@ class Assembly(Solution[N]):
 
     @cached_property
     def tip_wrenches(self) -> NDArray:
-        """(..., n, 6) [N m, N] wrench that the next part exerts on each body's tip.
+        """Wrench that the next body exerts on each body's tip, (..., n, 6) [N m, N].
 
         Each wrench acts at the frame's origin and is expressed in the frame's axes.
         The body's own weight is distributed along the body.
@@ -216,7 +216,7 @@ class Assembly(Solution[N]):
 
     @cached_property
     def start_wrenches(self) -> NDArray:
-        """(..., n, 6) [N m, N] wrench at the start of each link under its own weight.
+        """Wrench at the start of each link under its own weight, (..., n, 6) [N m, N].
 
         Each wrench acts at the link's start and is expressed in its frame's axes.  The
         entries of bodies without distributed weight are NaN.
@@ -227,7 +227,7 @@ class Assembly(Solution[N]):
 
     @cached_property
     def joint_wrenches(self) -> NDArray:
-        """(..., n, 6) [N m, N] wrench through each joint: K_B times the joint's screw.
+        """Wrench through each joint, K_B times the joint's screw, (..., n, 6) [N m, N].
 
         The difference from :attr:`tip_wrenches` equals the loads that act on the body
         at the frame.
@@ -236,13 +236,13 @@ class Assembly(Solution[N]):
 
     @cached_property
     def _closing(self) -> NDArray:
-        """(..., n, 6) [N m, N] wrench on each frame due to the closures alone."""
+        """Wrench on each frame due to the closures, (..., n, 6) [N m, N]."""
         at_platform = closure_signs(self.posture.robot).T @ self.closure_wrenches
         return np.einsum("...nji,...nj->...ni", self.posture.paths, at_platform)
 
     @cached_property
     def bound(self) -> N:
-        """(...) [J] certified lower bound on the potential energy of the assembly.
+        """Certified lower bound [J] on the potential energy of the assembly.
 
         The bound is the complementary energy of the computed wrenches.  For any
         wrenches w in equilibrium, the energy of every assembly is at least
@@ -259,7 +259,7 @@ class Assembly(Solution[N]):
 
     @property
     def _balancing(self) -> NDArray:
-        """(..., ny) [sqrt(2 J)] spring deformations in equilibrium with the wrenches.
+        """Spring deformations in equilibrium with the wrenches, (..., ny) [sqrt(2 J)].
 
         The wrenches include those of the applied loads.
         """
@@ -283,7 +283,7 @@ class Assembly(Solution[N]):
         )
 
     def closure_residual(self) -> N:
-        """Return (...) the largest closure error in rad, or m / reference length."""
+        """Return the largest closure error, in rad or in reference lengths."""
         return self._residual
 
     @cached_property
@@ -292,7 +292,7 @@ class Assembly(Solution[N]):
         return plain(residual.max(axis=-1, initial=0.0))
 
     def clearance_excess(self, own_axes_free: bool = False) -> N:
-        """Return (...) [-] the largest relative excess of a clearance over its cone."""
+        """Return the largest relative excess of a clearance over its bound."""
         if not own_axes_free and "_excess" in vars(self):
             return self._excess
         bounds = clearance_bounds(self.posture.robot, own_axes_free)
@@ -305,18 +305,18 @@ class Assembly(Solution[N]):
 
     @cached_property
     def rounding(self) -> N:
-        """(...) [rad, lengths] largest closure error that round-off can cause."""
+        """Largest closure error due to round-off, in rad or in reference lengths."""
         size = self.linearisation.size
         return plain(closure_rounding(self._errors, self.joints, size))
 
     @cached_property
     def uncertainty(self) -> N:
-        """(...) [J] duality gap evaluated without cancellation, plus round-off.
+        """Duality gap [J], evaluated without cancellation, plus round-off.
 
         The energy minus its bound equals |y - s|^2 / 2.  Here y are the spring
         deformations, and s the deformations in equilibrium with the wrenches.  Two
-        terms are added: the work that the wrench on each cone could still gain, and the
-        work of the multipliers on the residual of the closures.
+        terms are added: the work that the wrench on each cone could still do, and the
+        work of the multipliers on the closure residual.
         """
         joint, springs = _flat(self.joint_wrenches), self.elastic - self._balancing
         group, on_cones = self.joints.group, joint @ self.joints.cones
@@ -333,7 +333,7 @@ class Assembly(Solution[N]):
         )  # fmt: skip
 
     def duality_gap(self) -> N:
-        """Return (...) [J] certified bound on the excess over the minimum energy."""
+        """Return a certified bound [J] on the excess over the minimum energy."""
         return self._gap
 
     @cached_property
@@ -341,7 +341,7 @@ class Assembly(Solution[N]):
         return plain(np.maximum(self.potential - self.bound, 0.0))  # NaN stays NaN
 
     def relative_gap(self) -> N:
-        """Return (...) [-] the duality gap divided by the elastic energy.
+        """Return the duality gap divided by the elastic energy.
 
         The divisor is at least 1e-4 times the energy without clearance.
         """
@@ -352,7 +352,7 @@ class Assembly(Solution[N]):
 
     @property
     def certified(self) -> Any:
-        """(...) bool: gap <= 1e-8 energy + 1e-12 energy without clearance.
+        """True where gap <= 1e-8 energy + 1e-12 energy without clearance.
 
         Under loads, 1e-12 times the work of the loads is added to the limit.
         """
@@ -399,14 +399,14 @@ def all_loads(
     gravity: ArrayLike | None,
     carried: ArrayLike | None = None,
 ) -> FrameLoads:
-    """Return the loads on all small screws, from the arguments of ``solve_assembly``.
+    """Return the loads on all frames.
 
     Args:
         posture: the robot's configuration.
         load: (6,) [N m, N] wrench on the platform at its origin, base axes.
         bodies: (n, 6) [N m, N] wrenches on the bodies of all frames.
         gravity: (3,) [m/s^2] gravity vector in base axes.
-        carried: (n, 6) [N m, N] wrenches on the parts that the frames' joints carry.
+        carried: (n, 6) [N m, N] wrenches on the bodies that the frames' joints carry.
 
     Returns:
         Loads on every frame, including the weights if ``gravity`` is given.

@@ -39,12 +39,12 @@ from forcefit.assembly.solvers.conic import GAP, GAP_WITHOUT_CLEARANCE, SolverFa
 LARGEST_RESIDUAL = 1e-9
 # [-] largest accepted relative excess of a clearance over its bound
 LARGEST_EXCESS = 1e-9
-# largest accepted error in the screw: absolute [rad, m], and relative to the screw
+# largest accepted error of the platform screw: absolute [rad, m] and relative
 _SCREW, _SCREW_SHARE = 1e-5, 1e-3
-_AMPLIFIED = 10.0  # assumed upper limit of frame motion divided by spring deformation
+_AMPLIFIED = 10.0  # assumed largest ratio of frame motion to spring deformation
 # [-] required difference between upper and lower bound, relative to the distance
 _WIDTH = 3e-5
-# [-] a clearance whose range is a smaller fraction of its cone counts as fixed
+# [-] range, relative to its cone, below which a clearance is treated as fixed
 _HELD = 0.1
 
 
@@ -56,8 +56,7 @@ class ScrewBound:
         rotation: [rad] upper bound; infinite if the platform rotates freely.
         translation: [m] upper bound, at the platform's origin.
         rotation_open: [rad] part of ``rotation`` due to unloaded clearances, which make
-            the screw non-unique.  No possible screw is farther than this from the
-            computed screw.
+            the screw non-unique.
         translation_open: [m] part of ``translation`` due to unloaded clearances.
         rotation_error: [rad] part of ``rotation`` that is numerical error.
         translation_error: [m] part of ``translation`` that is numerical error.
@@ -72,12 +71,12 @@ class ScrewBound:
 
 
 def unproved(assembly: Assembly) -> str:
-    """Return sentences that state which properties the certificate does not prove.
+    """Return sentences about the properties that the certificate does not prove.
 
-    An assembly counts as proved if the closure residuals are at most 1e-9 (rad, or m
-    per reference length), the clearances exceed their bounds by at most 1e-9 relative,
-    and the energy exceeds the minimum by at most 1e-8 times the energy and the work of
-    the loads, plus 1e-12 times the energy without clearance.
+    An assembly is proved if three conditions are met.  The closure residuals are at
+    most 1e-9, in rad or reference lengths.  The clearances exceed their bounds by a
+    factor of at most 1 + 1e-9.  The energy exceeds the minimum by at most 1e-8 times
+    the energy and the work of the loads, plus 1e-12 times the energy without clearance.
 
     Args:
         assembly: minimum-energy assembly.
@@ -100,27 +99,27 @@ def unproved(assembly: Assembly) -> str:
         )
     if not residual <= LARGEST_RESIDUAL:
         sentences.append(
-            f"a closure stays open by {residual:.1e} rad or reference lengths"
+            f"a loop stays open by {residual:.1e} rad or reference lengths"
         )
     if not excess <= LARGEST_EXCESS:
-        sentences.append(f"a clearance is exceeded by {excess:.1e} of its size")
+        sentences.append(f"a clearance is exceeded by {excess:.1e} of its bound")
     if not sentences and not _springs_determined(assembly):
         sentences += unproved_screw(assembly, bound_screw(assembly))
     return "; ".join(sentences)
 
 
 def unproved_screw(assembly: Assembly, bound: ScrewBound) -> list[str]:
-    """Return a message for each part of the platform screw that is too inaccurate.
+    """Return messages if the rotation or translation of the platform is inaccurate.
 
-    Only the unique part of the screw is tested: unloaded clearances are not counted.
+    The non-uniqueness due to unloaded clearances is not counted as inaccuracy.
 
     Args:
         assembly: minimum-energy assembly.
         bound: error bound on the platform screw.
 
     Returns:
-        A message for the rotation, the translation or both, if the error can exceed
-        1e-5 rad or m plus 1e-3 times the value.
+        A message for each half of the screw whose error can exceed 1e-5 rad or m plus
+        1e-3 times its magnitude.
     """
     allowed = _allowed(assembly)
     spread = stiffness_spread(assembly.joints, assembly.linearisation.size)
@@ -163,9 +162,8 @@ def bound_screw(assembly: Assembly) -> ScrewBound:
         assembly: the computed assembly with its wrenches.
 
     Returns:
-        Bounds that follow from the certificate only.  They are computed for boxes
-        around the sets of screws, and can overestimate the true distances by up to a
-        factor of sqrt(3).
+        Bounds on the distances.  They are computed for boxes around the sets of screws,
+        and overestimate the true distances by at most a factor of sqrt(3).
     """
     gap, lin = assembly.uncertainty, assembly.linearisation
     open_closures = lin.rows @ assembly.screws.ravel()
@@ -184,7 +182,7 @@ def bound_screw(assembly: Assembly) -> ScrewBound:
         )
 
     def uncertain(joints: VirtualJoints) -> MovingCones:
-        """Return clearances, springs and residual that the gap does not determine."""
+        """Return the unknowns that the gap does not determine."""
         columns, start, group, room = _room(assembly, joints, gap)
         springs = joints.elastic * np.sqrt(2.0 * gap)
         columns = np.hstack([columns * room, springs])
@@ -229,15 +227,15 @@ def _room(
     group = joints.group
     load = cone_sizes(joints.cones.T @ assembly.joint_wrenches.ravel(), group)
     share = np.divide(gap, load, out=np.full(len(load), np.inf), where=load > 0.0)
-    # in an interval, the range is measured from its end; in a disc, it is the width of
-    # a segment
+    # The range is measured from the end of an interval. In a disc, it is the width of a
+    # circular segment.
     room = np.where(np.bincount(group) > 1, 2.0 * np.sqrt(2.0 * share), share)
     room = np.where(room < _HELD, room, 1.0)
     return joints.cones, clearances_in(assembly, joints), group, room[group]
 
 
 def _farthest(reachable: ReachableSet, part: int, box: float) -> float:
-    """Bound the distance [rad or m] of the set from its centre."""
+    """Bound the distance [rad or m] of the points of a set from its centre."""
     if not 0.0 < box < np.inf:
         return box
     about_centre = replace(reachable, centre=np.zeros(6))
@@ -248,7 +246,7 @@ def _farthest(reachable: ReachableSet, part: int, box: float) -> float:
 
 
 def _extents(reachable: ReachableSet) -> NDArray:
-    """Return the (6,) [rad, m] largest extents along the axes, in either sense."""
+    """Return the largest extent along each axis in both senses, (6,) [rad, m]."""
     extents = []
     for d in np.concatenate([np.eye(6), -np.eye(6)]):
         try:

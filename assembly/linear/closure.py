@@ -8,14 +8,15 @@ meet at a closure must produce the same motion:
 The sign is +1 on the first chain, -1 on the second chain, and 0 for frames that belong
 to neither or to both.  All screws are expressed at the platform's origin in base axes.
 The multiplier of closure k is therefore the wrench at the platform's origin that the
-second chain of k exerts on the first.  ======  =============  ==========
-================================================ symbol  code           shape
-meaning ======  =============  ==========
-================================================ y       ``elastic``    (6n, ny)
-links and joint springs, scaled: energy = y.y / 2 u       ``cones``      (6n, nu)
-clearances in discs, intervals or balls of radius 1 q       ``free``       (6n, nq)
-unbounded motions, in units of their screws ======  =============  ==========
-================================================
+second chain of k exerts on the first.
+
+======  ===========  ========  ===================================================
+symbol  code         shape     meaning
+======  ===========  ========  ===================================================
+y       ``elastic``  (6n, ny)  links and joint springs, scaled: energy = y.y / 2
+u       ``cones``    (6n, nu)  clearances in discs, intervals or balls of radius 1
+q       ``free``     (6n, nq)  unbounded motions, in units of their screws
+======  ===========  ========  ===================================================
 """
 
 from dataclasses import dataclass, field
@@ -81,14 +82,13 @@ def virtual_joints(
 
     Args:
         robot: robot of n frames.
-        springs: whether links and joints are elastic; problem (21) treats them as
-            rigid.
+        springs: whether links and joints are elastic.  They are rigid in problem (21).
         own_axes_free: whether passive joints with stiffness move freely about (or
-            along) their z axis.  If False, the z axis is elastic, or rigid if
-            ``springs`` is False.  The two choices give the two margins of problem (21).
-        bounded_motion: whether to impose the motion limits of passive joints, for all
-            joints or for a set of frames.  These limits are large and rarely active, so
-            callers omit them first and check the solution.
+            along) their z axis.  If False, the motion about z is elastic, or rigid if
+            ``springs`` is False.
+        bounded_motion: whether to impose the motion limits of passive joints; or the
+            set of frames whose limits are imposed.  The limits are rarely active, so
+            callers first omit them and check the solution.
 
     Returns:
         The columns.
@@ -101,7 +101,7 @@ def virtual_joints(
 
 @dataclass(frozen=True)
 class _JointsKey:
-    """Cache key, equal for robots that differ only in errors and masses."""
+    """Cache key; robots that differ only in errors and masses have equal keys."""
 
     parts: tuple
     robot: Robot = field(compare=False)
@@ -156,7 +156,7 @@ def _virtual_joints(
 def _elastic(
     links: NDArray, joints: NDArray, robot: Robot
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
-    """Return the spring columns, and (ny,) bool, True for springs of links."""
+    """Return the spring columns, and whether each belongs to a link."""
     count = len(robot.frames)
     columns, is_link = [np.zeros((6 * count, 0))], []
     for compliances, link in ((links, True), (joints, False)):
@@ -172,7 +172,7 @@ def _elastic(
 
 
 def _cones(bounds: NDArray, scales: NDArray) -> tuple[NDArray, NDArray, NDArray]:
-    """Return bounded clearances: columns, cones, and whether the margin scales each."""
+    """Return the columns, cones and scaling by the margin of clearances."""
     rows, sizes, group, scaled = [], [], [], []
     count = 0
     for i, cone in np.argwhere((bounds > 0) & np.isfinite(bounds)):
@@ -192,7 +192,7 @@ def _cones(bounds: NDArray, scales: NDArray) -> tuple[NDArray, NDArray, NDArray]
 
 
 def _free(bounds: NDArray, robot: Robot) -> NDArray:
-    """Return unit columns of unbounded motions; a helical joint's is [0 0 1 0 0 h]."""
+    """Return unit columns of unbounded motions; [0 0 1 0 0 h] for a helical joint."""
     rows = [6 * i + r for i, cone in np.argwhere(np.isinf(bounds)) for r in CONES[cone]]
     columns = np.zeros((6 * len(bounds), len(rows)))
     columns[rows, np.arange(len(rows))] = 1.0
@@ -230,7 +230,7 @@ class Linearisation:
 
     @cached_property
     def rows(self) -> NDArray:
-        """(6 closures, 6 n) matrix; rows @ screws = 0 for the total screws.
+        """Closure matrix, (6 closures, 6 n); rows @ screws = 0 for the total screws.
 
         The blocks are sign_kj M_j; their translations are divided by :attr:`size`.
         """
@@ -241,7 +241,7 @@ class Linearisation:
 
     @cached_property
     def platform(self) -> NDArray:
-        """(6, 6 n) unscaled map from frame screws to the platform screw, eq. (8)."""
+        """Unscaled map from frame screws to the platform screw, (6, 6 n), eq. (8)."""
         robot = self.posture.robot
         on_path = robot.on_path[robot.index(robot.platform)]
         platform = np.swapaxes(self.posture.paths * on_path[:, None, None], 0, 1)
@@ -249,7 +249,7 @@ class Linearisation:
 
     @cached_property
     def misfit(self) -> NDArray:
-        """(6 closures,) scaled closure error that the geometric errors cause."""
+        """Scaled closure error due to the geometric errors, (6 closures,)."""
         return self.rows @ self.posture.robot.errors.ravel()
 
 

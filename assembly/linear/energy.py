@@ -49,9 +49,9 @@ from forcefit.assembly.solvers.method import Method, check_method, log_reference
 
 __all__ = ["Assembly", "CannotAssemble", "solve_assembly"]
 
-# outcome codes of assembly/kernels/linear/energies.h. Codes from _LEFT on mean that the
-# kernel returned no result. The codes _AT_BOUNDS can be caused by an omitted motion
-# limit of a passive joint
+# Outcome codes of assembly/kernels/linear/energies.h. For codes >= _LEFT, the kernel
+# has no result. An omitted motion limit of a passive joint can cause the codes
+# _AT_BOUNDS.
 _LEFT, _AT_BOUNDS = 2, (5, 6)
 _STATUS: dict[type[Exception], str] = {
     CannotAssemble: CANNOT_ASSEMBLE,
@@ -60,7 +60,7 @@ _STATUS: dict[type[Exception], str] = {
 }
 _NUMBERS = ("energy", "bound", "tight", "work", "residual", "excess")
 _VECTORS = ("clearances", "motions", "multipliers", "elastic")
-# arrays of k points by name; "tight" is the energy without clearance
+# arrays of k points; the key "tight" denotes the energy without clearance
 _Rows = dict[str, NDArray]
 
 
@@ -116,7 +116,7 @@ def solve_assembly(
             compiled method cannot certify; ``"reference"`` uses only numpy and
             Clarabel.  The field ``method`` of the result states the method used for
             each point.
-        carried: (n, 6) or (k, n, 6) [N m, N] wrenches on the parts that the joints of
+        carried: (n, 6) or (k, n, 6) [N m, N] wrenches on the bodies that the joints of
             all frames carry, each at its frame's origin, base axes.
 
     Returns:
@@ -150,7 +150,7 @@ def solve_assembly(
 
 
 def with_free_own_axes(assembly: Assembly) -> Assembly:
-    """Solve (22) with compliant joints that rotate freely about their own axis.
+    """Solve (22) with compliant joints that move freely about their z axis.
 
     Args:
         assembly: assembly of many points.
@@ -164,10 +164,10 @@ def with_free_own_axes(assembly: Assembly) -> Assembly:
 
 
 def together_at(posture: Posture, points: Sequence[Assembly | Exception]) -> Assembly:
-    """Combine points that were solved separately into one object.
+    """Combine separately solved points into one object.
 
     Args:
-        posture: k postures of a robot, whose springs and clearances may differ from
+        posture: k postures of a robot.  Its springs and clearances may differ from
             those of the individual points.
         points: k assemblies, or the exception raised at a point without a solution.
 
@@ -201,12 +201,12 @@ def failure_status(error: Exception) -> str:
 def _solve_one(
     posture: Posture, load: NDArray, loads: FrameLoads, method: Method
 ) -> Assembly:
-    """Solve one posture by the compiled method, or by the reference if necessary."""
+    """Solve one posture by the compiled or, if necessary, the reference method."""
     robot = posture.robot
     if method == "reference":
         return least_energy(posture, load, loads)
     rounding, acting = _rounding_of(robot), loads.rows() if loads else None
-    # copy: C++ obtains the address of a writable array three times as fast
+    # The copy is writable; C++ accesses writable arrays faster.
     T = np.array(posture.transforms, ndmin=4)
     off = np.array([posture.mismatch])
     for bounded in (False, True):
@@ -230,9 +230,9 @@ def _solve_one(
     return with_known(assembly, known)
 
 
-@lru_cache(maxsize=32)  # cached, because it is called for one robot at many postures
+@lru_cache(maxsize=32)  # called for one robot at many postures
 def _rounding_of(robot: Robot) -> float:
-    """Return the largest closure error [rad, lengths] that round-off can cause."""
+    """Return the largest closure error [rad, lengths] due to round-off."""
     joints, _ = structure_of(robot)
     return float(closure_rounding(robot.errors, joints, checked_size(robot)))
 
@@ -241,12 +241,12 @@ def _solve_many(
     posture: Posture, errors: NDArray | None, load: NDArray, loads: FrameLoads,
     own_axes_free: bool, method: Method,
 ) -> Assembly:  # fmt: skip
-    """Solve all points by the compiled method, then unproved ones by the reference."""
+    """Solve all points; use the reference method where the compiled method fails."""
     robot = posture.robot
     T, sets, off = _checked(posture, errors)
     joints, structure = structure_of(robot, True, own_axes_free)
     acting = loads.rows() if loads else None
-    # the points differ only in their loads
+    # Only the loads differ between the points.
     if acting is not None and len(T) == len(sets) == 1:
         sets = np.repeat(sets, len(acting), axis=0)
     count = len(sets) if len(T) == 1 else len(T)
@@ -266,7 +266,7 @@ def _solve_many(
     if left and method == "compiled":
         log_reference(robot.name, "minimum energy", len(left), count)
     for i in left:
-        one = points[i]  # posture and loads of point i
+        one = points[i]
         _record(rows, points.apart, i, _by_reference(one, own_axes_free))
     residual = rows["residual"] + closure_rounding(sets, joints, structure.size)
     _drop_rounding(rows, residual, points.loaded)
@@ -275,7 +275,7 @@ def _solve_many(
 
 
 def _bounds_matter(structure: Structure, outcome: NDArray) -> NDArray:
-    """Return (k,) bool, True where an omitted motion limit could be active."""
+    """Return True for each point where an omitted motion limit can be active."""
     return np.isin(outcome, _AT_BOUNDS) & bool(np.isfinite(structure.free_bound).any())
 
 
@@ -283,12 +283,12 @@ def _within_bounds(
     joints: VirtualJoints, structure: Structure, matter: NDArray,
     given: tuple[NDArray, NDArray, NDArray, NDArray | None], rows: _Rows,
 ) -> tuple[NDArray, VirtualJoints, _Rows]:  # fmt: skip
-    """Solve again at points where motion limits of passive joints can be active.
+    """Solve points again with the motion limits of passive joints.
 
     Returns:
-        Indices of the points solved here, with all motion limits as cones; their
-        virtual joints; and their results for these joints.  Results whose shape does
-        not depend on the virtual joints are also stored in ``rows``.
+        Indices of the selected points, their virtual joints, and their results.
+        Results whose shape does not depend on the virtual joints are also stored in
+        ``rows``.
     """
     held = np.flatnonzero(matter)
     T, sets, off, acting = (
@@ -310,7 +310,7 @@ def _within_bounds(
 def _checked(
     posture: Posture, errors: NDArray | None
 ) -> tuple[NDArray, NDArray, NDArray]:
-    """Return checked transforms, errors and closure errors, per point or common."""
+    """Check and return the transforms, errors and closure errors."""
     n = len(posture.robot.frames)
     given = posture.robot.errors if errors is None else errors
     T = posture.transforms.reshape(-1, *posture.transforms.shape[-3:])
@@ -328,7 +328,7 @@ def _checked(
             f"is larger than {LARGEST_LENGTH:g} [rad, m]"
         )
     off = np.broadcast_to(np.asarray(posture.mismatch, dtype=float), (len(T),))
-    # the kernels are compiled for writable arrays in C order
+    # The kernels require writable arrays in C order.
     T, sets, off = (
         np.require(array, dtype=float, requirements=["C", "W"])
         for array in (T, sets, off)
@@ -348,8 +348,7 @@ def _compiled(
         rows["outcome"][:] = _LEFT
     elif loads is None:
         _fill(given, rows, None)
-    # without loads, the results are bit-identical to those of a call without this
-    # argument
+    # Points without loads have bit-identical results with and without this argument.
     else:
         loaded = np.any(loads, axis=(1, 2, 3))
         for some, acting in ((loaded, loads), (~loaded, None)):
@@ -378,14 +377,14 @@ def _empty(joints: VirtualJoints, count: int) -> _Rows:
 
 
 def _unsaid(count: int) -> _Rows:
-    """Allocate the result arrays of k points that the kernel does not fill."""
+    """Allocate result arrays that the kernel does not fill."""
     texts = {"method": "compiled", "status": OK, "reason": ""}
     rows = {name: np.full(count, text, dtype=object) for name, text in texts.items()}
     return rows | {name: np.zeros(count) for name in ("gap", "potential", "least")}
 
 
 def _certify(rows: _Rows, points: Assembly) -> None:
-    """Store gap, potential and lower bound of each point in ``rows``."""
+    """Compute the gap, potential and lower bound of each point."""
     energy, bound, loads = rows["energy"], rows["bound"], points.frame_loads
     rows["gap"][:] = np.maximum(0.0, energy - bound)
     on_errors = loads.body @ points.posture.robot.errors.ravel()
@@ -396,7 +395,7 @@ def _certify(rows: _Rows, points: Assembly) -> None:
 
 
 def _fill(given: tuple[Any, ...], rows: _Rows, loads: NDArray | None) -> None:
-    """Solve the points with errors or loads; the results of other points stay zero."""
+    """Solve the points that have errors or loads; leave other results at zero."""
     if loads is not None or np.count_nonzero(given[2][:1]) or given[2].any():
         structure, T, errors, mismatch = given
         assemble_side_by_side(structure, T, errors, mismatch, loads, rows)
@@ -418,7 +417,7 @@ def _of_rows(
     posture: Posture, joints: VirtualJoints, rows: _Rows, load: NDArray,
     loads: FrameLoads, errors: NDArray | None,
 ) -> Assembly:  # fmt: skip
-    """Return many assemblies as views of ``rows``, whose values can be set later."""
+    """Return many assemblies that share the arrays of ``rows``."""
     known = {"_gap": "gap", "_residual": "residual", "_excess": "excess"}
     known |= {"bound": "least"}
     known |= {k: k for k in ("energy", "work", "platform_screw", "potential")}
@@ -433,7 +432,7 @@ def _of_rows(
 
 
 def _by_reference(where: Assembly, own_axes_free: bool) -> Assembly | Exception:
-    """Return one point solved by the reference method, or the exception raised."""
+    """Solve one point by the reference method; return the result or the exception."""
     try:
         return least_energy(where.posture, where.load, where.frame_loads, own_axes_free)
     except (CannotAssemble, FreeMotion, SolverFailed) as error:
@@ -472,15 +471,15 @@ def _record(
 
 
 def _drop_rounding(rows: _Rows, residual: NDArray, loaded: NDArray) -> None:
-    """Set energies, wrenches and springs that are only round-off to zero, in place."""
+    """Set energies, wrenches and deformations that are only round-off to zero."""
     multipliers = rows["multipliers"]
     drop_zeros(rows["energy"], rows["bound"], multipliers, residual, loaded)
-    # without loads and wrenches, all deformations are round-off
+    # Without loads and wrenches, all deformations are round-off.
     rows["elastic"][~(loaded | multipliers.any(axis=1))] = 0.0
 
 
 def _excess_of(clearances: NDArray, starts: NDArray) -> NDArray:
-    """Return (k,) [-] the largest excess of the clearances (k, nu) over their cones."""
+    """Return each point's largest relative excess of a clearance over its cone."""
     if not clearances.shape[1]:
         return np.zeros(len(clearances))
     squares = np.add.reduceat(clearances.T**2, starts[:-1], axis=0)

@@ -1,10 +1,8 @@
-"""Compiled solution of problems (22), (21), (27) and of K_C at several postures.
+"""Compiled solution of problems (21), (22), (27) and of the stiffness matrix K_C.
 
-Each lane of the processor's vector registers computes one posture, or one search of
-(27), from the poses of the frames to the certificate.  Lanes are independent, so the
-results at a point are bit-identical whether the point is computed alone, in a batch or
-in another order.  Points that the kernels do not cover or cannot certify are marked for
-the reference method.
+Each lane of the processor's vector registers computes one posture.  Lanes are
+independent, so a point has bit-identical results alone and in a batch.  Points that the
+kernels do not cover or cannot certify are marked for the reference method.
 """
 
 from collections.abc import Mapping
@@ -16,7 +14,7 @@ from numpy.typing import NDArray
 from forcefit.assembly.kernels.choice import kernels
 from forcefit.assembly.linear.robot_structure import Structure
 
-# outcome codes of (21), (27) and K_C: certified by the kernel, or left to the reference
+# outcome codes: certified by the kernel, or to be solved by the reference method
 COMPILED, REFERENCE = range(2)
 _KEPT = 64  # number of robots whose C++ objects are cached
 _known: dict[int, tuple[Structure, Any]] = {}
@@ -84,13 +82,14 @@ def bounds_side_by_side(
         centres: solution of (22): (k, 6) [rad, m] screws of the platform at its origin;
             (k, nu) clearances in the cones of ``structure``; and (k, nq) [rad, m]
             motions, of which only bounded motions are read.
-        held: structure whose solution of (22) identifies the loaded clearances.
+        held: structure for which (22) was solved to identify the loaded clearances.
         loads: solution of (22) for ``held``: (k, 6 closures) multipliers of the scaled
             closures; (k, nu) clearances in the cones of ``held``; (k,) [J] energies;
             (k,) [J] energies with all clearances zero; and (cones,) indices of the
             cones of ``structure`` among the cones of ``held``.
         asked: (3,) [m] vector from the platform's origin to the point whose error is
-            bounded; (2,) [rad, m] required difference of upper and lower bounds.
+            bounded; and (2,) [rad, m] required differences between upper and lower
+            bounds.
         out: arrays to fill: (k, 2) [rad] lower and upper bounds on the rotation; (k, 2)
             [m] bounds of the translation; two arrays (k, 6) [rad, m] of screws that
             attain the lower bounds; (k,) number of support functions computed; and (k,)
@@ -128,7 +127,7 @@ def compliances_side_by_side(
 
 
 def _robot(structure: Structure) -> Any:
-    """Return the C++ object of a structure, created and checked on first use."""
+    """Return the cached C++ object of a structure."""
     known = _known.get(id(structure))
     if known is None:
         if len(_known) >= _KEPT:

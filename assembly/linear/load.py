@@ -4,15 +4,14 @@ A dead load does work on every small screw of the chain between its point of app
 and the base.  A load on the body of frame j acts on the base side of j's joint: it does
 work on the body's error and deformation, but not on the joint's clearance and spring.
 A load ``carried`` by j's joint acts on the platform side of that joint.  The drive
-force of frame j (``drive_force``) acts between j's body and the part that j's joint
+force of frame j (``drive_force``) acts between j's body and the body that j's joint
 carries.  It does work only on the joint's motion.
 
 The weight W of a beam is distributed over its length.  It is replaced by forces W / 2
 at both ends, together with the moments -r x W / 12 and +r x W / 12 of a beam clamped at
-both ends.  The end deflection and rotation then equal those under the distributed load;
-only the deflection between the ends is slightly larger.  The section at the tip
-transmits the wrench of the beam's spring minus the equivalent wrench at the tip, see
-:func:`weights_at_tips`.
+both ends.  The deflections and rotations at the ends then equal those under the
+distributed load.  The section at the tip transmits the wrench of the beam's spring
+minus the equivalent wrench at the tip, see :func:`weights_at_tips`.
 
 Sources:
     Timoshenko, Strength of Materials I, section 38 (beam with built-in ends, uniform
@@ -32,9 +31,7 @@ from forcefit.assembly.model.robot import BeamLink, MeshLink, Robot, beam_axis
 from forcefit.inputs.table import BadInput, quoted
 from forcefit.stiffness.beam.sections import declared_section
 
-_LARGEST_LOAD = (
-    1e60  # [N m, N] upper limit, larger than the largest mass times the largest gravity
-)
+_LARGEST_LOAD = 1e60  # [N m, N] larger than the largest mass times the largest gravity
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,8 +43,8 @@ class FrameLoads:
             bodies.
         joint: (..., 6n) [N m, N] wrenches that do work on clearances, springs and
             motions of joints.
-        distributed: (..., 6n) [N m, N] part of ``body`` that is distributed along the
-            links, reduced to their tips; or zero.
+        distributed: (..., 6n) [N m, N] wrenches at the links' tips that are equivalent
+            to the distributed weights of the links.  They are included in ``body``.
     """
 
     body: NDArray
@@ -55,7 +52,7 @@ class FrameLoads:
     distributed: NDArray = field(default_factory=lambda: np.zeros(()))
 
     def __bool__(self) -> bool:
-        # not any(), which takes five times as long as count_nonzero
+        # count_nonzero is faster than any().
         return bool(np.count_nonzero(self.body) or np.count_nonzero(self.joint))
 
     def __getitem__(self, rows: Any) -> "FrameLoads":
@@ -65,7 +62,7 @@ class FrameLoads:
 
     @property
     def at_tips(self) -> NDArray:
-        """(..., n, 6) [N m, N] ``distributed``, one wrench per frame."""
+        """Field ``distributed`` as one wrench per frame, (..., n, 6) [N m, N]."""
         full = np.broadcast_to(self.distributed, self.body.shape)
         return full.reshape(*full.shape[:-1], -1, 6)
 
@@ -110,7 +107,7 @@ def loads_on_frames(
         load: (6,) [N m, N] wrench on the platform at its origin, base axes.
         bodies: (n, 6) [N m, N] wrench on each frame's body at the frame's origin, base
             axes.
-        carried: (n, 6) [N m, N] wrench at each frame's origin on the part that the
+        carried: (n, 6) [N m, N] wrench at each frame's origin on the body that the
             frame's joint carries, base axes.
 
     Returns:
@@ -139,8 +136,8 @@ def loads_on_frames(
         own[..., robot.index(robot.platform), :] += np.asarray(load, dtype=float)
     acting = np.flatnonzero(given.reshape(-1, n, 6).any(axis=(0, 2)))
     if acting.size:
-        # express all wrenches at the platform's origin, then add up those that act on
-        # the carried frames
+        # Express all wrenches at the platform's origin, then add up the wrenches on the
+        # frames that each frame carries.
         arms = (T[..., :3, 3] - posture.platform[..., None, :3, 3])[..., None, :, :]
         if acting.tolist() != [robot.index(robot.platform)]:  # the platform itself
             given[..., acting, :] = _moved(given[..., acting, :], arms[..., acting, :])
@@ -157,15 +154,15 @@ def loads_on_frames(
 
 @lru_cache(maxsize=32)
 def driven(robot: Robot) -> bool:
-    """Return True if at least one drive of the robot applies a force."""
+    """Return whether a drive of the robot is controlled by force."""
     return any(frame.drive_force for frame in robot.frames)
 
 
 def drive_loads(robot: Robot) -> NDArray:
-    """Return the (n, 6) [N m, N] wrenches that drives exert on the parts they move.
+    """Return the wrenches that drives exert on the bodies they move, (n, 6) [N m, N].
 
-    The wrenches act at each frame's origin, in the frame's axes.  The drive exerts the
-    opposite wrench on its body.
+    Each wrench acts at its frame's origin and is expressed in the frame's axes.  The
+    drive exerts the opposite wrench on the body on which it is mounted.
     """
     wrenches = np.zeros((len(robot.frames), 6))
     for wrench, frame in zip(wrenches, robot.frames, strict=True):
@@ -176,8 +173,8 @@ def drive_loads(robot: Robot) -> NDArray:
 def _with_leading(
     lead: tuple[int, ...], whose: str, shape: tuple[int, ...], own: tuple[int, ...]
 ) -> tuple[int, ...]:
-    """Return the common leading dimensions; ``own`` is the shape without them."""
-    if shape == own:  # the usual case: no leading dimensions
+    """Return the common leading dimensions; ``own`` are the last dimensions."""
+    if shape == own:  # no leading dimensions
         return lead
     try:
         if shape[-len(own) :] != own:
@@ -193,12 +190,12 @@ def _with_leading(
 
 @lru_cache(maxsize=16)
 def _beyond(robot: Robot) -> NDArray:
-    """Return the (n, n) matrix whose entry (i, j) is 1 if frame i carries frame j."""
+    """Return a matrix whose entry (i, j) is 1 if frame i carries frame j, (n, n)."""
     return (robot.on_path & ~np.eye(len(robot.frames), dtype=bool)).T.astype(float)
 
 
 def _moved(wrenches: NDArray, arms: NDArray) -> NDArray:
-    """Transform (..., n, 6) wrenches at points (..., n, 3) to the origin."""
+    """Return wrenches (..., n, 6), applied at points (..., n, 3), about the origin."""
     read = wrenches.copy()
     x, y, z = (arms[..., a] for a in range(3))
     fx, fy, fz = (wrenches[..., a] for a in range(3, 6))
@@ -238,15 +235,15 @@ def weights(posture: Posture, gravity: ArrayLike) -> tuple[NDArray, NDArray]:
             clamp[..., :3] = np.cross(along, W) / 12
             bodies[..., i, :] += _at(np.zeros(3), W / 2) - clamp
             parent = robot.parents[i]
-            if parent >= 0:  # otherwise the base carries it
-                # the beam need not start at the parent's origin
+            if parent >= 0:  # The base carries frames without a parent.
+                # The beam may start outside the parent's origin.
                 arm = T[..., i, :3, 3] - along - T[..., parent, :3, 3]
                 carried[..., parent, :] += _at(arm, W / 2) + clamp
     return bodies, carried
 
 
 def massless(robot: Robot, gravity: ArrayLike | None) -> list[str]:
-    """Return a remark if the robot, or a link given by a mesh, lacks a mass.
+    """Return a remark if the robot has no mass or a mesh link has no density.
 
     Args:
         robot: any robot.
@@ -281,7 +278,7 @@ def massless(robot: Robot, gravity: ArrayLike | None) -> list[str]:
 
 
 def weights_at_tips(posture: Posture, gravity: ArrayLike) -> NDArray:
-    """Reduce the weights distributed along the links to the tips of the links.
+    """Return the wrenches at the tips that are equivalent to the links' weights.
 
     Args:
         posture: one or many configurations of a robot of n frames.
@@ -319,7 +316,7 @@ def wrenches_at_starts(robot: Robot, tips: NDArray, distributed: NDArray) -> NDA
 
 @lru_cache(maxsize=16)
 def _masses(robot: Robot) -> NDArray:
-    """Return (n, 8): mass and centre of each body; mass and vector of its beam."""
+    """Return masses and centres of bodies, masses and vectors of beams, (n, 8)."""
     table = np.zeros((len(robot.frames), 8))
     for row, frame in zip(table, robot.frames, strict=True):
         row[0], row[1:4] = frame.mass, frame.centre_of_mass
@@ -333,7 +330,7 @@ def _masses(robot: Robot) -> NDArray:
 
 
 def loads_with_weight(postures: Posture, load: NDArray, gravity: NDArray) -> FrameLoads:
-    """Return the loads due to a platform wrench and gravity, at one or many postures.
+    """Return the loads due to a platform wrench and gravity.
 
     Args:
         postures: one posture, or R postures in one object.
@@ -341,8 +338,8 @@ def loads_with_weight(postures: Posture, load: NDArray, gravity: NDArray) -> Fra
         gravity: (3,) or (R, 3) [m/s^2] gravity vector in base axes.
 
     Returns:
-        Loads (6n,) or (R, 6n) on all small screws, read-only.  The arrays are shared by
-        robots that differ only in errors, springs and clearances.
+        Loads (6n,) or (R, 6n) on all small screws, read-only.  Robots that differ only
+        in errors, springs and clearances share these arrays.
     """
     robot = postures.robot
     arrays = load, gravity, _masses(robot), drive_loads(robot)
@@ -366,7 +363,7 @@ def _loads_with_weight(content: Content) -> FrameLoads:
 def with_distributed(
     loads: FrameLoads, posture: Posture, gravity: ArrayLike
 ) -> FrameLoads:
-    """Store the distributed weight of the links in the field ``distributed``.
+    """Return loads whose field ``distributed`` contains the links' weights.
 
     Args:
         loads: loads that include the result of :func:`weights`.
@@ -394,5 +391,5 @@ def _check(whose: str, given: ArrayLike | None, largest: float, unit: str) -> No
 
 
 def _at(arm: NDArray, force: NDArray) -> NDArray:
-    """Return the (..., 6) wrench ``[arm x f, f]`` of a force f (..., 3) at a point."""
+    """Return the wrench ``[arm x f, f]`` of a force f about the origin, (..., 6)."""
     return np.concatenate([np.cross(arm, force), force], axis=-1)

@@ -19,13 +19,13 @@ from forcefit.assembly.solvers.method import Method, check_method
 
 @dataclass(frozen=True)
 class Asked:
-    """Settings for the pose error bounds.
+    """Settings of the pose error bounds.
 
     Attributes:
         assumption: name from the table in :mod:`forcefit.assembly.linear.pose_error`.
         energy_budget: eta of the assumption ``budget``.
-        tolerance_rotation: [rad] required gap between upper and lower bound.
-        tolerance_translation: [m] required gap between the translation bounds.
+        tolerance_rotation: [rad] largest accepted gap between upper and lower bound.
+        tolerance_translation: [m] largest accepted gap between the bounds.
         offset: (3,) [m] from the platform's origin to the point whose error is bounded.
         method: ``"compiled"`` or ``"reference"``.
     """
@@ -56,8 +56,8 @@ def compiled_bounds(assembly: Assembly, asked: Asked) -> tuple[dict[str, Any], N
         Mapping with ``rotation_error`` (k, 2) [rad] and ``translation_error`` (k, 2)
         [m], lower and upper bounds; ``rotation_screw`` and ``translation_screw`` (k, 6)
         [rad, m] that attain the lower bounds; and ``supports`` (k,) number of support
-        functions evaluated.  Also (k,) bool, True for points that must be solved in
-        numpy or for which (22) has no solution; their bounds are NaN.
+        functions evaluated.  Also an array (k,) that is True for points without bounds.
+        These points must be solved in numpy, or (22) has no solution.
     """
     count, robot = len(assembly), assembly.posture.robot
     rows = {
@@ -78,8 +78,8 @@ def compiled_bounds(assembly: Assembly, asked: Asked) -> tuple[dict[str, Any], N
         return rows, np.ones(count, dtype=bool)
     solution = assembly
     if asked.assumption == "free":
-        # here, joints rotate about their own axes without energy. A clearance is fixed
-        # only if it remains loaded without the soft springs of these axes
+        # Under this assumption, joints rotate freely about their own axes. A clearance
+        # is fixed only if it remains loaded without the springs about these axes.
         solution = with_free_own_axes(assembly)
         outcome[~np.isfinite(solution.clearances).all(axis=1)] = REFERENCE
     places = _places_of(robot, asked.assumption)
@@ -112,8 +112,7 @@ class _Places(NamedTuple):
 
     Attributes:
         moving: structure of the robot whose columns can move.
-        loaded: structure in whose solution of (22) the loaded clearances are
-            identified.
+        loaded: structure for which (22) is solved to identify the loaded clearances.
         columns: (nu,) columns in (22) of the moving clearances.
         cone_of: (cones,) cones of ``loaded`` that contain the moving clearances.
         bounded: free motions that have a bound.
@@ -130,7 +129,7 @@ class _Places(NamedTuple):
 
 @lru_cache(maxsize=32)
 def _places_of(robot: Robot, assumption: str) -> _Places:
-    """Return the columns that can move under an assumption, cached for each robot."""
+    """Return the columns that can move under an assumption."""
     own_axes_free = assumption == "free"
     moving = structure_of(robot, False, own_axes_free)[1]
     all_of = structure_of(robot)[1]

@@ -1,4 +1,4 @@
-"""Find the minimum-energy assembly whose platform pose is nearest to nominal.
+"""Find the minimum-energy assembly with the smallest pose deviation.
 
 The minimum-energy assembly need not be unique.  Springs and loaded clearances are equal
 in all such assemblies, see ``frozen`` in
@@ -41,7 +41,7 @@ from forcefit.assembly.solvers.conic import minimise_energy
 from forcefit.assembly.solvers.method import Method
 from forcefit.stiffness.screws import skew
 
-_STILL = 1e-11  # [rad, m] range below which a platform pose counts as unique
+_STILL = 1e-11  # [rad, m] range below which the platform pose is treated as unique
 
 
 def nearest_pose(
@@ -59,8 +59,8 @@ def nearest_pose(
 
     Returns:
         The assembly that minimises the Euclidean norm of the deviation (rotation vector
-        [rad] and displacement of the point [m]); and whether clearances leave the pose
-        non-unique.
+        [rad] and displacement of the point [m]); and whether the pose is non-unique
+        because of clearances.
 
     Raises:
         SolverFailed: the cone solver did not converge.
@@ -77,8 +77,8 @@ def nearest_pose(
         moved = _with_clearances(assembly, free, least.clearances)
     exceeded = moved.clearance_excess() > LARGEST_EXCESS
     if exceeded and not assembly.joints.bounded_motion:
-        # an omitted motion limit of a passive joint is active: solve again with all
-        # limits
+        # An omitted motion limit of a passive joint is active. Solve again with all
+        # limits.
         robot = assembly.posture.robot
         if has_bounded_motion(robot):
             bounded = solve_with(
@@ -114,7 +114,7 @@ class _FreeClearances:
 
 
 def _free_clearances(assembly: Assembly, offset: ArrayLike) -> _FreeClearances | None:
-    """Return the clearances that can vary at minimum energy; None if there are none."""
+    """Return the clearances that can vary at minimum energy, or None."""
     joints, lin = assembly.joints, assembly.linearisation
     unloaded = ~loaded_cones(assembly, joints)
     columns = joints.cones[:, unloaded]
@@ -138,7 +138,7 @@ def _free_clearances(assembly: Assembly, offset: ArrayLike) -> _FreeClearances |
 
 
 def _with_clearances(assembly: Assembly, free: _FreeClearances, v: NDArray) -> Assembly:
-    """Replace the unloaded clearances and adapt the free motions."""
+    """Replace the unloaded clearances; satisfy the closures by free motions."""
     joints, lin = assembly.joints, assembly.linearisation
     u = assembly.clearances.copy()
     u[free.unloaded] = v
@@ -159,7 +159,7 @@ def _moves(free: _FreeClearances, method: Method) -> bool:
 def _heights(
     free: _FreeClearances, direction: NDArray, method: Method
 ) -> Iterator[float]:
-    """Yield the range [rad, m] of the platform along a direction and its opposite."""
+    """Yield the ranges [rad, m] of the platform along both senses of each direction."""
     gradient = free.map.T @ direction
     size = float(np.linalg.norm(gradient))
     none, right = np.zeros((0, len(gradient))), free.rows @ free.start

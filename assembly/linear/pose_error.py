@@ -11,19 +11,19 @@ budget   all assemblies with at most (1 + eta) times the minimum energy
 ======== =================================================================
 
 Motions of passive joints stay within their limits.  Rotation and translation are
-bounded separately: a tool on a bearing rotates freely, but the error of its point is
-bounded.
+bounded separately, because a tool on a bearing rotates freely while the error of its
+point is bounded.
 
 The set of platform screws (:mod:`forcefit.assembly.linear.reference.pose_error`) is
 convex.  With ``"compiled"``, :func:`forcefit.assembly.solvers.one_problem.farthest`
-bounds the farthest screw of the set, and calls Clarabel only for uncertain support
+bounds the largest screw of the set, and calls Clarabel only for inaccurate support
 functions.  With ``"reference"``, :func:`forcefit.assembly.solvers.outer_cuts.farthest`
-does this in numpy, and Clarabel computes every support function.
+bounds it in numpy, and Clarabel computes every support function.
 
-For ``frozen`` and ``free`` all steps are compiled
-(:mod:`forcefit.assembly.linear.moving_clearances`), which takes a few tenths of a
-millisecond per point.  For ``budget``, and for points that the compiled search does not
-cover, the set is constructed in numpy, one point at a time.
+For ``frozen`` and ``free``, all steps are compiled
+(:mod:`forcefit.assembly.linear.moving_clearances`).  For ``budget``, and for points
+that the compiled search does not cover, the set is constructed in numpy, one point at a
+time.
 """
 
 from collections.abc import Callable
@@ -72,7 +72,7 @@ class PoseError(PointResults):
         status: (...) ``"ok"``; for many points also ``"cannot assemble"``, or
             ``"solver failed"`` if there is no solution or its certificate is too weak.
         reason: (...) message if the status is not ok.
-        proof: function that returns the unproved properties at one point.
+        proof: function that returns a text about the unproved properties of a point.
     """
 
     assumption: str
@@ -111,10 +111,9 @@ class PoseError(PointResults):
 
     @cached_property
     def unproved(self) -> Any:
-        """(...) unproved properties of the solution of (22) or of the bounds.
+        """Message about unproved properties of the solution of (22) or of the bounds.
 
-        The text is empty if everything is proved.  At a single point, it is computed on
-        first use, because this takes longer than computing the bounds.
+        The text is empty if everything is proved.
         """
         return self.reason if self.of_many else self.reason or self.proof()
 
@@ -152,17 +151,16 @@ def bound_pose_error(
             ``budget``.
         assumption: name from the table at the head of this module.
         energy_budget: eta of ``budget``.
-        tolerance_rotation: [rad] required gap between upper and lower bound.
-        tolerance_translation: [m] required gap between the translation bounds.
+        tolerance_rotation: [rad] largest accepted gap between upper and lower bound.
+        tolerance_translation: [m] largest accepted gap between the bounds.
         offset: (3,) [m] from the platform's origin to the point whose error is bounded,
             base axes.
-        method: ``"compiled"``; or ``"reference"``, which uses only numpy and Clarabel
-            and takes several tenths of a second.
+        method: ``"compiled"``; or ``"reference"``, which uses only numpy and Clarabel.
 
     Returns:
-        Bounds.  They are wider than required only if 400 support functions did not
-        suffice, in which case ``unproved`` contains a message.  They are infinite if
-        the platform can rotate, or its point translate, without limit.  For many
+        Bounds on the errors.  They are wider than required if 400 support functions do
+        not suffice; ``unproved`` then contains a message.  They are infinite if the
+        platform can rotate, or its point translate, without limit.  For many
         assemblies, one object contains all points.  A point without bounds does not
         raise an exception; instead, ``reason`` contains its message.
 
@@ -191,7 +189,7 @@ def bound_pose_error(
 
 
 def _bounds_of_many(assembly: Assembly, asked: Asked) -> PoseError:
-    """Bound the errors at many points, one by one where the kernel fails."""
+    """Bound the errors at many points, by the reference if the kernel fails."""
     rows, left = compiled_bounds(assembly, asked)
     status, reason = assembly.status.copy(), assembly.reason.copy()
     left &= status == OK
@@ -247,7 +245,7 @@ def _too_wide(
 ) -> str:
     """Return a message if the bounds are too far apart, otherwise ``""``."""
     low, high = bounds
-    # both bounds are infinite if the platform can move without bound
+    # Both bounds are infinite if the platform moves freely.
     if high - low <= tolerance or low == high:
         return ""
     return (

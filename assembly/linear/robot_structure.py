@@ -19,7 +19,7 @@ from forcefit.assembly.solvers.cones import cone_starts
 
 
 class Structure(NamedTuple):
-    """Posture-independent arrays that describe a robot.
+    """Arrays that describe a robot independently of its posture.
 
     The robot has n frames and closures with np different patterns of signs.
 
@@ -76,7 +76,7 @@ def structure_of(
     robot: Robot, springs: bool = True, own_axes_free: bool = False,
     bounded_motion: bool = False,
 ) -> tuple[VirtualJoints, Structure]:  # fmt: skip
-    """Return the virtual joints of a robot, as columns and as arrays.
+    """Return the virtual joints of a robot as columns and as arrays.
 
     Args:
         robot: any robot.
@@ -95,7 +95,7 @@ def structure_of(
 
 @dataclass(frozen=True)
 class _Tree:
-    """Robot data needed for a structure in addition to the virtual joints."""
+    """Data of a robot that a structure contains in addition to the virtual joints."""
 
     platform: int
     closures: tuple[tuple[int, int], ...]
@@ -104,13 +104,13 @@ class _Tree:
 
 @lru_cache(maxsize=32)
 def _structure(joints: VirtualJoints, tree: _Tree, own_axes_free: bool) -> Structure:
-    """Return the arrays, cached across robots that differ only in their errors."""
+    """Return the arrays; robots that differ only in their errors share them."""
     robot = tree.robot
     on_path = robot.on_path[tree.platform]
     signs = closure_signs(robot).T.astype(float)
     patterns, pattern_of = np.unique(signs, axis=0, return_inverse=True)
-    # springs form a group if they have equal signs in all closures and on the path to
-    # the platform
+    # The springs of a group have equal signs in all closures and on the path to the
+    # platform.
     spring_frame, springs = _by_frame(joints.elastic)
     acting = np.any(signs[spring_frame] != 0.0, axis=1)
     key = 2 * pattern_of[spring_frame] + on_path[spring_frame]
@@ -122,7 +122,7 @@ def _structure(joints: VirtualJoints, tree: _Tree, own_axes_free: bool) -> Struc
     cone_frame, cones = _by_frame(joints.cones)
     free_frame, free = _by_frame(joints.free)
     bounds = component_bounds(clearance_bounds(robot, own_axes_free))
-    # a helical joint's rotation comes before its translation
+    # The rotation of a helical joint comes before its translation.
     free_axis = (free != 0).argmax(axis=1) if len(free) else np.zeros(0, dtype=int)
     cone_axis = np.abs(cones).argmax(axis=1) if len(cones) else np.zeros(0, dtype=int)
     return Structure(

@@ -1,8 +1,8 @@
-"""Round-off: energies indistinguishable from zero, and ill-conditioned stiffnesses.
+"""Detect energies that are only round-off, and ill-conditioned stiffnesses.
 
-Closures are sums of screws that cancel.  In floating-point arithmetic, a residual of a
-few units in the last place of the terms remains.  The work of the wrenches on this
-residual is round-off, not elastic energy.
+The screws in a closure sum to zero.  In floating-point arithmetic, a residual of a few
+units in the last place remains.  The work of the wrenches on this residual is
+round-off, not elastic energy.
 """
 
 from functools import lru_cache
@@ -14,7 +14,7 @@ from forcefit.assembly.linear.closure import VirtualJoints, in_reference_lengths
 
 # [-] relative round-off error of a sum of a few dozen terms
 ROUNDING = 8 * float(np.finfo(float).eps)
-# stiffness ratio at which the stiffest spring's round-off is 1e-3 of the softest
+# ratio of largest to smallest stiffness above which round-off is significant
 SPREAD = 1e13
 
 
@@ -44,7 +44,7 @@ def _clearance_sum(joints: VirtualJoints, size: float) -> float:
 def differs_from_zero(
     energy: ArrayLike, gap: ArrayLike, multipliers: NDArray, residual: ArrayLike
 ) -> NDArray:
-    """Return whether minimum energies exceed their certified uncertainty.
+    """Return whether minimum energies exceed their uncertainty.
 
     An energy that does not exceed the duality gap can be zero.  The work of the
     wrenches on closure round-off is also counted as uncertainty.
@@ -66,7 +66,7 @@ def drop_zeros(
     energy: NDArray, bound: NDArray, multipliers: NDArray, residual: NDArray,
     loaded: ArrayLike = False,
 ) -> None:  # fmt: skip
-    """Set energies that cannot be distinguished from zero to zero, in place.
+    """Set energies that are only round-off to zero, in place.
 
     Args:
         energy: (k,) [J] minimum energies.
@@ -77,7 +77,7 @@ def drop_zeros(
         loaded: (k,) bool, points under loads.
     """
     zero = ~differs_from_zero(energy, energy - bound, multipliers, residual)
-    # if no energy is zero, no multiplier is round-off
+    # If no energy is zero, no multiplier is round-off.
     if not np.count_nonzero(zero):
         return
     rounding = ~differs_from_zero(energy, 0.0, multipliers, residual) & ~np.array(

@@ -17,7 +17,7 @@ from forcefit.assembly.model.point_results import N, PointResults, plain
 from forcefit.assembly.model.statuses import OK
 
 _VECTORS = ("elastic", "clearances", "motions", "multipliers")
-# names of derived values that can be stored: properties, parts of a certificate
+# names of derived values that can be stored
 KNOWN = (
     "energy", "platform_screw", "work", "potential", "bound", "_gap", "_residual",
     "_excess",
@@ -49,10 +49,10 @@ class Solution(PointResults, Generic[N]):
             ``"no equilibrium"``, or ``"solver failed"``, which also denotes a
             certificate that is too weak.
         reason: (...) message if the status is not ok.
-        apart: for some points, by number: an assembly whose columns differ from
+        apart: separately stored points by index: an assembly whose columns differ from
             ``joints``, or the exception raised if there is no solution.
-        held: sorted numbers of the points at which motion limits of passive joints are
-            active, and an assembly of these points with all motion limits as cones.
+        held: sorted indices of the points at which motion limits of passive joints are
+            active, and the assembly of these points with all motion limits as cones.
     """
 
     linearisation: Linearisation
@@ -108,8 +108,8 @@ class Solution(PointResults, Generic[N]):
         lin, robot = self.linearisation, self.posture.robot
         if self.posture.transforms.ndim > 3:
             lin = replace(lin, posture=self.posture[i])
-        # if the errors are those of the robot, keep the robot object, whose columns are
-        # cached
+        # The virtual joints of the robot object are cached, so it is kept if the errors
+        # are equal.
         if one.errors is not None and not np.array_equal(one.errors, robot.errors):
             robot = robot.with_errors(one.errors)
             lin = replace(lin, posture=replace(lin.posture, robot=robot))
@@ -139,7 +139,7 @@ class Solution(PointResults, Generic[N]):
         return with_known(taken, known)
 
     def in_columns(self, joints: VirtualJoints) -> Self:
-        """Express many points in the columns of other virtual joints.
+        """Express the solutions of many points in the columns of other virtual joints.
 
         Args:
             joints: virtual joints of some points in ``apart``.
@@ -171,7 +171,7 @@ class Solution(PointResults, Generic[N]):
         """Store the points at which motion limits of passive joints are active.
 
         Args:
-            rows: sorted numbers of these points.
+            rows: sorted indices of these points.
             joints: virtual joints with all motion limits as cones.
             parts: ``clearances`` and ``motions`` of these points in the columns of
                 ``joints``.
@@ -189,7 +189,7 @@ class Solution(PointResults, Generic[N]):
 
     @property
     def as_many(self) -> Self:
-        """The solution of one point as a solution of many points, with k = 1."""
+        """Solution of one point in the form of k = 1 points."""
         lin = self.linearisation
         rows: dict[str, Any] = {
             name: np.asarray(getattr(self, name))[None]

@@ -26,13 +26,14 @@ from forcefit.assembly.solvers.conic import SolverFailed
 from forcefit.assembly.solvers.method import Method, check_method, log_reference
 from forcefit.results.display import Figures
 
-# accepted gap between margin and lower bound, relative to the margin
+# largest accepted gap between margin and lower bound, relative to the margin
 MARGIN_GAP = 1e-8
-_GAP_ABSOLUTE = 1e-12  # [-] absolute part of that gap
-# behaviour of compliant joints about their own axis, by the name of the margin
+_GAP_ABSOLUTE = 1e-12  # [-] absolute part of the accepted gap
+# behaviour of compliant joints about their own axis, for each margin
 Compliant = Literal["rigid", "free"]
 MARGINS: dict[str, Compliant] = {"margin": "rigid", "margin_free": "free"}
-ASSEMBLABLE = 1.0 + 1e-6  # largest margin that counts as assemblable: 1 plus round-off
+# largest margin at which a robot can be assembled: 1 plus round-off
+ASSEMBLABLE = 1.0 + 1e-6
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -77,7 +78,7 @@ class Zone(PointResults, Generic[N]):
         largest = margins[np.isfinite(margins)].max(initial=0.0)
         inside = np.count_nonzero(self.assemblable)
         points = f"{len(self)}, {inside} assemble rigidly"
-        return {"points": points, "margin": f"at most {largest:.6g} where there is one"}
+        return {"points": points, "margin": f"at most {largest:.6g} where finite"}
 
     def __getitem__(self, rows: Any) -> "Zone":
         """Return one point or a selection; raise SolverFailed for a failed point."""
@@ -88,15 +89,15 @@ class Zone(PointResults, Generic[N]):
 
     @property
     def assemblable(self) -> Any:
-        """(...) bool, True if the manipulator can be assembled without deformation."""
+        """True where the manipulator can be assembled without deformation."""
         return self.margin <= ASSEMBLABLE
 
     @property
     def unproved(self) -> Any:
-        """(...) reason why the margin is missing or unproved; otherwise empty."""
+        """Reason why the margin is missing or unproved; empty if it is proved."""
         margin, bound = np.atleast_1d(self.margin, self.bound)
         with np.errstate(invalid="ignore"):
-            # the condition is written so that NaN counts as not proved
+            # With NaN, the comparison is False, so the margin is not proved.
             proved = margin - bound <= MARGIN_GAP * margin + _GAP_ABSOLUTE
         text = np.array(self.reason, dtype=object, ndmin=1)
         for i in np.flatnonzero(~proved & (margin != bound) & (text == "")):
@@ -130,7 +131,7 @@ def zone_margin(
     posture: Posture | Sequence[Posture], compliant: Compliant = "rigid",
     errors: ArrayLike | None = None, method: Method = "compiled",
 ) -> Zone:  # fmt: skip
-    """Compute the clearance factor at which a rigid manipulator can just be assembled.
+    """Compute the factor on clearances at which a rigid manipulator can be assembled.
 
     Args:
         posture: the robot's configuration; or many postures of one robot.
@@ -183,7 +184,7 @@ def zone_margin(
 
 
 def _erring(posture: Posture, errors: NDArray, i: int) -> Posture:
-    """Return the posture of point i with the geometric errors of that point."""
+    """Return the posture of a point with the geometric errors of that point."""
     if posture.transforms.ndim > 3:
         posture = posture[i if len(posture.transforms) > 1 else 0]
     own = errors if errors.ndim == 2 else errors[i]
@@ -195,7 +196,7 @@ def _erring(posture: Posture, errors: NDArray, i: int) -> Posture:
 def _compiled(
     posture: Posture, compliant: Compliant, own: NDArray, method: Method
 ) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-    """Compute margins, bounds, forces and a mask of points that remain unsolved."""
+    """Compute margins, bounds and forces; mark points that remain unsolved."""
     if compliant not in {"rigid", "free"}:
         raise ValueError(f"compliant is {compliant!r}, expected 'rigid' or 'free'")
     joints, structure = structure_of(posture.robot, False, compliant == "free")
@@ -209,7 +210,7 @@ def _compiled(
     if not own.any():  # no clearance is needed
         return *np.zeros((2, count)), forces, np.zeros(count, dtype=bool)
     if joints.scaled.all():
-        # the kernels are compiled for writable arrays in C order
+        # The kernels require writable arrays in C order.
         points = (
             np.require(T, requirements=["C", "W"]),
             np.require(own.reshape(-1, *own.shape[-2:]), requirements=["C", "W"]),

@@ -1,9 +1,8 @@
 """Reference method in numpy and Clarabel: problems (21), (22), (27) at one posture.
 
-The reference method is slow but covers all cases: loads, rigid closures, matrices of
-uncertain rank, active motion limits of passive joints.  It is selected by
-``"reference"`` and also solves points that the compiled method does not cover or cannot
-certify.
+The reference method is slow but also covers rigid closures, nearly singular matrices
+and active motion limits of passive joints.  It is selected by ``method="reference"``,
+and it solves points that the compiled method does not cover or cannot certify.
 
 =========  ==========================================  ===============================
 paper      quantity or problem                         function

@@ -1,14 +1,14 @@
 """Problems (21) and (22) written in cvxpy as the paper prints them.
 
-The module is deliberately slow and simple: every screw of every frame is a variable,
-and every constraint is an equation of the paper.  Tests compare the results of
-:mod:`forcefit.assembly.linear.energy` and :mod:`forcefit.assembly.linear.zone` with
-those of this module.  All three use the same robot, bounds c-bar, compliances and eqs
-(13)-(15), but no common code for solving the problems.
+Every screw of every frame is a variable, and every constraint is an equation of the
+paper.  Tests compare the results of :mod:`forcefit.assembly.linear.energy` and
+:mod:`forcefit.assembly.linear.zone` with those of this module.  All three use the same
+robot, bounds c-bar, compliances and eqs (13)-(15), but no common code for solving the
+problems.
 
 The implementation deviates from the paper in two details.  Screws are expressed in mrad
-and mm, which suits the absolute tolerances of the solver, and a screw is fixed at zero
-in rigid directions.
+and mm, which suits the absolute tolerances of the solver.  Deformations in rigid
+directions are fixed at zero.
 """
 
 import warnings
@@ -27,7 +27,7 @@ from forcefit.assembly.model.clearance import (
 from forcefit.assembly.model.links import link_compliances, spring_compliances
 
 OPTIMAL = {"optimal", "optimal_inaccurate"}
-_UNIT = 1e-3  # the unit of screws in this module is mrad or mm
+_UNIT = 1e-3  # screws in this module are in mrad and mm
 
 
 def energy_as_printed(
@@ -68,7 +68,7 @@ def energy_as_printed(
 
 
 def margin_as_printed(posture: Posture, own_axes_free: bool = False) -> float | None:
-    """Return the margin of problem (21): the smallest feasible factor on clearances.
+    """Return the smallest factor on the clearances for which (21) is feasible.
 
     Args:
         posture: the robot's configuration.
@@ -94,7 +94,7 @@ def margin_as_printed(posture: Posture, own_axes_free: bool = False) -> float | 
 
 
 def _root_of_stiffness(C: NDArray) -> NDArray:
-    """Return a (6, 6) root R of the stiffness R^T R, zero in rigid directions."""
+    """Return a matrix R with stiffness = R^T R; rigid directions are omitted."""
     soft = np.flatnonzero(np.diag(C) > 0)
     root = np.zeros_like(C)
     root[np.ix_(soft, soft)] = np.linalg.cholesky(
@@ -104,7 +104,7 @@ def _root_of_stiffness(C: NDArray) -> NDArray:
 
 
 def _clearance_constraints(c: Any, bounds: NDArray, factor: NDArray) -> list:
-    """Return the constraints (2)-(5); ``factor`` (n, 5) multiplies the bounds."""
+    """Return the constraints (2)-(5) with bounds multiplied by ``factor``."""
     import cvxpy as cp
 
     constraints = []
@@ -125,7 +125,7 @@ def _clearance_constraints(c: Any, bounds: NDArray, factor: NDArray) -> list:
 def _assembly_constraints(
     posture: Posture, x_p: Any, bodies: Any, joints: Any
 ) -> list:  # fmt: skip
-    """Return eqs (16)-(20): the end of every chain, and the platform's pose error x_p.
+    """Return eqs (16)-(20) for the ends of all chains and the platform's pose error.
 
     The arguments ``bodies`` and ``joints`` are screws (n, 6).
     """
@@ -137,7 +137,7 @@ def _assembly_constraints(
     stacked = cp.vec(bodies + joints + along_threads, "C")
 
     def pose_error(name: str) -> Any:
-        """Return the displacement of a frame by the screws along its path, eq. (8)."""
+        """Return the displacement of a frame due to the screws on its path, eq. (8)."""
         on_path = robot.on_path[robot.index(name)]
         return np.hstack(posture.paths * on_path[:, None, None]) @ stacked
 
@@ -146,12 +146,12 @@ def _assembly_constraints(
 
 
 def _solve(problem: Any, allowed: set[str]) -> None:
-    """Solve with tight tolerances; raise RuntimeError unless the status is allowed."""
+    """Solve a problem with small tolerances; raise RuntimeError for other statuses."""
     import cvxpy as cp
 
     tight = {"tol_gap_abs": 1e-12, "tol_gap_rel": 1e-11, "tol_feas": 1e-11}
     try:
-        # the warning is redundant, because the status also reports inaccuracy
+        # The status reports inaccurate solutions, so the warning is redundant.
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             problem.solve(solver=cp.CLARABEL, **tight)

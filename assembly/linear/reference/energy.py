@@ -1,4 +1,4 @@
-"""Problem (22) by the reference method: minimise energy minus work, |u_c| <= 1."""
+"""Solve problem (22) by the reference method."""
 
 from dataclasses import replace
 
@@ -23,15 +23,14 @@ from forcefit.assembly.linear.rounding import differs_from_zero, stiffness_sprea
 from forcefit.assembly.model.clearance import has_bounded_motion
 from forcefit.assembly.solvers.conic import ConicSolution, minimise_energy
 
-# stiffness, relative to the softest spring, above which a spring counts as rigid
+# stiffness relative to the softest spring, above which springs are nearly rigid
 _RIGID_BESIDE = 1e19
 
 
 class CannotAssemble(Exception):
     """Raised if neither clearances nor elasticity can close the loops of a robot.
 
-    The exception reports a result rather than a usage error: a closure remains open in
-    a direction in which all parts are rigid.
+    A closure remains open in a direction in which all bodies and joints are rigid.
     """
 
 
@@ -67,7 +66,7 @@ def least_energy(
     else:
         if assembly.clearance_excess(own_axes_free) <= 1e-9:
             return assembly
-    # an omitted motion limit of a passive joint is active: solve again with the limit
+    # An omitted motion limit of a passive joint is active. Solve again with all limits.
     joints = virtual_joints(robot, True, own_axes_free, bounded_motion=True)
     return solve_with(lin, joints, load, frame_loads)
 
@@ -111,27 +110,27 @@ def solve_with(
     residual = assembly.closure_residual() + assembly.rounding
     if frame_loads or differs_from_zero(assembly.stored, 0.0, multipliers, residual):
         return assembly
-    # no energy is needed, so deformations and wrenches are round-off
+    # The robot closes without energy, so deformations and wrenches are round-off.
     return replace(
         assembly, elastic=np.zeros_like(y), multipliers=np.zeros_like(multipliers)
     )
 
 
 def _minimise(reduced: Reduction) -> ConicSolution:
-    """Solve a reduced problem; report the open closure if it is infeasible."""
+    """Solve a reduced problem; raise CannotAssemble if it is infeasible."""
     joints = reduced.joints
     spread = stiffness_spread(joints, reduced.linearisation.size)
     beyond = ""
     if spread > _RIGID_BESIDE:
         beyond = (
             f"; the stiffest spring is {spread:.0e} times as stiff as the "
-            "softest, which exceeds double precision: the stiffest springs "
-            "count as rigid"
+            "softest, which exceeds double precision, so the stiffest springs "
+            "are treated as rigid"
         )
     if reduced.inconsistent:
         raise CannotAssemble(
-            f"a rigid part stays open by {reduced.inconsistent:.3g} rad or "
-            f"reference lengths: no clearance or spring acts there{beyond}"
+            f"a rigid loop stays open by {reduced.inconsistent:.3g} rad or reference "
+            f"lengths, because no clearance or spring can close it{beyond}"
         )
     least = minimise_energy(
         reduced.G, reduced.h, reduced.d, reduced.H, reduced.k, joints.group,
@@ -139,7 +138,7 @@ def _minimise(reduced: Reduction) -> ConicSolution:
     )  # fmt: skip
     if not least.feasible:
         raise CannotAssemble(
-            "the closures stay open: neither a spring nor a clearance within "
-            f"its bounds can close them{beyond}"
+            "the loops stay open, because springs and clearances within their "
+            f"bounds cannot close them{beyond}"
         )
     return least

@@ -1,4 +1,4 @@
-"""Set of platform screws that an assumption of problem (27) admits.
+"""Set of platform screws that are possible under an assumption of problem (27).
 
 Clearances v move within their cones, and free motions q follow through the closures:
 
@@ -7,10 +7,9 @@ Clearances v move within their cones, and free motions q follow through the clos
 A free motion that no closure constrains either leaves the platform fixed or makes
 components of its screw unbounded.
 
-Motions of passive joints are limited.  Most of these limits are never active, and
-mixing cones of 10 rad with cones of 1e-5 reduces the accuracy.  A limit is therefore
-omitted unless the largest possible motion, the sum over the cones of |A_q^+ A_v|,
-exceeds it.
+Motions of passive joints are limited.  Most of these limits are never active, and a
+limit of 10 rad among cones of 1e-5 rad reduces the accuracy.  A limit is therefore
+omitted unless the sum of |A_q^+ A_v| over the cones exceeds it.
 """
 
 from collections.abc import Callable
@@ -48,9 +47,8 @@ from forcefit.results.display import html_table, short_repr
 from forcefit.stiffness.screws import skew
 
 ASSUMPTIONS = ("frozen", "free", "budget")
-# accepted excess of squared clearances over their cones. A smaller value hardly
-# improves solutions, but a cone at its bound would then block the step of all other
-# cones
+# Accepted excess of squared clearances over their cones. With a smaller value, a cone
+# at its bound would block the step of all other cones.
 _EXCESS = 1e-8
 
 
@@ -113,7 +111,7 @@ class ReachableSet:
     __repr__, _repr_html_ = short_repr, html_table
 
     def unbounded(self, part: int) -> bool:
-        """Return whether the rotation (part 0) or translation (part 3) is unbounded."""
+        """Return whether the rotation (``part`` 0) or translation (3) is unbounded."""
         free = self.free[part : part + 3]
         return bool(np.abs(free).max(initial=0.0) > UNBOUNDED)
 
@@ -166,12 +164,12 @@ class ReachableSet:
         return Support(max(height, float(direction @ screw)), screw, reduced)
 
     def _screw_near(self, v: NDArray) -> NDArray:
-        """Return the (6,) [rad, m] screw of a nearby v within all rows and cones."""
-        # rows are satisfied to machine precision, cones to 5e-9 of their size
+        """Return the screw [rad, m] of a feasible point near v."""
+        # Rows are satisfied to machine precision, cones to 5e-9 of their size.
         start, group = self.start, self.group
         step = v - start
         step = step - self.rows.T @ (self.rows @ step)
-        # starting inside all cones: longest part of the step that remains inside
+        # Find the longest step that remains inside all cones.
         aa, ab, bb = (
             np.bincount(group, one * other)
             for one, other in ((step, step), (start, step), (start, start))
@@ -185,7 +183,7 @@ class ReachableSet:
     def farthest(
         self, part: int, tolerance: float, method: Method = "compiled"
     ) -> tuple[tuple[float, float], NDArray, int]:
-        """Bound the largest rotation or translation, and return a screw.
+        """Bound the largest rotation or translation of the set.
 
         Args:
             part: 0 for the rotation, 3 for the translation.
@@ -218,14 +216,14 @@ class ReachableSet:
 
     @property
     def starts(self) -> NDArray:
-        """(cones + 1,) index of the first column of each cone, then nv."""
+        """Index of the first column of each cone, then nv, (cones + 1,)."""
         return cone_starts(self.group)
 
 
 def reachable_screws(
     assembly: Assembly, assumption: str, energy_budget: float = 0.05
 ) -> ReachableSet:
-    """Return the set of platform screws that an assumption of (27) admits.
+    """Return the set of platform screws that are possible under an assumption.
 
     Args:
         assembly: minimum-energy assembly.
@@ -241,12 +239,15 @@ def reachable_screws(
     if assumption not in ASSUMPTIONS:
         raise ValueError(f"assumption is {assumption!r}, expected one of {ASSUMPTIONS}")
     if assumption == "budget" and (assembly.frame_loads or energy_budget < 0):
-        raise ValueError("the budget assumption requires no load and a budget >= 0")
+        raise ValueError(
+            "assumption 'budget': expected an assembly without load and an energy "
+            "budget >= 0"
+        )
     free = assumption == "free"
     loaded = assembly
     if free:
-        # here, joints rotate about their own axes without energy. A clearance is fixed
-        # only if it remains loaded without the soft springs of these axes
+        # Under this assumption, joints rotate freely about their own axes. A clearance
+        # is fixed only if it remains loaded without the springs about these axes.
         loaded = least_energy(
             assembly.posture, assembly.load, assembly.frame_loads, own_axes_free=True
         )
@@ -274,7 +275,7 @@ def within_bounds(
     assembly: Assembly, kept: frozenset[int],
     moving: Callable[[VirtualJoints], MovingCones], own_axes_free: bool = False,
 ) -> ReachableSet:  # fmt: skip
-    """Return the screws reached by moving cones and the resulting free motions.
+    """Return the set of platform screws for given moving cones.
 
     Args:
         assembly: assembly at the start.
@@ -309,7 +310,7 @@ class _Motion:
 
     @cached_property
     def _follow(self) -> tuple[NDArray, NDArray]:
-        """(nq, m) pseudoinverse of A_q; (6, nq) unresisted platform motions."""
+        """Pseudoinverse of A_q, and screws of motions that no closure resists."""
         lin = self.assembly.linearisation
         A_q, P_q = lin.rows @ self.joints.free, lin.platform @ self.joints.free
         inverse = np.linalg.pinv(A_q, rcond=self._with_mismatch(RANK))
@@ -318,15 +319,15 @@ class _Motion:
         return inverse, np.where(large, free, 0.0)
 
     def _with_mismatch(self, threshold: float) -> float:
-        """Return a threshold [-] plus the round-off of the nominal closures."""
+        """Add the round-off of the nominal closures to a threshold."""
         return rank_tolerance(self.assembly.posture.mismatch, threshold)
 
     @cached_property
     def passed(self) -> frozenset[int]:
-        """Frames whose joint motion can exceed a limit that was omitted."""
+        """Frames whose joint motion can exceed an omitted limit."""
         inverse, free = self._follow
         row = self.joints.free.argmax(axis=0)
-        # the motion limit of a joint without a spring is always included
+        # The motion limit of a joint without a spring is always included.
         robot, group = self.joints.robot, self.cones.group
         limit = component_bounds(clearance_bounds(robot)).ravel()[row]
         clearance = component_bounds(scales_with_margin(robot)).ravel()[row]
@@ -338,7 +339,7 @@ class _Motion:
         most = np.abs(middle)
         for c in np.unique(group):
             most = most + np.linalg.norm(step[:, group == c], axis=1)
-        # a motion resisted only by its limit reaches that limit
+        # A motion that no closure resists reaches its limit.
         passing = limited & ((most > limit) | free.any(axis=0))
         return frozenset((row[passing] // 6).tolist())
 
@@ -360,7 +361,7 @@ class _Motion:
 
 
 def clearances_in(assembly: Assembly, joints: VirtualJoints) -> NDArray:
-    """Return the (nu,) clearances of an assembly in the unit cones of other joints."""
+    """Return the clearances of an assembly in the columns of other virtual joints."""
     screws = clearance_components(joints.robot, assembly.clearance_screws).ravel()
     u = joints.cones.T @ screws / (joints.cones**2).sum(axis=0)
     return into_cones(u, joints.group)
@@ -373,7 +374,7 @@ def _rows(A: NDArray, noise: float) -> NDArray:
 
 
 def loaded_cones(assembly: Assembly, joints: VirtualJoints) -> NDArray:
-    """Find the clearances with an active constraint, by strict complementarity.
+    """Find the clearances whose constraint is active.
 
     Args:
         assembly: minimum-energy assembly.
@@ -387,7 +388,7 @@ def loaded_cones(assembly: Assembly, joints: VirtualJoints) -> NDArray:
     screws = clearance_components(joints.robot, assembly.clearance_screws).ravel()
     u = joints.cones.T @ screws / (joints.cones**2).sum(axis=0)
     slack = np.maximum(0.0, 1.0 - cone_sizes(u, joints.group))
-    # the product of contact force and distance from the bound is about the solver's
-    # gap, so one of the two is nearly zero
+    # The product of contact force and distance from the bound is about the solver's
+    # gap. One of the two factors is therefore nearly zero.
     scale = max(assembly.energy, 1e-9 * assembly.energy_without_clearance, 1e-300)
     return ((load > scale * slack) & (load > 1e-9 * scale))[joints.group]

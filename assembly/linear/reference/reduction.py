@@ -44,15 +44,15 @@ from forcefit.assembly.linear.load import FrameLoads, loads_on_frames
 from forcefit.results.display import html_table, numbers, short_repr
 from forcefit.stiffness.screws import SCREW
 
-# relative to the largest joint motion: smaller motions count as round-off
+# motions below this fraction of the largest joint motion are round-off
 _STILL = 1e-6
-_NAMED = 4  # largest number of joints that a message lists
-# relative to the largest load: smaller loads count as round-off
+_NAMED = 4  # largest number of joints in a message
+# loads below this fraction of the largest load are round-off
 _LOAD_ROUNDING = 1e-13
 
 
 class FreeMotion(ValueError):
-    """Raised if a load drives a motion that nothing resists: no equilibrium exists."""
+    """Raised if a load drives a motion that nothing resists."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,31 +98,31 @@ class Reduction:
     __repr__, _repr_html_ = short_repr, html_table
 
     def springs(self, u: NDArray) -> NDArray:
-        """Return the (ny,) [sqrt(2 J)] scaled deformations of all springs for u."""
+        """Return the scaled deformations of all springs, (ny,) [sqrt(2 J)]."""
         return self.spread @ (self.G @ u + self.h) + self.load_springs
 
     @property
     def load_springs(self) -> NDArray:
-        """(ny,) [sqrt(2 J)] scaled deformation that only the loads would cause."""
+        """Scaled deformations due to the loads alone, (ny,) [sqrt(2 J)]."""
         return spring_deformations(
             self.linearisation, self.joints, self.frame_loads, self.load_multipliers
         )
 
     @property
     def energy_without_clearance(self) -> float:
-        """[J] elastic energy with every bounded clearance equal to zero."""
+        """Elastic energy [J] with every bounded clearance equal to zero."""
         bent, h = self.load_springs, self.h
         return float(h @ h + 2 * (self.spread @ h) @ bent + bent @ bent) / 2
 
     def motions(self, u: NDArray, y: NDArray) -> NDArray:
-        """Return the minimum-norm (nq,) free motions for given u and y."""
+        """Return the free motions of minimum norm, (nq,)."""
         A = self.linearisation.rows
         moved = self.joints.cones @ u + self.joints.elastic @ y
         right = -self.linearisation.misfit - A @ moved
         return np.linalg.lstsq(A @ self.joints.free, right, rcond=RANK)[0]
 
     def multipliers(self, springs: NDArray, rigid_multipliers: NDArray) -> NDArray:
-        """Return the minimum-norm (6 closures,) scaled closure wrenches."""
+        """Return the scaled closure wrenches of minimum norm, (6 closures,)."""
         all_springs = self.spread @ springs
         inner = self.elastic_inverse.T @ all_springs + self.rigid @ rigid_multipliers
         return self.load_multipliers + self.basis @ inner
@@ -212,7 +212,7 @@ def spring_deformations(
     frame_loads: FrameLoads,
     multipliers: NDArray,
 ) -> NDArray:
-    """Compute the spring deformations in equilibrium with closures and loads.
+    """Compute the spring deformations that are in equilibrium with the loads.
 
     Args:
         lin: the assembly constraints.
@@ -235,7 +235,7 @@ def _load_multipliers(
     """Return the multipliers that balance the loads along every free motion."""
     A_q, drive = lin.rows @ joints.free, joints.free.T @ frame_loads.joint
     multipliers = np.linalg.lstsq(A_q.T, -drive, rcond=RANK)[0]
-    # the component orthogonal to the rows of A_q is a free motion driven by the load
+    # The component orthogonal to the rows of A_q is a free motion that the load drives.
     left = A_q.T @ multipliers + drive
     most = np.maximum(
         1e-8 * np.abs(drive).max(initial=1e-300),
@@ -252,8 +252,8 @@ def _load_multipliers(
 def _load_rounding(
     lin: Linearisation, joints: VirtualJoints, frame_loads: FrameLoads
 ) -> NDArray:
-    """Return the (nq,) round-off in the work of the loads on free motions."""
-    # factors for screws; those for wrenches are the inverse
+    """Return the round-off in the work of the loads on each free motion."""
+    # The factors scale screws; wrenches are divided by them.
     lengths = in_reference_lengths(lin.size)
     largest = np.abs(frame_loads.joint.reshape(-1, 6) / lengths).max(initial=0.0)
     sizes = np.tile(lengths, len(joints.free) // 6) @ np.abs(joints.free)
@@ -275,7 +275,7 @@ def _motion_text(lin: Linearisation, screws: NDArray) -> str:
     platform = lin.platform @ screws
     turn, shift = np.linalg.norm(platform[:3]) * lin.size, np.linalg.norm(platform[3:])
     if max(turn, shift) <= _STILL * moved.max() * lin.size:
-        return f"{way}; the platform is at rest"
+        return f"{way}; the platform does not move"
     unit = platform / (turn / lin.size if turn > _STILL * shift else shift)
     unit = np.where(np.abs(unit) > _STILL * np.abs(unit).max(), unit, 0.0)
     return f"{way}; the platform moves along {numbers(unit)} [rad, m]"
@@ -289,15 +289,14 @@ def _rigid_rows(
     tolerance: float,
     noise: float,
 ) -> tuple[NDArray, NDArray, NDArray, float]:
-    """Return independent rows that only clearances can satisfy, and their residual."""
+    """Return independent rows without springs, and their residual."""
     rows, wanted = rigid_rows.T @ A_u, rigid_rows.T @ right
     U, S, _ = svd(rows, full_matrices=True)
-    # clearances are small, so the rank is determined relative to their size
+    # Clearances are small, so the rank is determined relative to their size.
     rank = rank_of(S, ROWS_RANK, noise)
     errors = np.abs(lin.rows * lin.posture.robot.errors.ravel()).max(initial=0.0)
     unclosed = np.abs(U[:, rank:].T @ wanted).max(initial=0.0)
-    # rows are classified as rigid within a tolerance, so they contain a small part of
-    # the deformation under loads
+    # Rows are rigid within a tolerance, so a load still deforms them slightly.
     bent = np.abs(right).max(initial=0.0)
     allowed = 1e-12 + 10 * tolerance * max(errors, bent)
     independent = U[:, :rank]

@@ -1,4 +1,4 @@
-"""Problem (21) by the reference method: smallest t with every |u_c| <= t."""
+"""Solve problem (21) by the reference method."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +23,7 @@ from forcefit.assembly.solvers.conic import least_factor
 
 
 def least_margin(posture: Posture, own_axes_free: bool) -> tuple[float, float]:
-    """Compute the clearance factor at which a rigid manipulator can be assembled, (21).
+    """Compute the factor on clearances at which a rigid manipulator can be assembled.
 
     Args:
         posture: the robot's configuration.
@@ -41,8 +41,8 @@ def least_margin(posture: Posture, own_axes_free: bool) -> tuple[float, float]:
     bounds = clearance_bounds(robot, own_axes_free)
     ranges = np.where(scales_with_margin(robot), np.inf, bounds)
     if clearance_excess(clearance_components(robot, screws), ranges) > 1e-9:
-        # an omitted motion limit of a passive joint is active: solve again with the
-        # limit
+        # An omitted motion limit of a passive joint is active. Solve again with all
+        # limits.
         joints = virtual_joints(robot, False, own_axes_free, bounded_motion=True)
         margin, bound, _ = margin_with(lin, joints)
     return margin, bound
@@ -81,7 +81,7 @@ def _margin_of(reduced: Reduction) -> tuple[float, float, NDArray]:
         return np.inf, np.inf, u
     if not np.any(reduced.k):
         return 0.0, 0.0, u
-    # with orthonormal rows, the result does not depend on the units of the closures
+    # With orthonormal rows, the result does not depend on the units of the closures.
     U, S, B = svd(reduced.H, full_matrices=False)
     right = U.T @ reduced.k / S
     t, u, y = least_factor(B, right, joints.group, joints.scaled)

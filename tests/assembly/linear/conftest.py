@@ -1,4 +1,4 @@
-"""The paper's robot at the poses of its workspace."""
+"""The IRSBot-2 at 45 poses of its workspace."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from tests.robots_for_tests import irsbot2_over
 
 @pytest.fixture(scope="module")
 def grid():
-    """The paper's robot with its first random sample, at 45 poses of its workspace."""
+    """Return the IRSBot-2 with random errors, and 45 poses of its workspace."""
     robot, postures = irsbot2_over(
         np.linspace(-0.4, 0.4, 9), np.linspace(-0.6, -0.2, 5)
     )

@@ -1,4 +1,4 @@
-"""Ball clearance |(TX, TY, TZ)| <= c: closed forms, cvxpy, and the reference method."""
+"""Ball clearance |(TX, TY, TZ)| <= c, compared with closed forms and cvxpy."""
 
 from dataclasses import replace
 
@@ -21,7 +21,7 @@ C = 10e-6  # [m]
 
 
 def with_balls(robot):
-    """The robot with every radial clearance replaced by a ball, except for slides."""
+    """Return the robot with ball clearances in place of radial clearances."""
 
     def changed(frame):
         given = frame.clearance
@@ -34,21 +34,18 @@ def with_balls(robot):
 
 
 def pointed(clearance, at=(0.0, 0.0, 0.0)):
-    """The assembly of a tip carried by a single joint with this clearance."""
+    """Return the assembly of a tip that a single joint with clearance carries."""
     frames = (Frame("joint", clearance=clearance), Frame("tip", "joint", list(at)))
     return solve_assembly(home_posture(Robot("tip", "tip", frames)))
 
 
 @pytest.mark.parametrize(("method", "width"), [("compiled", 1e-9), ("reference", 5e-7)])
 def test_ball_clearance_allows_its_radius_in_every_direction(method, width):
-    """The circumscribed cylinder, with radial = axial = c, reaches sqrt(2) c.
-
-    The reference method cuts a round set by at most 400 planes.
-    """
+    """A circumscribed cylinder with radial = axial = c allows sqrt(2) c."""
     for clearance, expected in (
         (Clearance(ball=C), C),
         (Clearance(radial=C, axial=C), np.sqrt(2) * C),
-        # 0.1 m from a joint that tilts by 1 mrad
+        # The tip is 0.1 m from a joint that tilts by 1 mrad.
         (Clearance(ball=C, tilt=1e-3), C + 0.1e-3),
     ):
         found = bound_pose_error(
@@ -61,8 +58,8 @@ def test_ball_clearance_allows_its_radius_in_every_direction(method, width):
 
 
 @pytest.mark.parametrize("gap", [0.5 * C, 1.7 * C, 40 * C])
-def test_energy_outside_a_ball_clearance_depends_on_the_distance_beyond_it(gap):
-    """Two equal springs of 1e6 N/m in series deform by the gap minus the radius."""
+def test_energy_depends_on_the_distance_beyond_a_ball_clearance(gap):
+    """Two springs of 1e6 N/m in series deform by the gap minus the radius."""
     direction = np.array([1.0, -2.0, 2.0]) / 3
     screw = [0, 0, 0, *(gap * direction)]
     robot = coaxial_beams(screw, clearance=Clearance(ball=C))
@@ -79,8 +76,8 @@ def test_energy_outside_a_ball_clearance_depends_on_the_distance_beyond_it(gap):
 
 
 @pytest.mark.parametrize("seed", range(24))
-def test_energy_and_margin_with_ball_clearances_match_the_paper_in_cvxpy(seed):
-    """The tolerances are those used for robots without ball clearances."""
+def test_energy_and_margin_with_ball_clearances_agree_with_cvxpy(seed):
+    """The tolerances equal those for robots without ball clearances."""
     rng = np.random.default_rng(seed)
     posture = home_posture(with_balls(random_robot(rng, 2 + seed % 2, 1 + seed % 3)))
     zone = zone_margin(posture)
@@ -107,7 +104,7 @@ def test_energy_and_margin_with_ball_clearances_match_the_paper_in_cvxpy(seed):
 
 
 @pytest.mark.parametrize("assumption", ["frozen", "free"])
-def test_compiled_pose_error_bounds_with_ball_clearances_overlap_the_reference(
+def test_compiled_pose_errors_with_ball_clearances_agree_with_the_reference(
     assumption,
 ):
     compiled = 0
@@ -130,7 +127,7 @@ def test_compiled_pose_error_bounds_with_ball_clearances_overlap_the_reference(
 
 
 def pressed(force, clearance):
-    """A pin at the end of a spring of 1e6 N/m and 1e4 N m/rad, 0.1 m before its tip."""
+    """Return a pin on a spring of 1e6 N/m and 1e4 N m/rad, 0.1 m before the tip."""
     K = np.diag([1e4, 1e4, 1e4, 1e6, 1e6, 1e6])
     frames = (
         Frame("arm", translation=[0.5, 0, 0], joint_stiffness=K),
@@ -141,7 +138,7 @@ def pressed(force, clearance):
 
 
 @pytest.mark.parametrize("method", ["contact", "exact"])
-def test_closed_ball_clearance_is_compliant_along_its_boundary(method):
+def test_ball_clearance_in_contact_is_compliant_along_its_surface(method):
     """Perpendicular to the force F, the contact acts as a spring F / c in series."""
     direction = np.array([2.0, -1.0, 2.0]) / 3
     posture, load = pressed(300.0 * direction, Clearance(ball=50e-6))
@@ -159,7 +156,7 @@ def test_ball_clearance_has_a_distinct_name_in_results():
 
 
 @pytest.mark.parametrize("key", ["radial", "axial"])
-def test_ball_clearance_replaces_the_other_translational_bounds(key):
+def test_ball_clearance_replaces_radial_and_axial_bounds(key):
     with pytest.raises(BadInput, match=f'clearance.{key}: found together with "ball"'):
         Clearance(ball=C, **{key: C})
     with pytest.raises(BadInput, match=r"clearance\.ball: found a bound on a sliding"):

@@ -1,4 +1,4 @@
-"""Certificates of minimum energy and platform screw, and their loss by round-off."""
+"""Certificates of minimum energy and platform screw, and the effect of round-off."""
 
 from dataclasses import replace
 
@@ -22,7 +22,7 @@ from tests.robots_for_tests import (
 )
 
 
-def test_solutions_with_nan_or_wrong_values_are_not_certified():
+def test_solution_with_nan_or_wrong_values_is_not_certified():
     answer = solve_assembly(place_robot(irsbot2_with(NUMBERS["cases"][0])))
     for spoilt_answer in (
         replace(answer, multipliers=answer.multipliers * np.nan),
@@ -37,9 +37,7 @@ def test_solutions_with_nan_or_wrong_values_are_not_certified():
 
 
 def arm_against_wall(young, soft=50.0):
-    """A bar of modulus ``young`` between a soft hinge and a wall that is off by 0.1 mm
-    along the bar and 0.2 mm across; the hinge rotation is computed.
-    """
+    """Return a bar between a soft hinge and a wall with errors of 0.1 and 0.2 mm."""
     K = np.diag([np.inf, np.inf, soft, np.inf, np.inf, np.inf])
     bar = BeamLink({"radius": 0.01}, young, 0.3, theory="euler")
     frames = (
@@ -54,11 +52,11 @@ def arm_against_wall(young, soft=50.0):
 
 
 @pytest.mark.parametrize("young", [7e10, 1e16, 1e20, 1e22, 1e30, 1e38])
-def test_hinge_rotation_error_is_within_its_bound_or_rejected_as_ill_conditioned(
+def test_hinge_rotation_error_is_within_its_bound_or_uncertified(
     young,
 ):
     """A transverse force F rotates the hinge by t = F L / K and bends the bar by F L^3
-    / (3 E I); together t L + F L^3 / (3 E I) = 0.2 mm.
+    / (3 E I), with t L + F L^3 / (3 E I) = 0.2 mm.
     """
     if young >= 1e30:
         with pytest.raises(CannotAssemble, match="the stiffest spring is 3e"):
@@ -75,9 +73,7 @@ def test_hinge_rotation_error_is_within_its_bound_or_rejected_as_ill_conditioned
 
 
 def test_platform_screw_computed_by_cvxpy_is_within_the_certified_bound():
-    """Energies from cvxpy exceed the minimum by 1e-8 J, which is added to the
-    uncertainty.
-    """
+    """The tolerance of cvxpy, 1e-8 J, is added to the uncertainty."""
     compared = 0
     for seed in range(16):
         rng = np.random.default_rng(seed)
@@ -87,8 +83,8 @@ def test_platform_screw_computed_by_cvxpy_is_within_the_certified_bound():
         except CannotAssemble:
             continue
         energy, screw = energy_as_printed(posture)
-        # the bound also holds for any assembly whose energy is this much above the
-        # minimum
+        # The bound is also valid for assemblies whose energy exceeds the minimum by the
+        # uncertainty.
         worse = replace(answer, multipliers=answer.multipliers)
         worse.__dict__["uncertainty"] = answer.uncertainty + max(
             energy - answer.bound, 1e-9 * answer.energy_without_clearance
@@ -101,8 +97,8 @@ def test_platform_screw_computed_by_cvxpy_is_within_the_certified_bound():
     assert compared > 10
 
 
-def test_errors_that_cancel_to_machine_precision_store_no_energy():
-    """The errors of a loop add up to zero, but not in floating point: 0.1 + 0.2."""
+def test_errors_that_sum_to_round_off_cause_no_energy():
+    """The errors 0.1, 0.2 and -0.3 mm do not sum to zero in floating point."""
     parts = [1e-4, 2e-4, -3e-4]
     frames = [Frame("f0", translation=[0.1, 0, 0], link=MatrixLink(1e6 * np.eye(6)))]
     for i, error in enumerate(parts):
@@ -118,8 +114,7 @@ def test_errors_that_cancel_to_machine_precision_store_no_energy():
     assert assemble_at(robot, posture.transforms[None]).energy[0] == 0.0
     drawn = linear_response(posture).solve(robot.errors[None])
     assert drawn.energy[0] == 0.0
-    # a small energy that is not round-off is preserved: k g^2 / 2 of one spring, by
-    # hand
+    # A small energy that is not round-off is preserved: k g^2 / 2 of one spring.
     for gap in (1e-6, 1e-12, 1e-17):
         frames[1] = replace(frames[1], geometric_error=[0, 0, 0, gap, 0, 0])
         small = replace(robot, frames=(*frames[:2], Frame("f3", "f1", [0.2, 0, 0]),
@@ -134,13 +129,13 @@ def test_errors_that_cancel_to_machine_precision_store_no_energy():
 
 
 def test_duality_gap_of_wrong_multipliers_equals_hand_calculation():
-    """Wrong multipliers and springs cause a duality gap that is known by hand."""
     robot = coaxial_beams(np.array([0, 0, 0, 2e-4, 0, 0]), (1e6, 3e6))
     answer = solve_assembly(home_posture(robot))
     assert answer.duality_gap() < 1e-12 * answer.energy
     for wrong in (0.0, 0.9, 1.1, 2.0):
         spoilt = replace(answer, multipliers=answer.multipliers * wrong)
-        # complementary energy: f g - f^2 C / 2, off by (wrong - 1)^2 of the energy
+        # The complementary energy f g - f^2 C / 2 is too small by (wrong - 1)^2 times
+        # the energy.
         expected = (wrong - 1) ** 2 * answer.energy
         assert spoilt.duality_gap() == pytest.approx(expected, rel=1e-9)
     stiffer = replace(answer, elastic=answer.elastic * 1.01)
@@ -148,8 +143,8 @@ def test_duality_gap_of_wrong_multipliers_equals_hand_calculation():
     assert stiffer.closure_residual() > 1e-7
 
 
-def test_rotation_and_translation_are_certified_to_separate_tolerances():
-    """The tolerance is 1e-5 + 1e-3 of the value: 1.1e-4 rad, and 1e-5 m."""
+def test_rotation_and_translation_have_separate_tolerances():
+    """The tolerance is 1e-5 plus 1e-3 times the value."""
     gap = np.array([0.2, 0, 0, 0, 0, 0])
     assembly = solve_assembly(home_posture(coaxial_beams(gap)))
     assert np.abs(assembly.platform_screw[0]) == pytest.approx(0.1)
@@ -168,7 +163,7 @@ def test_rotation_and_translation_are_certified_to_separate_tolerances():
 
 
 def disturbed(rng, seed):
-    """The assembly of a random robot, and the same with a perturbed solution."""
+    """Return the assembly of a random robot, and its perturbed solution."""
     robot = random_robot(np.random.default_rng(seed), 2, link_share=0.8)
     load = rng.normal(size=6) * [1, 1, 1, 10, 10, 10]
     best = solve_assembly(home_posture(robot), load)
@@ -183,7 +178,7 @@ def disturbed(rng, seed):
 
 
 def bound_by_hand(assembly):
-    """-w.dl - w C w / 2 - work on the clearances - |w q|, summed frame by frame."""
+    """Return the sum of -w.dl - w C w / 2 - clearance work - |w q| over the frames."""
     robot, total = assembly.posture.robot, 0.0
     C_link, C_joint = link_compliances(robot), joint_compliances(robot)
     bounds = clearance_bounds(robot)
@@ -202,7 +197,7 @@ SEEDS = (1, 3, 4, 6, 9, 12)
 
 
 def solvable(rng):
-    """Assemblies of all random robots that can be assembled."""
+    """Yield the assemblies of random robots that can be assembled."""
     for seed in SEEDS:
         try:
             yield disturbed(rng, seed)
@@ -210,8 +205,8 @@ def solvable(rng):
             continue
 
 
-def test_any_wrenches_imply_a_lower_bound_on_the_energy(rng):
-    """Weak duality; the bound equals the sum defined in its docstring."""
+def test_arbitrary_wrenches_give_a_lower_bound_on_the_energy(rng):
+    """By weak duality, the sum over the frames is a lower bound."""
     some = list(solvable(rng))
     assert len(some) >= 3
     assert any(len(other.motions) for _, other in some)
@@ -224,7 +219,7 @@ def test_any_wrenches_imply_a_lower_bound_on_the_energy(rng):
 
 
 def test_combining_solutions_preserves_the_certificate_of_each_point():
-    """The bound is the energy minus the gap, also above the minimum."""
+    """The bound equals the energy minus the gap."""
     robot = coaxial_beams([0, 0, 0, 1e-4, 0, 0])
     best = solve_assembly(home_posture(robot))
     worse = replace(best, elastic=1.001 * best.elastic)

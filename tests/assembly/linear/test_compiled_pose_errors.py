@@ -1,4 +1,4 @@
-"""Bounds of (27) at many points, compared with the reference method and each other."""
+"""Bounds of (27) at many points, compared with the reference method."""
 
 import numpy as np
 import pytest
@@ -15,9 +15,7 @@ ASSUMPTIONS = ("frozen", "free")
 
 
 def assert_overlap(batch, i, one, uncertain=2e-7, width=1e-6):
-    """Both intervals contain the true value; the solutions of (22) differ by the square
-    root of their gaps, at most 1e-8 of the energy.
-    """
+    """Assert that two intervals overlap, because both contain the true value."""
     for name in PARTS:
         low, high = getattr(batch, name)[i]
         other = getattr(one, name)
@@ -30,8 +28,8 @@ def assert_overlap(batch, i, one, uncertain=2e-7, width=1e-6):
 
 
 @pytest.mark.parametrize("assumption", ASSUMPTIONS)
-def test_compiled_pose_error_bounds_overlap_the_reference_method(assumption, rng):
-    """Evaluated at a platform offset, with and without passive joint limits."""
+def test_compiled_pose_error_bounds_agree_with_the_reference(assumption, rng):
+    """The point is offset from the platform's origin."""
     homes = [home_posture(make()) for make in BUILT_IN.values()]
     for seed in range(12):
         draw = np.random.default_rng(seed)
@@ -47,7 +45,6 @@ def test_compiled_pose_error_bounds_overlap_the_reference_method(assumption, rng
         solved = np.flatnonzero((many.status == "ok") & ~many.one_by_one)
         compiled += len(solved)
         for i in solved[:2].tolist():
-            # of the same solution of (22)
             one = bound_pose_error(
                 assemblies[i], assumption, offset=at, method="reference"
             )
@@ -55,7 +52,7 @@ def test_compiled_pose_error_bounds_overlap_the_reference_method(assumption, rng
     assert compiled
 
 
-def test_pose_error_bounds_are_as_tight_as_requested(grid):
+def test_pose_error_bounds_differ_by_at_most_the_tolerance(grid):
     robot, postures = grid
     errors = np.array([-0.3, 0.1, 0.2])[:, None, None] * robot.errors
     options = {
@@ -72,7 +69,7 @@ def test_pose_error_bounds_are_as_tight_as_requested(grid):
 
 @pytest.mark.parametrize("assumption", ASSUMPTIONS)
 def test_pose_error_bound_does_not_depend_on_other_points(grid, rng, assumption):
-    """Bit-identical in another order, among other points, and alone."""
+    """Results are bit-identical in another order and for single points."""
     robot, postures = grid
     at, count = together(postures), len(postures)
     errors = robot.errors * rng.uniform(0, 1, (count, 1, 1))
@@ -89,7 +86,7 @@ def test_pose_error_bound_does_not_depend_on_other_points(grid, rng, assumption)
 
 @pytest.mark.parametrize("spin", [10.0, 1e-2, 3e-4, 1e-5, 0.0])
 @pytest.mark.parametrize("assumption", ["frozen", "free"])
-def test_motion_limits_of_passive_joints_apply_to_many_points(spin, assumption):
+def test_pose_errors_at_many_points_respect_motion_limits(spin, assumption):
     """Points where a clearance reaches the limit are solved by the reference method."""
     posture = home_posture(hinged_frame(spin))
     one = bound_pose_error(
@@ -104,7 +101,7 @@ def test_motion_limits_of_passive_joints_apply_to_many_points(spin, assumption):
     assert less == (spin < 1e-3)
 
 
-def test_robot_that_cannot_be_assembled_has_no_pose_error_bounds():
+def test_pose_error_of_an_unassemblable_robot_is_missing():
     rigid = (Frame("a", geometric_error=[0, 0, 0, 1e-3, 0, 0]), Frame("b"))
     robot = Robot("open", "a", rigid, (("a", "b"),))
     batch = bound_pose_error(solve_assembly([home_posture(robot)]))
@@ -114,8 +111,8 @@ def test_robot_that_cannot_be_assembled_has_no_pose_error_bounds():
     assert batch[0].unproved == batch.unproved[0] == batch.reason[0]
 
 
-def test_load_along_a_motion_released_by_the_assumption_is_reported():
-    """A hinge held by a soft spring rotates freely under the assumption free."""
+def test_load_about_an_axis_that_is_free_by_assumption_is_rejected():
+    """Under the assumption ``free``, a hinge with a spring rotates freely."""
     spring = np.diag([np.inf, np.inf, 1e2, *[np.inf] * 3])
     robot = Robot("sprung door", "tip", (
         Frame("hinge", joint="revolute", joint_stiffness=spring),

@@ -1,4 +1,4 @@
-"""Drives that apply a prescribed force: statics of redundantly actuated robots."""
+"""Statics of redundantly actuated robots with prescribed drive forces."""
 
 from dataclasses import replace
 
@@ -12,14 +12,14 @@ from forcefit.assembly.model.force_control import with_drive_forces
 from forcefit.assembly.model.robot import BeamLink, Clearance, Frame, MatrixLink, Robot
 from tests.assembly.exact.test_exact import only
 
-ALONG_X = [0.0, np.pi / 2, 0.0]  # turns z to x
+ALONG_X = [0.0, np.pi / 2, 0.0]  # rotates the z axis to the x axis
 METHODS = ("compiled", "reference")
 
 
 def opposing_slides(k_rod, k_first=np.inf, k_second=np.inf):
-    """Two opposing slides on one line, with a spring between them along x.
+    """Return two collinear slides that are connected by a rod along x.
 
-    Both slide coordinates increase along +x, and the rod tip is at the second slide.
+    Both slide coordinates increase along +x.
     """
     stiff = np.diag([1e9, 1e9, 1e9, k_rod, 1e9, 1e9])
     frames = (
@@ -40,23 +40,23 @@ def _along(k):
 
 @pytest.mark.parametrize("solve", [solve_assembly, solve_exact])
 @pytest.mark.parametrize("method", METHODS)
-def test_force_of_one_of_two_opposing_slides_equals_the_force_in_the_rod(solve, method):
-    """F = 200 N stretches rod and first drive in series: x = F (1/k_rod + 1/k_1)."""
+def test_drive_force_of_a_slide_equals_the_rod_force(solve, method):
+    """The force F stretches rod and first drive in series: x = F (1/k_rod + 1/k_1)."""
     F, k_rod, k_1 = 200.0, 4e6, 1e7
     robot = with_drive_forces(opposing_slides(k_rod, k_1, 3e7), {"second": F})
     assembly = solve(home_posture(robot), method=method)
     x = F / k_rod + F / k_1
     assert assembly.platform_screw[3] == pytest.approx(x, rel=1e-9)
-    # the rod is pulled: the outer part pulls its tip along +x
+    # The rod is in tension.
     np.testing.assert_allclose(assembly.tip_wrenches[1], [0, 0, 0, F, 0, 0], atol=2e-6)
     assert assembly.energy == pytest.approx(F * x / 2, rel=1e-9)
-    # the drive holds its block against the block's pull along -x
+    # The drive exerts the reaction on its block.
     assert assembly.tip_wrenches[2][5] == pytest.approx(-F, rel=1e-9)
     assert assembly.posture.platform[0, 3] == 1.0  # no nominal motion
 
 
-def test_energy_of_the_linear_solution_balances_the_work_of_the_drive():
-    """A constant force does twice the work of the elastic energy."""
+def test_work_of_the_drive_is_twice_the_linear_elastic_energy():
+    """The work of a constant force is twice the elastic energy."""
     robot = with_drive_forces(opposing_slides(4e6), {"second": 120.0})
     assembly = solve_assembly(home_posture(robot))
     assert assembly.work == pytest.approx(2 * assembly.energy, rel=1e-12)
@@ -65,7 +65,7 @@ def test_energy_of_the_linear_solution_balances_the_work_of_the_drive():
 
 
 def test_force_control_removes_the_stiffness_of_the_drive():
-    """With position control, the drives act in parallel: k_2 + 1/(1/k_1 + 1/k_rod)."""
+    """With position control, the stiffness is k_2 + 1/(1/k_1 + 1/k_rod)."""
     k_rod, k_1, k_2 = 4e6, 1e7, 3e7
     robot = opposing_slides(k_rod, k_1, k_2)
     series = 1 / (1 / k_rod + 1 / k_1)
@@ -79,9 +79,9 @@ def test_force_control_removes_the_stiffness_of_the_drive():
 
 
 def crossed_cranks(radius=0.004):
-    """A four-bar with both cranks driven: crank 0.3 m, coupler 0.5 m, ground 0.5 m.
+    """Return a parallelogram linkage with two driven cranks at 60 deg.
 
-    The cranks of the parallelogram are at 60 deg; the coupler is a beam along x.
+    The cranks are 0.3 m long, and the coupler is a beam of 0.5 m along x.
     """
     beam = BeamLink({"radius": radius}, 7e10, 0.3, None, "euler")
     up = np.pi / 3
@@ -98,11 +98,11 @@ def crossed_cranks(radius=0.004):
 
 
 @pytest.mark.parametrize("torque", [12.0, -3.0])
-def test_torque_of_a_redundant_crank_loads_the_coupler_by_its_lever_arm(torque):
-    """Moments about the rocker's pivot: the coupler's force N r sin 60 = -torque.
+def test_coupler_force_equals_crank_torque_divided_by_lever_arm(torque):
+    """The axial force N of the coupler satisfies N r sin 60 deg = -torque.
 
-    A positive torque rotates the rocker towards the crank and compresses the coupler.
-    The crank drive supports the same moment; the rocker rotates by N L / (EA r sin 60).
+    A positive torque compresses the coupler.  The rocker rotates by |N| L / (EA r sin
+    60 deg).
     """
     robot = with_drive_forces(crossed_cranks(), {"rocker": torque})
     posture = home_posture(robot)
@@ -116,12 +116,12 @@ def test_torque_of_a_redundant_crank_loads_the_coupler_by_its_lever_arm(torque):
     turned = assembly.clearance_screws[robot.index("rocker"), 2]
     assert turned == pytest.approx(shorter / (0.3 * np.sin(np.pi / 3)), rel=1e-9)
     assert assembly.work == pytest.approx(torque * turned, rel=1e-12)
-    # moment that the crank's drive transmits to the base's side
+    # moment that the crank's drive transmits to the base
     assert assembly.tip_wrenches[0][2] == pytest.approx(torque, rel=1e-9)
     assert solve_exact(posture).platform_screw[3] == pytest.approx(-shorter, rel=1e-3)
 
 
-def test_drive_that_alone_supports_a_motion_cannot_apply_a_prescribed_force():
+def test_sole_drive_of_a_motion_rejects_force_control():
     robot = crossed_cranks()
     crank = replace(robot.frames[3], actuated=False)
     robot = replace(robot, frames=(*robot.frames[:3], crank, *robot.frames[4:]))
@@ -131,8 +131,8 @@ def test_drive_that_alone_supports_a_motion_cannot_apply_a_prescribed_force():
 
 
 @pytest.mark.parametrize("torque", [1e-3, 40.0])
-def test_hinge_spring_rotates_by_torque_over_stiffness(torque):
-    """Also for large rotations, 0.8 rad = 40 N m / 50 N m/rad: the torque follows."""
+def test_hinge_rotates_by_drive_torque_over_stiffness(torque):
+    """The rotation is 0.8 rad = 40 N m / 50 N m/rad."""
     hinge = Frame("hinge", joint="revolute", joint_stiffness=only(2, 50.0),
                   drive_force=torque)  # fmt: skip
     robot = Robot("arm", "arm", (hinge, Frame("arm", "hinge", [0.4, 0, 0])))
@@ -146,8 +146,8 @@ def test_hinge_spring_rotates_by_torque_over_stiffness(torque):
 
 
 @pytest.mark.parametrize("solve", [solve_assembly, solve_exact])
-def test_force_of_a_drive_can_balance_a_weight(solve):
-    """A torque m g l on the hinge leaves its spring unloaded and the arm at rest."""
+def test_drive_torque_balances_a_weight(solve):
+    """With a torque m g l of the drive, the hinge spring does not deform."""
     hinge = Frame("hinge", joint="revolute", joint_stiffness=only(2, 50.0),
                   drive_force=2.0 * 9.81 * 0.4)  # fmt: skip
     arm = Frame("arm", "hinge", [0.4, 0, 0], mass=2.0)
@@ -156,8 +156,8 @@ def test_force_of_a_drive_can_balance_a_weight(solve):
     np.testing.assert_allclose(assembly.platform_screw, np.zeros(6), atol=1e-15)
 
 
-def test_drive_force_closes_clearances_of_other_joints():
-    """Tension takes up the whole axial clearance of +-20 um at the rod end."""
+def test_drive_force_moves_other_joints_to_the_end_of_their_clearance():
+    """Tension moves the rod end by its whole axial clearance of 20 um."""
     robot = opposing_slides(4e6)
     first = replace(robot.frames[0], clearance=Clearance(axial=2e-5))
     robot = replace(robot, frames=(first, *robot.frames[1:]))
@@ -194,8 +194,8 @@ def test_unknown_and_coupled_drives_are_rejected():
 
 
 @pytest.mark.parametrize("solve", [solve_assembly, solve_exact])
-def test_screw_drive_exerts_a_force_of_torque_over_lead(solve):
-    """2 pi M = F P per turn: a nut that cannot rotate loads a spring by M / h."""
+def test_screw_drive_force_equals_torque_divided_by_lead(solve):
+    """A nut that cannot rotate loads a spring by M / h, since 2 pi M = F P per turn."""
     pitch, k, M = 0.005, 2e6, 3.0
     screw = Frame("screw", joint="helical", pitch=pitch, actuated=True)
     nut = Frame("nut", "screw", joint="revolute")

@@ -1,4 +1,4 @@
-"""Problem (22): properties, closed forms, and cvxpy solutions for random robots."""
+"""Problem (22), compared with closed forms and with cvxpy for random robots."""
 
 from dataclasses import replace
 
@@ -32,8 +32,8 @@ seeds = st.integers(0, 2**32 - 1)
 
 
 @pytest.mark.parametrize("axis", range(6))
-def test_two_springs_in_series_take_up_a_gap_as_in_closed_form(axis):
-    """The energy is g^2/2 k1 k2/(k1 + k2) for a gap g along one axis."""
+def test_energy_of_two_springs_in_series_equals_the_closed_form(axis):
+    """The energy for a gap g along one axis is k1 k2/(k1 + k2) g^2/2."""
     gap = np.zeros(6)
     gap[axis] = 2e-4
     k1, k2 = 1e6, 3e6
@@ -41,7 +41,7 @@ def test_two_springs_in_series_take_up_a_gap_as_in_closed_form(axis):
     series = k1 * k2 / (k1 + k2)
     assert answer.energy == pytest.approx(series * 2e-4**2 / 2, rel=1e-12)
     one, two = (answer.posture.robot.index(n) for n in ("one", "two"))
-    # link 1 is pulled towards the gap by k2/(k1 + k2) of it, and pulls with k1
+    # Link 1 deforms by k2/(k1 + k2) times the gap.
     assert answer.link_screws[one, axis] == pytest.approx(1.5e-4, rel=1e-12)
     assert answer.wrenches[one, axis] == pytest.approx(series * 2e-4, rel=1e-12)
     assert answer.wrenches[two, axis] == pytest.approx(-series * 2e-4, rel=1e-12)
@@ -54,8 +54,8 @@ def test_two_springs_in_series_take_up_a_gap_as_in_closed_form(axis):
     ("gap", "left"),
     [(5e-5, 0.0), (1e-4, 0.0), (1e-4 * (1 + 1e-16), 0.0), (1.5e-4, 5e-5)],
 )
-def test_springs_deform_only_by_the_gap_beyond_the_clearance(gap, left):
-    """A radial clearance of 1e-4 m takes up the first part of the gap."""
+def test_springs_deform_by_the_gap_minus_the_clearance(gap, left):
+    """A radial clearance of 1e-4 m reduces the gap."""
     clearance = Clearance(radial=1e-4)
     direction = np.array([0, 0, 0, 0.6, 0.8, 0.0])
     robot = coaxial_beams(gap * direction, (1e6, 1e6), clearance=clearance)
@@ -69,7 +69,7 @@ def test_springs_deform_only_by_the_gap_beyond_the_clearance(gap, left):
 
 @pytest.mark.parametrize("method", METHODS)
 def test_wrench_equals_stiffness_times_deformation_of_every_spring(method):
-    """w = K_E e = K_B b, eq. (6): half their squared difference is within the gap."""
+    """The tolerance of w = K_E e = K_B b, eq. (6), follows from the duality gap."""
     posture = place_robot(irsbot2_with(NUMBERS["cases"][0]), pose={"tx": 0.1})
     answer = solve_assembly(posture, [1.0, 2.0, 3.0, 40.0, 50.0, 60.0], method=method)
     robot = posture.robot
@@ -89,11 +89,11 @@ def test_wrench_equals_stiffness_times_deformation_of_every_spring(method):
 
 
 @pytest.mark.parametrize("name", ["irsbot2", "3rrr", "delta"])
-def test_energy_without_clearance_equals_the_energy_of_a_tight_robot(name, rng):
-    """Under a load, the energy without clearance includes the work of the load."""
+def test_energy_without_clearance_equals_that_of_a_robot_without_clearance(name, rng):
+    """Under a load, the work of the load is included."""
     home = home_posture(load_robot(name))
     errors = 1e-4 * rng.normal(size=home.robot.errors.shape)
-    if name == "irsbot2":  # its proximal loops are rigid and perfect
+    if name == "irsbot2":  # its proximal loops are rigid
         errors[~np.any(irsbot2_with(NUMBERS["cases"][0]).errors, axis=1)] = 0.0
     tight = without_joint_clearances(home.robot).with_errors(errors)
     posture = replace(home, robot=tight)
@@ -105,8 +105,8 @@ def test_energy_without_clearance_equals_the_energy_of_a_tight_robot(name, rng):
         assert answer.energy_without_clearance == pytest.approx(answer.energy, rel=1e-9)
 
 
-def test_platform_frame_changes_the_screw_and_not_the_energy():
-    """The screw changes by the small rigid-body motion to another reference point."""
+def test_energy_does_not_depend_on_the_platform_frame():
+    """The screw is expressed at another reference point."""
     robot = irsbot2_with(NUMBERS["cases"][0])
     arm = np.array([0.03, -0.2, 0.11])
     tool = Frame("tool", "leg1.tip", arm)
@@ -119,18 +119,19 @@ def test_platform_frame_changes_the_screw_and_not_the_energy():
     assert np.allclose(other.platform_screw, expected, rtol=0, atol=1e-11)
 
 
-def test_rigid_open_closure_cannot_be_assembled():
+def test_open_loop_of_rigid_bodies_cannot_be_assembled():
     robot = planar_four_bar()
     rigid = replace(robot, frames=tuple(replace(f, link=None) for f in robot.frames))
     errors = np.zeros((6, 6))
-    errors[2] = [1e-3, 0, 0, 0, 0, 1e-4]  # out of the plane: no joint takes it up
+    # out-of-plane error, which no joint can compensate
+    errors[2] = [1e-3, 0, 0, 0, 0, 1e-4]
     with pytest.raises(CannotAssemble, match="stays open by 0.00"):
         solve_assembly(home_posture(rigid.with_errors(errors)))
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_passive_joint_is_stopped_by_its_motion_limit(method):
-    """The slide is limited to +-1e-4 m; the spring closes the remaining gap."""
+def test_passive_joint_stops_at_its_motion_limit(method):
+    """The slide moves by at most 1e-4 m, and the spring closes the remaining gap."""
     frames = (
         Frame("link", translation=[0, 0, 0.5], link=MatrixLink(1e6 * np.eye(6))),
         Frame("slide", "link", joint="prismatic", clearance=Clearance(axial=1e-4)),
@@ -154,8 +155,10 @@ def test_passive_joint_is_stopped_by_its_motion_limit(method):
 
 
 def as_bearings(robot):
-    """The robot with compliant joints that move freely along their axes, and the same
-    robot with each of them replaced by springs in series with a free joint.
+    """Return a robot with free compliant joints, and its equivalent with springs.
+
+    In the second robot, springs in series with a free joint replace each compliant
+    joint.
     """
     bearings, split, after = [], [], {}
     for f in robot.frames:
@@ -179,8 +182,8 @@ def as_bearings(robot):
     return replace(robot, frames=tuple(bearings)), replace(robot, frames=tuple(split))
 
 
-def test_bearing_equals_springs_in_series_with_a_free_joint():
-    """Both agree to 1e-8 of the energy without clearance, in every solver."""
+def test_compliant_joint_equals_springs_in_series_with_a_free_joint():
+    """Energies agree to 1e-8 of the energy without clearance."""
     compared = 0
     for seed in range(40):
         rng = np.random.default_rng(seed)
@@ -219,13 +222,12 @@ def test_bearing_equals_springs_in_series_with_a_free_joint():
 
 @settings(deadline=None, max_examples=25)
 @given(seed=seeds, legs=st.integers(1, 3), joints=st.integers(1, 3))
-# the first cannot be assembled by 0.1 % of its clearances, which Clarabel's own ray
-# shows only together with the bounds on the clearances
+# Seed 0: the clearances are too small by 0.1 %.
 @example(seed=0, legs=2, joints=1)
 @example(seed=17, legs=3, joints=1)
 @example(seed=58, legs=2, joints=2)
-def test_energy_of_random_robots_matches_the_paper_in_cvxpy(seed, legs, joints):
-    """The tolerance, 1e-6 of the energy without clearance, is the accuracy of cvxpy."""
+def test_energy_of_random_robots_agrees_with_cvxpy(seed, legs, joints):
+    """The accuracy of cvxpy is 1e-6 of the energy without clearance."""
     rng = np.random.default_rng(seed)
     robot = random_robot(rng, legs, joints)
     load = rng.normal(size=6) * [1, 1, 1, 10, 10, 10] if rng.random() < 0.5 else None
@@ -246,8 +248,8 @@ def test_energy_of_random_robots_matches_the_paper_in_cvxpy(seed, legs, joints):
 
 
 @pytest.mark.parametrize("turned", [1, -1])
-def test_closure_out_of_reach_is_infeasible(turned):
-    """H u is at most 5 over the disc plus 2 over the interval, which is 7."""
+def test_gap_larger_than_all_clearances_is_infeasible(turned):
+    """The largest H u is 5 for the disc plus 2 for the interval."""
     H = np.array([[3.0, 4.0, 2.0]])
     problem = np.zeros((1, 3)), np.ones(1), np.zeros(3), H
     group = np.array([0, 0, 1])
@@ -255,6 +257,6 @@ def test_closure_out_of_reach_is_infeasible(turned):
     assert not beyond.feasible
     within = minimise_energy(*problem, turned * np.array([7.0 * (1 - 1e-6)]), group)
     assert within.feasible
-    # its only point, but for 1e-3: the square root of what is left of the reach
+    # The feasible set has a size of about sqrt(1e-6).
     only = turned * np.array([0.6, 0.8, 1.0])
     np.testing.assert_allclose(within.clearances, only, atol=3e-3)

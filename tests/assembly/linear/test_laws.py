@@ -1,4 +1,4 @@
-"""Invariance to units, frames and the location of loop cuts, and reciprocity."""
+"""Invariance to units, reference frames and loop cuts; reciprocity."""
 
 from dataclasses import replace
 
@@ -18,8 +18,8 @@ REFUSALS = (CannotAssemble, FreeMotion, SolverFailed)
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_changing_the_length_unit_scales_energies_but_not_margins(seed):
-    """Energy in N mm is 1000 times that in N m; margins and angles are the same."""
+def test_margins_do_not_depend_on_the_length_unit(seed):
+    """An energy in N mm is 1000 times its value in N m."""
     robot = random_robot(np.random.default_rng(seed), legs=2)
     small = replace(robot, frames=tuple(
         replace(f, joint_stiffness=None) for f in robot.frames
@@ -27,7 +27,7 @@ def test_changing_the_length_unit_scales_energies_but_not_margins(seed):
     one, other = home_posture(small), home_posture(in_millimetres(small))
     try:
         here = solve_assembly(one)
-    except REFUSALS as error:  # refused in one unit, refused in the other
+    except REFUSALS as error:  # Both units raise the same error.
         with pytest.raises(type(error)):
             solve_assembly(other)
         return
@@ -41,7 +41,7 @@ def test_changing_the_length_unit_scales_energies_but_not_margins(seed):
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_rigid_motion_of_the_robot_preserves_energy_and_pose_errors(seed):
+def test_energy_and_pose_errors_do_not_depend_on_the_base_pose(seed):
     rng = np.random.default_rng(seed)
     robot = random_robot(rng, legs=2)
     turn, shift = rng.uniform(-2, 2, 3), rng.uniform(-1, 1, 3)
@@ -68,7 +68,7 @@ def test_rigid_motion_of_the_robot_preserves_energy_and_pose_errors(seed):
 
 
 def cut_at_the_crank(robot):
-    """The four-bar with its loop cut at the crank's end: the coupler runs backwards."""
+    """Return the four-bar with its loop cut at the end of the crank."""
     frame = {f.name: f for f in robot.frames}
     pin_b, rocker, end_b = frame["pin_b"], frame["rocker"], frame["end_b"]
     length = float(pin_b.translation[0])
@@ -78,17 +78,17 @@ def cut_at_the_crank(robot):
               frame["pin_a"].rotation,
               geometric_error=frame["pin_a"].geometric_error),
         rocker,
-        # the rocker's own body, then the pin that joins it to the coupler
+        # the rocker's body, then the pin between rocker and coupler
         replace(end_b, name="pin", joint="revolute"),
-        # the coupler from its far end to its near one, and the pin there
+        # the reversed coupler, then the pin at its near end
         Frame("near", "pin", [-length, 0, 0], joint="revolute", link=pin_b.link),
         Frame("near_end", "near"),
     )  # fmt: skip
     return Robot("cut", "crank_end", frames, (("crank_end", "near_end"),))
 
 
-def test_energy_does_not_depend_on_where_a_loop_is_cut():
-    """Out-of-plane errors of crank and rocker bend the coupler for either cut."""
+def test_energy_does_not_depend_on_the_loop_cut():
+    """Out-of-plane errors of crank and rocker bend the coupler."""
     errors = np.zeros((6, 6))
     errors[1] = [1e-3, -2e-3, 0, 0, 0, 3e-4]
     errors[5] = [-2e-3, 1e-3, 0, 0, 0, -1e-4]
@@ -101,8 +101,8 @@ def test_energy_does_not_depend_on_where_a_loop_is_cut():
     assert other.energy == pytest.approx(one.energy, rel=1e-9)
 
 
-def test_displacements_under_two_loads_satisfy_betti_reciprocity(rng):
-    """Maxwell-Betti on closed loops without clearance: w1 . x2 = w2 . x1."""
+def test_displacements_satisfy_betti_reciprocity(rng):
+    """Without clearance, w1 . x2 = w2 . x1."""
     robot = irsbot2()
     tight = replace(robot, frames=tuple(
         replace(f, clearance=None) for f in robot.frames
@@ -115,7 +115,7 @@ def test_displacements_under_two_loads_satisfy_betti_reciprocity(rng):
         assert float(first @ other.platform_screw) == pytest.approx(work, rel=1e-8)
 
 
-def test_rigid_serial_robot_pose_is_the_product_of_its_erroneous_transforms():
+def test_rigid_serial_robot_pose_equals_the_product_of_transforms():
     """The pose of a rigid robot equals the product of the transforms."""
     error = np.array([0.02, -0.01, 0.03, 1e-3, 2e-3, -3e-3])
     frames = (

@@ -22,7 +22,7 @@ Q = RHO * AREA * G  # [N/m]
 
 
 def cantilever(cuts=1, theory="euler"):
-    """A beam along x, cut into ``cuts`` pieces."""
+    """Return a beam along x as ``cuts`` links in series."""
     link = BeamLink({"radius": RADIUS}, E, 0.3, density=RHO, theory=theory)
     frames = tuple(
         Frame(f"p{i}", f"p{i - 1}" if i else "base", [L / cuts, 0, 0], link=link)
@@ -32,16 +32,16 @@ def cantilever(cuts=1, theory="euler"):
 
 
 @pytest.mark.parametrize("cuts", [1, 2, 5])
-def test_self_weight_deflection_equals_the_textbook(cuts):
-    """The tip deflects by q L^4 / 8 EI with slope q L^3 / 6 EI, for any cuts."""
+def test_self_weight_deflection_equals_beam_theory(cuts):
+    """The tip deflects by q L^4 / 8 EI with slope q L^3 / 6 EI."""
     answer = solve_assembly(home_posture(cantilever(cuts)), gravity=[0, 0, -G])
     expected = [0, Q * L**3 / (6 * EI), 0, 0, 0, -Q * L**4 / (8 * EI)]
     assert np.allclose(answer.platform_screw, expected, rtol=1e-9, atol=1e-15)
     assert answer.duality_gap() <= 1e-9 * answer.energy
 
 
-def test_timoshenko_beam_adds_the_shear_deflection():
-    """Additional deflection q L^2 / 2 k G A, k = 6 (1 + nu) / (7 + 6 nu)."""
+def test_self_weight_deflection_of_timoshenko_beam_includes_shear():
+    """The shear deflection is q L^2 / 2 k G A with k = 6 (1 + nu) / (7 + 6 nu)."""
     answer = solve_assembly(
         home_posture(cantilever(theory="timoshenko")), gravity=[0, 0, -G]
     )
@@ -50,8 +50,8 @@ def test_timoshenko_beam_adds_the_shear_deflection():
     assert answer.platform_screw[5] == pytest.approx(expected, rel=1e-9)
 
 
-def test_eccentric_mass_acts_with_its_lever_arm():
-    """2 kg 0.3 m beyond the tip of a rigid arm on a torsion spring about y."""
+def test_eccentric_mass_causes_a_moment():
+    """A mass of 2 kg is 0.3 m beyond the tip of a rigid arm on a torsion spring."""
     K = np.diag([np.inf] * 6).astype(float)
     K[2, 2] = 500.0
     frames = (
@@ -62,14 +62,14 @@ def test_eccentric_mass_acts_with_its_lever_arm():
     )  # fmt: skip
     robot = Robot("arm", "arm", frames)
     answer = solve_assembly(home_posture(robot), gravity=[0, 0, -G])
-    angle = 2.0 * G * 0.8 / 500.0  # moment 2 g (0.5 + 0.3), about +y
+    angle = 2.0 * G * 0.8 / 500.0  # moment 2 g (0.5 + 0.3) about +y
     assert answer.platform_screw[1] == pytest.approx(angle, rel=1e-12)
     assert answer.platform_screw[5] == pytest.approx(-0.5 * angle, rel=1e-12)
     assert answer.joint_wrenches[0, 2] == pytest.approx(2 * G * 0.8, rel=1e-12)
 
 
-def test_load_on_a_body_deforms_its_link_and_not_its_distal_joint():
-    """The load passes through the link, but not through its soft distal joint."""
+def test_load_on_a_body_does_not_deform_its_distal_joint():
+    """The load is transmitted by the link, but not by its distal joint."""
     K = 1e5 * np.eye(6)
     frames = (
         Frame("body", link=MatrixLink(K), joint="revolute", joint_stiffness=K),
@@ -88,7 +88,7 @@ def test_load_on_a_body_deforms_its_link_and_not_its_distal_joint():
 
 
 def test_base_reactions_of_a_closed_loop_sum_to_its_weight():
-    """Both chains of the loop are attached to the base."""
+    """The reactions of both chains are added."""
     robot = planar_four_bar()
     heavy = tuple(
         replace(f, mass=1.5, centre_of_mass=[0.02, 0.01, 0.03])
@@ -105,8 +105,8 @@ def test_base_reactions_of_a_closed_loop_sum_to_its_weight():
 
 
 @pytest.mark.parametrize("size", [1e6, 1e8])
-def test_large_loads_cause_deflections_by_the_compliance(size):
-    """Doubling a load of 1e8 N increases the deflection by compliance times load."""
+def test_large_loads_cause_proportional_deflections(size):
+    """The deflection is proportional to a load of 1e8 N."""
     posture = home_posture(load_robot("irsbot2"))
     once, twice = (
         solve_assembly(posture, [0, 0, 0, 0, 0, k * size]).platform_screw[5]
@@ -118,9 +118,9 @@ def test_large_loads_cause_deflections_by_the_compliance(size):
 
 @pytest.mark.parametrize(("shift", "hangs"), [(0.0, True), (1e-9, False)])
 def test_pendulum_is_in_equilibrium_only_when_hanging(shift, hangs):
-    """The rotated hinge, off the origin, carries 2 kg; its moment is only round-off.
+    """If the mass hangs below the hinge, its moment is only round-off.
 
-    A centre of mass that is off by 1 nm rotates it.
+    If the centre of mass is displaced by 1 nm, there is no equilibrium.
     """
     at, turn = np.array([0.1, 0.2, 0.7]), np.array([-0.3, 0.2, 0.9])
     inside = rotation_matrix(turn).T @ [shift, 0.0, -0.3]
@@ -137,8 +137,8 @@ def test_pendulum_is_in_equilibrium_only_when_hanging(shift, hangs):
             solve_assembly(posture, gravity=[0, 0, -G])
 
 
-def test_load_about_a_free_hinge_is_rejected_with_its_unit_motion():
-    """About z at the origin a platform at (0.5, 0.25) moves by (-0.25, 0.5) per rad."""
+def test_load_about_a_free_hinge_is_rejected():
+    """A rotation about z moves a platform at (0.5, 0.25) by (-0.25, 0.5) per rad."""
     link = MatrixLink(1e6 * np.eye(6))
     frames = (
         Frame("hinge", joint="revolute"),
@@ -151,10 +151,8 @@ def test_load_about_a_free_hinge_is_rejected_with_its_unit_motion():
         solve_assembly(home_posture(Robot("r", "tip", frames)), [0, 0, 1, 0, 0, 0])
 
 
-def test_link_wrenches_of_a_chain_balance_all_distal_loads(rng):
-    """Three beams in arbitrary directions: the wrench at each start balances all loads
-    beyond it, including the tip load; the wrench at each tip is that of the next
-    start."""
+def test_link_wrenches_of_a_chain_balance_the_distal_loads(rng):
+    """The wrench at the start of each beam balances all loads beyond this start."""
     link = BeamLink({"width": 0.02, "height": 0.03}, E, 0.3, density=RHO)
     frames = tuple(
         Frame(f"p{k}", f"p{k - 1}" if k else "base", rng.normal(size=3),
@@ -185,7 +183,7 @@ def test_link_wrenches_of_a_chain_balance_all_distal_loads(rng):
 
 
 def beam_on_two_pins():
-    """A beam of 0.8 m along x, free to turn about y at both ends."""
+    """Return a beam of 0.8 m along x with hinges about y at both ends."""
     turn = [np.pi / 2, 0, 0]
     link = BeamLink({"radius": RADIUS}, E, 0.3, density=RHO)
     frames = (
@@ -197,16 +195,16 @@ def beam_on_two_pins():
     return Robot("pinned", "end", frames, (("end", "ground"),))
 
 
-def test_beam_on_two_pins_has_zero_end_moments_under_its_weight():
-    """q L / 2 and no moment at both ends; the deformation corresponds to q L^2 / 12.
+def test_beam_on_two_pins_has_zero_end_moments():
+    """The end forces are q L / 2.
 
-    The end moments vanish for finite motions as well.
+    The deformation of the beam corresponds to end moments of q L^2 / 12.
     """
     posture = home_posture(beam_on_two_pins())
     answer = solve_assembly(posture, gravity=[0, 0, -G])
     row = posture.robot.index("b")
     half, scale = Q * L / 2, np.array([Q * L**2] * 3 + [Q * L] * 3)
-    up = [0, 0, 0, 0, half, 0]  # the beam's y points up
+    up = [0, 0, 0, 0, half, 0]  # the y axis of the beam points up
     np.testing.assert_allclose(answer.tip_wrenches[row] / scale, up / scale, atol=1e-9)
     down = [0, 0, 0, 0, -half, 0]
     start = answer.start_wrenches[row]
@@ -231,21 +229,21 @@ def test_beam_on_two_pins_has_zero_end_moments_under_its_weight():
     ],
 )
 def test_loads_of_wrong_shape_are_rejected(given, message):
-    """Loads are applied to two postures of a robot of eight frames."""
+    """The loads are applied at two postures of a robot of eight frames."""
     posture = home_posture(load_robot("four_bar"))
     with pytest.raises(BadInput, match=message):
         solve_assembly([posture, posture], **given)
 
 
 def reduced(robot, load=None):
-    """The problem of a robot at home."""
+    """Return the reduced problem of a robot in its home pose."""
     posture = home_posture(robot)
     loads = None if load is None else loads_on_frames(posture, load)
     return reduce_problem(linearise(posture), virtual_joints(robot), loads)
 
 
 def turn_and_slide():
-    """A pin about z and a slider along it, 10 m long."""
+    """Return a pin about z in series with a slider along z and a link of 10 m."""
     return Robot("chain", "tip", (
         Frame("turn", joint="revolute"),
         Frame("slide", "turn", [10, 0, 0], joint="prismatic"),
@@ -255,7 +253,7 @@ def turn_and_slide():
 
 @pytest.mark.parametrize("load", [1e-9, 1.0, 1e9])
 def test_free_motion_message_does_not_depend_on_the_size_of_the_load(load):
-    """The loads are 0.3 N m and 2 N; a unit rotation translates the tip by 10 m."""
+    """Loads of 0.3 N m and 2 N drive a rotation and a translation."""
     with pytest.raises(FreeMotion) as told:
         reduced(turn_and_slide(), load * np.array([0, 0, 2.0, 0, 0, 0.3]))
     assert "it moves turn rz, slide tz; " in str(told.value)

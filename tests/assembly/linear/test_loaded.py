@@ -1,4 +1,4 @@
-"""Compiled solution of (22) with and without loads: closed forms and certificates."""
+"""Compiled solution of (22) under loads, compared with closed forms."""
 
 from dataclasses import replace
 
@@ -21,7 +21,7 @@ GRAVITY = (1.0, 2.0, -9.81)
 
 
 def compiled(posture, *loads, **others):
-    """One posture by the compiled kernels; the reference is none of them."""
+    """Solve one posture by the compiled kernels."""
     many = solve_assembly([posture], *loads, **others)
     assert set(many.method) == {"compiled"}
     assert many.certified.all()
@@ -29,11 +29,10 @@ def compiled(posture, *loads, **others):
 
 
 @pytest.mark.parametrize("force", [0.5, 50.0, 300.0])
-def test_second_spring_deforms_only_after_the_pin_touches_its_rim(force):
-    """Only the platform spring deforms until the pin reaches its radial clearance c.
+def test_second_spring_deforms_only_after_the_pin_touches_its_bore(force):
+    """A second spring acts through a pin with radial clearance c.
 
-    From there on k1 x + k2 (x - c) = w.  With k1 = 1e6 N/m and c = 1e-4 m, the second
-    spring is unloaded up to w = 100 N.
+    The displacement satisfies k1 x = w for x <= c and k1 x + k2 (x - c) = w for x > c.
     """
     k1, k2, c = 1e6, 3e6, 1e-4
     robot = coaxial_beams([0.0] * 6, (k1, k2), clearance=Clearance(radial=c))
@@ -46,7 +45,7 @@ def test_second_spring_deforms_only_after_the_pin_touches_its_rim(force):
 
 
 def test_load_moves_an_open_chain_to_the_boundary_of_its_clearance():
-    """Spring and pin in series, without closure: c + w / k, and energy w^2 / 2k."""
+    """The displacement of spring and pin in series is c + w / k."""
     k, c, force = 1e5, 2e-4, 7.0
     frames = (
         Frame("arm", link=MatrixLink(k * np.eye(6))),
@@ -60,12 +59,12 @@ def test_load_moves_an_open_chain_to_the_boundary_of_its_clearance():
 
 
 @pytest.mark.parametrize("name", ["irsbot2", "3rrr", "five_bar", "four_bar"])
-def test_displacements_by_loads_and_errors_add_without_clearance(name, rng):
-    """Superposition holds, and the platform compliance is reciprocal."""
+def test_displacements_due_to_loads_and_errors_add_without_clearance(name, rng):
+    """Superposition is valid, and the platform compliance is symmetric."""
     posture = home_posture(without_joint_clearances(load_robot(name)))
     robot = posture.robot
     errors = 1e-4 * rng.normal(size=robot.errors.shape)
-    if name == "irsbot2":  # its proximal loops are rigid and perfect
+    if name == "irsbot2":  # its proximal loops are rigid
         errors[~np.any(irsbot2_with(NUMBERS["cases"][0]).errors, axis=1)] = 0.0
     erring = replace(posture, robot=robot.with_errors(errors))
     alone = solve_assembly([erring]).platform_screw[0]
@@ -79,7 +78,7 @@ def test_displacements_by_loads_and_errors_add_without_clearance(name, rng):
 
 @pytest.mark.parametrize("kappa", [0.0, 0.2, 1.0])
 @pytest.mark.parametrize("size", [1e-3, 1.0, 10.0])
-def test_all_points_of_the_paper_robot_are_certified(grid, kappa, size):
+def test_all_points_of_irsbot2_are_certified(grid, kappa, size):
     robot, postures = grid
     erring = robot.with_errors(kappa * robot.errors)
     postures = [replace(posture, robot=erring) for posture in postures]
@@ -92,7 +91,7 @@ def test_all_points_of_the_paper_robot_are_certified(grid, kappa, size):
 
 
 def cases_at_random():
-    """Random robots of all kinds, some of which no kernel covers."""
+    """Yield random robots, including robots that no kernel covers."""
     for name in sorted(BUILT_IN):
         yield home_posture(BUILT_IN[name]())
     for seed in range(60):
@@ -101,10 +100,10 @@ def cases_at_random():
 
 
 @pytest.mark.parametrize("loaded", [False, True])
-def test_compiled_and_reference_methods_agree_on_random_robots_or_both_fail(
+def test_compiled_and_reference_methods_agree_on_random_robots(
     loaded,
 ):
-    """Loads act on every body, errors vary over decades, and potentials agree."""
+    """The potentials agree for loads on all bodies and errors of any magnitude."""
     solved = 0
     for number, home in enumerate(cases_at_random()):
         rng = np.random.default_rng(number)
@@ -138,13 +137,14 @@ def test_compiled_and_reference_methods_agree_on_random_robots_or_both_fail(
         assert unproved(reference) == ""
         on_errors = reference.frame_loads.body @ errors.ravel()
         potential = many.energy[0] - many.work[0] - on_errors
-        # that of the reference counts what rounding leaves open in the closures
+        # The uncertainty of the reference includes the round-off in the closures.
         gaps = many.duality_gap()[0] + reference.uncertainty + 1e-15 * abs(on_errors)
         assert abs(potential - reference.potential) <= gaps
         assert many.energy_without_clearance[0] == pytest.approx(
             reference.energy_without_clearance, rel=1e-7, abs=1e-15
         )
-        if not len(reference.clearances):  # else clearance may leave the screw open
+        # With clearance, the screw can be non-unique.
+        if not len(reference.clearances):
             size = np.abs(reference.platform_screw).max() + 1e-12
             off = np.abs(many.platform_screw[0] - reference.platform_screw)
             assert off.max() < 1e-6 * size
@@ -152,10 +152,10 @@ def test_compiled_and_reference_methods_agree_on_random_robots_or_both_fail(
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_load_moves_a_limited_pin_to_its_limit_and_a_free_pin_has_no_equilibrium(
+def test_load_moves_a_pin_to_its_motion_limit(
     method,
 ):
-    """An open chain: a pin limited to 1e-3 rad, or without limit, turned about z."""
+    """A pin in an open chain rotates by its limit of 1e-3 rad, or has no limit."""
     pin = Frame("pin", joint="revolute", clearance=Clearance(spin=1e-3))
     load = [0, 0, 2.0, 0, 0, 0]
     for own, status in ((pin, "ok"), (replace(pin, clearance=None), "no equilibrium")):

@@ -1,4 +1,4 @@
-"""Points that the compiled method cannot certify are solved by the reference."""
+"""Use of the reference method for points that the compiled method cannot certify."""
 
 from dataclasses import replace
 
@@ -19,15 +19,15 @@ def beams():
 
 
 def rigid():
-    """A robot with rigid closure rows, which the compiled method does not cover."""
+    """Return a robot with rigid loops, which the compiled method does not cover."""
     robot = coaxial_beams(GAP, clearance=Clearance(1e-3))
     frames = tuple(replace(frame, link=None) for frame in robot.frames)
     return home_posture(replace(robot, frames=frames))
 
 
 @pytest.mark.parametrize("load", [None, LOAD])
-def test_unproved_point_is_bit_identical_to_the_reference_method(load):
-    """The result states the method used, at one posture and at many."""
+def test_unproved_point_equals_the_reference_method(load):
+    """The field ``method`` contains the method used."""
     posture = rigid()
     asked = solve_assembly(posture, load, method="reference")
     one, many = solve_assembly(posture, load), solve_assembly([posture], load)
@@ -39,7 +39,7 @@ def test_unproved_point_is_bit_identical_to_the_reference_method(load):
 
 
 def test_only_unproved_points_use_the_reference_method(monkeypatch):
-    """One of three points, whose errors differ, cannot be certified."""
+    """One of three points cannot be certified."""
     robot = irsbot2_with(NUMBERS["cases"][0])
     postures = [home_posture(robot)] * 3
     errors = robot.errors * np.array([1.0, 0.5, 2.0])[:, None, None]

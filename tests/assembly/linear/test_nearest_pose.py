@@ -1,4 +1,4 @@
-"""If clearances leave the pose undetermined, the pose nearest to nominal is used."""
+"""Pose nearest to nominal, for robots whose pose is not unique."""
 
 import json
 import warnings
@@ -21,12 +21,12 @@ from forcefit.assembly.robots import load_robot
 from tests.campaigns_for_tests import write_campaign
 from tests.robots_for_tests import coaxial_beams
 
-POINT = np.array([0.03, -0.05, 0.02])  # [m] platform axes
-UNIT = 1e-4  # [rad, m] of screws in cvxpy
+POINT = np.array([0.03, -0.05, 0.02])  # [m] reference point in platform axes
+UNIT = 1e-4  # [rad, m] unit of the screws in cvxpy
 
 
 def erring(name, seed, turn=2e-4, shift=2e-5, pose=None):
-    """A built-in robot with small errors at all frames, at a posture."""
+    """Return a posture of a built-in robot with small errors at all frames."""
     robot, rng = load_robot(name), np.random.default_rng(seed)
     size = np.array([turn] * 3 + [shift] * 3)
     errors = rng.uniform(-1, 1, (len(robot.frames), 6)) * size
@@ -34,21 +34,21 @@ def erring(name, seed, turn=2e-4, shift=2e-5, pose=None):
 
 
 def arm_of(posture):
-    """[m] from the platform's origin to the reference point, base axes."""
+    """Return the vector from the platform's origin to the reference point [m]."""
     return posture.platform[:3, :3] @ POINT
 
 
 def at_point(answer, posture):
-    """(6,) [rad, m] platform screw at the reference point."""
+    """Return the platform screw at the reference point, (6,) [rad, m]."""
     turn, move = np.split(answer.platform_screw, 2)
     return np.concatenate([turn, move + np.cross(turn, arm_of(posture))])
 
 
 def nearest_by_cvxpy(posture, point, load=None):
-    """(6,) [rad, m] nearest pose, with all screws as variables of the program.
+    """Return the pose nearest to nominal, computed by cvxpy, (6,) [rad, m].
 
-    Without a load the springs are undeformed; under a load the energy minus its work is
-    minimal, to 1e-9, for the problem as printed.
+    Without a load, the springs are undeformed.  Under a load, the energy minus the work
+    is minimal to a relative accuracy of 1e-9.
     """
     robot, count = posture.robot, len(posture.robot.frames)
     c, e, b = (cp.Variable((count, 6)) for _ in range(3))
@@ -87,7 +87,7 @@ def nearest_by_cvxpy(posture, point, load=None):
     limits.append(x == end(robot.platform))
     arm = posture.platform[:3, :3] @ point
     turn, move = x[:3], x[3:]
-    deviation = cp.hstack([  # t + theta x arm, written out
+    deviation = cp.hstack([  # rotation, translation + rotation x arm
         turn,
         move[0] + turn[1] * arm[2] - turn[2] * arm[1],
         move[1] + turn[2] * arm[0] - turn[0] * arm[2],
@@ -95,10 +95,11 @@ def nearest_by_cvxpy(posture, point, load=None):
     ])  # fmt: skip
     problem = cp.Problem(cp.Minimize(cp.norm(deviation)), limits)
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)  # its doubts are in the status
+        # The status contains the same information.
+        warnings.simplefilter("ignore", UserWarning)
         problem.solve(solver=cp.CLARABEL)
     if problem.status != cp.OPTIMAL:
-        # a set 1e-9 thin: whether the other solver settles it hangs on the processor
+        # The feasible set is only 1e-9 wide, so convergence depends on the processor.
         pytest.skip(f"the reference is not sure of its own answer: {problem.status}")
     assert problem.status == "optimal"
     return deviation.value * UNIT
@@ -106,8 +107,7 @@ def nearest_by_cvxpy(posture, point, load=None):
 
 @pytest.mark.parametrize("name", ["five_bar", "delta", "hexapod", "four_bar"])
 @pytest.mark.parametrize("seed", [0, 1])
-def test_pose_inside_the_assembly_zone_is_nearest_to_nominal(name, seed):
-    """Without load the springs are unloaded, and cvxpy solves the cone program."""
+def test_nearest_pose_in_the_assembly_zone_agrees_with_cvxpy(name, seed):
     posture = erring(name, seed)
     here = as_declared(posture, point=POINT)
     found = predict(here)
@@ -121,13 +121,13 @@ def test_pose_inside_the_assembly_zone_is_nearest_to_nominal(name, seed):
     size = np.linalg.norm(expected)
     assert np.linalg.norm(reached) == pytest.approx(size, rel=1e-5, abs=1e-10)
     assert reached == pytest.approx(expected, abs=1e-7)
-    # the device reads finite rotations: half the square of a milliradian, times 0.2 m
+    # The device measures finite rotations, which differ by theta^2 / 2 times 0.2 m.
     assert found.deviation[0] == pytest.approx(reached, abs=1e-7)
     assert np.linalg.norm(at_point(answer, posture)) > 1.5 * size
 
 
 @pytest.mark.parametrize(("name", "margin"), [("five_bar", 0.0), ("orthoglide", 0.02)])
-def test_selecting_the_nearest_pose_preserves_the_energy(name, margin):
+def test_nearest_pose_has_minimum_energy(name, margin):
     posture = erring(name, 3)
     load = np.array([0, 0, 0, 0, -20.0, 0])
     here = as_declared(posture, load, point=POINT)
@@ -141,20 +141,19 @@ def test_selecting_the_nearest_pose_preserves_the_energy(name, margin):
     assert near.clearance_excess() < 1e-9
     expected = nearest_by_cvxpy(posture, POINT, here.load_at_origin()[0])
     size = np.linalg.norm(expected)
-    # 1e-9 of the energy is 5e-5 of a deflection
+    # The energy tolerance of 1e-9 corresponds to a deflection error of 5e-5.
     assert np.linalg.norm(at_point(near, posture)) == pytest.approx(size, rel=1e-4)
     assert found.deviation[0] == pytest.approx(expected, abs=2e-3 * size)
     assert np.linalg.norm(at_point(answer, posture)) > (1 + margin) * size
 
 
 @pytest.mark.parametrize("clearance", [2e-5, 8e-5])
-def test_pose_error_of_a_platform_on_two_pins_is_its_error_minus_one_clearance(
+def test_deviation_on_two_pins_equals_error_minus_clearance(
     clearance,
 ):
-    """Two rigid chains carry one platform, 0.1 mm apart, on pins with clearance c.
+    """Two rigid chains with errors of 0.1 mm carry a platform on pins.
 
-    Both pins must reach the platform: its pose nearest to nominal is off by 0.1 mm - c,
-    the part of the error that the first pin's clearance does not cover.
+    The deviation of the nearest pose is 0.1 mm minus the clearance of the pins.
     """
     pin = Clearance(radial=clearance, spin=0.0)
     frames = (
@@ -172,8 +171,8 @@ def test_pose_error_of_a_platform_on_two_pins_is_its_error_minus_one_clearance(
     assert found.deviation[0] == pytest.approx(expected, abs=1e-10)
 
 
-def test_determined_pose_is_not_reported_as_free():
-    """A load closes all clearances, or there is no clearance."""
+def test_unique_pose_is_not_reported_as_undetermined():
+    """The robot has no clearance, or a load moves each joint to its limit."""
     tight = home_posture(coaxial_beams(np.array([0, 0, 0, 1e-4, 0, 0])))
     assert predict(as_declared(tight)).undetermined.tolist() == [False]
     pin = Clearance(radial=2e-5, axial=2e-5, tilt=1e-4, spin=1e-4)
@@ -195,15 +194,14 @@ def test_determined_pose_is_not_reported_as_free():
         assert found.deviation[0] == pytest.approx(pushed, abs=1e-10)
 
 
-def test_prediction_with_fixed_rest_positions_equals_the_first_prediction():
-    """Without additional effects, the prediction does not change."""
+def test_prediction_with_stored_rest_positions_does_not_change():
     here = as_declared(erring("five_bar", 5), point=POINT)
     found, held = predict(here), predict(with_rest_positions(here))
     assert held.deviation == pytest.approx(found.deviation, abs=1e-9)
 
 
-def test_finite_motions_start_from_the_nearest_pose():
-    """Errors of 20 um: finite motions change the pose by far less than a micrometre."""
+def test_exact_prediction_starts_from_the_nearest_pose():
+    """With errors of 20 um, the linear and exact poses differ by less than 0.2 um."""
     here = as_declared(erring("five_bar", 0), point=POINT)
     found = predict(replace(here, exact=True))
     assert found.undetermined.tolist() == [True]
@@ -224,7 +222,7 @@ frame = [
 
 @pytest.fixture(scope="module")
 def with_clearance(tmp_path_factory):
-    """A slide whose clearance leaves the platform loose, with 24 noisy readings."""
+    """Return a campaign with 24 noisy readings of a slide with clearance."""
     rng = np.random.default_rng(1)
     rows = [
         ",".join([f"r{k}", str(0.02 * (k % 8)), *map(str, rng.normal(0, 5e-6, 3))])
@@ -236,7 +234,7 @@ def with_clearance(tmp_path_factory):
 
 
 @pytest.mark.parametrize("command", ["inspect", "diagnose"])
-def test_commands_report_readings_with_undetermined_clearance(
+def test_commands_report_measurements_with_undetermined_pose(
     command, with_clearance, tmp_path, run
 ):
     target = tmp_path / "found.json"
@@ -248,9 +246,9 @@ def test_commands_report_readings_with_undetermined_clearance(
 
 
 def test_nearest_pose_respects_the_motion_limit_of_a_joint():
-    """A pin limited to 1e-3 rad with an error of 1.5e-3: it cannot return to nominal.
+    """A pin with an error of 1.5e-3 rad rotates by at most 1e-3 rad.
 
-    Closed by a clearance of 2e-3, it rotates by v = q + 1.5e-3, which is at least 5e-4.
+    The smallest deviation is therefore 5e-4 rad.
     """
     robot = Robot("pin", "end", (
         Frame("pin", joint="revolute", clearance=Clearance(spin=1e-3),

@@ -1,4 +1,4 @@
-"""Bounds of (27): closed forms, published bounds, and a second method."""
+"""Bounds of (27), compared with closed forms and published bounds."""
 
 from dataclasses import replace
 
@@ -28,7 +28,7 @@ CASES = [
 
 
 def serial(*clearances, arm=0.3):
-    """Fixed joints with clearance, ``arm`` apart along x."""
+    """Return a chain of fixed joints with clearance at distances ``arm`` along x."""
     frames, above = [], "base"
     for i, clearance in enumerate(clearances):
         shift = [arm * bool(i), 0, 0]
@@ -45,7 +45,7 @@ def bounds(robot, assumption="frozen", **options):
 
 
 def assert_holds(bracket, value, tolerance):
-    """The bounds are as tight as requested and enclose the value."""
+    """Assert that the bounds enclose the value and differ by at most the tolerance."""
     low, high = bracket
     assert high - low <= tolerance
     slip = 1e-9 * value
@@ -53,27 +53,25 @@ def assert_holds(bracket, value, tolerance):
     assert high >= value - slip
 
 
-def test_pose_error_of_one_joint_equals_its_clearances_by_hand():
-    """Rotation: tilt and spin are perpendicular.  Translation: disc and interval, and
-    the arm of 0.3 m adds spin along y and tilt along z.
-    """
+def test_pose_error_of_one_joint_equals_its_clearances():
+    """The arm of 0.3 m adds a translation by spin along y and by tilt along z."""
     clearance = Clearance(radial=2e-5, axial=1e-5, tilt=4e-4, spin=3e-4)
     found = bounds(serial(clearance))
     assert_holds(found.rotation_error, 5e-4, 1e-9)
-    # x: r cos a; y: r sin a + 0.3 spin; z: axial + 0.3 tilt
+    # The components are r cos a, r sin a + 0.3 spin, and axial + 0.3 tilt.
     a = np.linspace(0, 2 * np.pi, 2_000_001)
     sizes = np.hypot(2e-5 * np.cos(a), 2e-5 * np.sin(a) + 0.3 * 3e-4)
     expected = np.hypot(sizes.max(), 1e-5 + 0.3 * 4e-4)
     assert_holds(found.translation_error, expected, 1e-9)
 
 
-def test_clearances_of_parallel_axes_add_up_along_a_serial_chain():
+def test_clearances_of_parallel_axes_add_up():
     found = bounds(serial(Clearance(radial=1e-5), Clearance(radial=2e-5)))
     assert_holds(found.translation_error, 3e-5, 1e-9)
     assert_holds(found.rotation_error, 0.0, 1e-9)
 
 
-def test_pose_error_at_a_platform_offset_includes_the_lever_arm():
+def test_pose_error_at_an_offset_point_includes_the_rotation():
     found = bounds(serial(Clearance(tilt=1e-3)), offset=[0.2, 0, 0])
     assert_holds(found.translation_error, 0.5e-3, 1e-9)
 
@@ -95,7 +93,7 @@ def test_free_platform_has_an_infinite_pose_error():
 
 @pytest.mark.parametrize("spin", [1.0, 1e-3, 1e-4, 1e-6, 1e-9, 0.0])
 def test_pose_error_includes_the_motion_limit_of_a_passive_joint(spin):
-    """For an arm L, y = radial + L spin and z = axial + L tilt occur together."""
+    """The largest translations are y = radial + L spin and z = axial + L tilt."""
     clearance = Clearance(radial=1e-5, axial=2e-5, tilt=3e-4, spin=spin)
     hub = Frame("hub", joint="revolute", clearance=clearance)
     found = bounds(Robot("arm", "tool", (hub, Frame("tool", "hub", [0.2, 0, 0]))))
@@ -105,9 +103,9 @@ def test_pose_error_includes_the_motion_limit_of_a_passive_joint(spin):
 
 
 def test_tool_point_on_a_bearing_axis_has_a_bounded_translation_error():
-    """At height h on the bearing axis, the bounds are radial + h tilt, and axial.
+    """At height h on the bearing axis, the bounds are radial + h tilt and axial.
 
-    Off the axis the translation error is infinite.
+    At other points, the translation error is infinite.
     """
     clearance = Clearance(radial=1e-5, axial=2e-5, tilt=3e-4)
     hub = Frame("hub", joint="revolute", clearance=clearance)
@@ -124,7 +122,7 @@ def test_tool_point_on_a_bearing_axis_has_a_bounded_translation_error():
 
 
 def hinged_frame(spin):
-    """A four-bar with clearance in its pins, two of which are limited to +-spin."""
+    """Return a four-bar with clearance in its pins and motion limits on two pins."""
     clearance = small_clearance(spin=spin)
     robot = planar_four_bar()
     limited = {"pin_a": clearance, "rocker": clearance, "pin_b": small_clearance()}
@@ -134,7 +132,7 @@ def hinged_frame(spin):
 
 
 def feasible(posture, cp):
-    """Clearance screws within all bounds that close the ideal robot, for cvxpy."""
+    """Return the clearance screws and constraints of the closed nominal robot."""
     robot, lin = posture.robot, linearise(posture)
     c = cp.Variable((len(robot.frames), 6))
     moved = 1e-4 * cp.reshape(c, (6 * len(robot.frames),), order="C")
@@ -149,7 +147,7 @@ def feasible(posture, cp):
 
 @pytest.mark.parametrize("spin", [1.0, 3e-4, 1e-4, 1e-5, 1e-8])
 def test_screws_that_attain_the_bounds_satisfy_the_closures(spin, rng):
-    """cvxpy checks the closures and computes the support functions, to 1e-6."""
+    """The closures and support functions are computed by cvxpy to 1e-6."""
     import cvxpy as cp
 
     from forcefit.assembly.linear.reference.as_printed import OPTIMAL, _solve
@@ -171,8 +169,8 @@ def test_screws_that_attain_the_bounds_satisfy_the_closures(spin, rng):
 
 
 @pytest.mark.parametrize("asked", [{}, {"energy_budget": 0.5}])
-def test_energy_budget_of_two_springs_allows_a_ball_of_known_radius(asked):
-    """E - E* = (k1 + k2)/2 |x - x*|^2 for every motion x of the common point."""
+def test_energy_budget_of_two_springs_bounds_the_displacement(asked):
+    """For a displacement x of the common point, E - E* = (k1 + k2)/2 |x - x*|^2."""
     k1, k2, gap, eta = 1e6, 3e6, 2e-4, asked.get("energy_budget", 0.05)
     robot = coaxial_beams(np.array([0, 0, 0, gap, 0, 0]), (k1, k2))
     least = k1 * k2 / (k1 + k2) * gap**2 / 2
@@ -183,9 +181,9 @@ def test_energy_budget_of_two_springs_allows_a_ball_of_known_radius(asked):
 
 
 @pytest.mark.parametrize("limit", [4.1, 1.5, 0.5])
-def test_motion_limit_of_a_joint_limits_the_pose_error_of_a_closed_chain(limit):
-    """Closed by q + E = v_1 + v_2 + v_3, |v| <= E and |q| <= limit E: min(3, limit + 1)
-    E is the farthest turn q + E of the platform.
+def test_pose_error_of_a_closed_chain_respects_motion_limits(limit):
+    """With the closure q + E = v_1 + v_2 + v_3, |v| <= E and |q| <= limit E, the
+    largest rotation q + E of the platform is min(3, limit + 1) E.
     """
     E, loose = 1e-3, Clearance(spin=1e-3)
     robot = Robot("pin", "end", (
@@ -208,29 +206,27 @@ def test_frozen_assumption_fixes_the_clearance_of_a_loaded_joint(stiffness):
     )  # fmt: skip
     answer = solve_assembly(home_posture(robot))
     found = bounds(robot)
-    # the loaded disc is fixed; the unloaded interval along z is free, but the springs
-    # that would have to follow it are fixed
+    # The radial clearance is loaded and therefore fixed. The axial clearance is
+    # unloaded, but the fixed springs prevent its motion.
     size = float(np.linalg.norm(answer.platform_screw[3:]))
     assert_holds(found.translation_error, size, 1e-9)
 
 
-def test_unknown_assumption_and_budget_under_load_are_rejected():
+def test_unknown_assumption_and_loaded_budget_are_rejected():
     many = solve_assembly(
         [home_posture(coaxial_beams(np.zeros(6)))], [1, 0, 0, 0, 0, 0]
     )
     for answer in (many, many[0]):
         with pytest.raises(ValueError, match="assumption is 'loose', expected one of"):
             bound_pose_error(answer, "loose")
-    with pytest.raises(ValueError, match="budget assumption requires no load"):
+    with pytest.raises(ValueError, match="expected an assembly without load"):
         bound_pose_error(many[0], "budget")
 
 
 @pytest.mark.parametrize(("case", "point"), CASES)
 @pytest.mark.parametrize(("key", "assumption"), [("rigid", "frozen"), ("free", "free")])
-def test_pose_error_bounds_overlap_the_published_bounds(case, point, key, assumption):
-    """Both contain the true value, so they overlap; the published deformations are
-    uncertain by 1e-7 where the energy is nearly zero.
-    """
+def test_pose_error_bounds_agree_with_published_bounds(case, point, key, assumption):
+    """Both intervals contain the true value, so they overlap."""
     pose = {"tx": point["x"], "tz": point["z"]}
     for name, robot in (("full", irsbot2_with(case)), ("clear", irsbot2())):
         answer = solve_assembly(place_robot(robot, pose=pose))

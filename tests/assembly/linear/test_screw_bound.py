@@ -17,7 +17,7 @@ from tests.robots_for_tests import coaxial_beams, random_robot
 
 
 def exactly(A):
-    """Convert an array of floats exactly to rows of fractions."""
+    """Convert an array of floats to rows of exact fractions."""
     return [[Fraction(float(v)) for v in row] for row in A]
 
 
@@ -34,7 +34,7 @@ def turned(A):
 
 
 def solved(K, right):
-    """Gauss-Jordan elimination, exact; None if singular."""
+    """Solve linear equations exactly by Gauss-Jordan elimination; None if singular."""
     rows = [own + more for own, more in zip(K, right, strict=True)]
     for i in range(len(rows)):
         pivot = next((r for r in range(i, len(rows)) if rows[r][i]), None)
@@ -49,9 +49,9 @@ def solved(K, right):
 
 
 def exact_screw(answer):
-    """Exact minimum-energy platform screw of a robot without clearance.
+    """Return the exact minimum-energy platform screw of a robot without clearance.
 
-    y = -A_y' l, A_y y + A_q q = -misfit and A_q' l = 0, with the columns as given.
+    The solution satisfies y = -A_y' l, A_y y + A_q q = -misfit and A_q' l = 0.
     """
     lin, joints = answer.linearisation, answer.joints
     A, springs, free = map(exactly, (lin.rows, joints.elastic, joints.free))
@@ -73,7 +73,7 @@ def exact_screw(answer):
 
 
 def tight(robot, change):
-    """The robot without clearance and with modified links."""
+    """Return the robot without clearance and with modified links."""
     return replace(robot, frames=tuple(
         replace(f, clearance=None, link=change(f.link) if f.link else None)
         for f in robot.frames
@@ -82,7 +82,7 @@ def tight(robot, change):
 
 def assert_within(answer, exact):
     off, bound = exact - answer.platform_screw, bound_screw(answer)
-    # the last place of the exact answer as a float
+    # rounding of the exact solution to floating point
     last = 1e-15 * np.abs(exact).max()
     assert np.linalg.norm(off[:3]) <= bound.rotation + last
     assert np.linalg.norm(off[3:]) <= bound.translation + last
@@ -92,7 +92,7 @@ def assert_within(answer, exact):
 @pytest.mark.parametrize(
     "spread", [0, *(pytest.param(s, marks=pytest.mark.slow) for s in (6, 12, 15))]
 )
-def test_screw_bound_holds_for_stiffnesses_of_different_magnitude(spread):
+def test_screw_error_is_within_its_bound_for_mixed_stiffnesses(spread):
     compared = 0
     for seed in range(12):
         rng = np.random.default_rng(seed)
@@ -107,7 +107,7 @@ def test_screw_bound_holds_for_stiffnesses_of_different_magnitude(spread):
         except CannotAssemble:
             continue
         exact = exact_screw(answer)
-        if exact is None:  # an idle motion
+        if exact is None:  # The robot has an unconstrained internal motion.
             continue
         assert_within(answer, exact)
         compared += 1
@@ -116,8 +116,8 @@ def test_screw_bound_holds_for_stiffnesses_of_different_magnitude(spread):
 
 @pytest.mark.parametrize("young", [7e10, 1e18, 1e24, 1e30])
 @pytest.mark.parametrize("name", ["four_bar", "five_bar"])
-def test_true_screw_error_is_below_the_stated_bound_for_any_stiffness(name, young):
-    """For E = 1e30 Pa and elastic drives, the error exceeds the screw itself."""
+def test_screw_error_is_within_its_bound_for_any_stiffness(name, young):
+    """With E = 1e30 Pa and elastic drives, the numerical error exceeds the screw."""
     rng = np.random.default_rng(1)
     robot = load_robot(name)
     robot = robot.with_errors(1e-3 * rng.uniform(-1, 1, (len(robot.frames), 6)))
@@ -135,8 +135,8 @@ def test_true_screw_error_is_below_the_stated_bound_for_any_stiffness(name, youn
         assert "the stiffest spring is" in unproved(answer)
 
 
-def test_solution_dominated_by_round_off_is_reported_as_not_proved():
-    """Links of 1e24 Pa with elastic drives, at a single posture and at one of many."""
+def test_solution_dominated_by_round_off_is_not_proved():
+    """The links have a Young's modulus of 1e24 Pa, and the drives are elastic."""
     robot = load_robot("five_bar")
     errors = 1e-3 * np.random.default_rng(1).uniform(-1, 1, (len(robot.frames), 6))
     robot = tight(robot.with_errors(errors), lambda link: replace(link, young=1e24))
@@ -152,17 +152,17 @@ def test_solution_dominated_by_round_off_is_reported_as_not_proved():
 
 
 def two_springs(k, gap, open_):
-    """Two links of stiffness k, with energy gap ``gap`` [J] and residual ``open_``."""
+    """Return the assembly of two links of stiffness k with a given gap and residual."""
     assembly = solve_assembly(home_posture(coaxial_beams(np.zeros(6), (k, k))))
     vars(assembly).update(uncertainty=gap, rounding=open_)
     return assembly
 
 
 def test_screw_bound_of_two_springs_equals_its_closed_form():
-    """(y_1, y_2) within sqrt(2 g), equal if closed: sqrt(g / k) along every axis.
+    """The bound along every axis is sqrt(g / k) for a closed loop.
 
-    If the closure may stay open, y_2 can be zero and y_1 carries the whole gap:
-    sqrt(2 g / k).  The box around a ball is larger by a factor of sqrt(3).
+    If the loop can stay open, one spring contains the whole energy gap, and the bound
+    is sqrt(2 g / k).  The bounds are multiplied by sqrt(3) for the box around a ball.
     """
     k, gap = 4e4, 1e-6
     closed = bound_screw(two_springs(k, gap, 1e-15))
@@ -170,14 +170,14 @@ def test_screw_bound_of_two_springs_equals_its_closed_form():
     for found in (closed.rotation, closed.translation, closed.translation_error):
         assert found == pytest.approx(expected, rel=1e-4)
     assert closed.rotation_open == closed.translation_open == 0.0
-    # lengths are counted in the longest body's, which is 1 m
+    # The reference length is the longest body, 1 m.
     open_ = bound_screw(two_springs(k, gap, 1.0))
     assert open_.rotation == pytest.approx(np.sqrt(2) * expected, rel=1e-4)
     assert open_.translation_error == pytest.approx(np.sqrt(2) * expected, rel=1e-4)
 
 
-def test_clearance_outside_the_loop_is_reported_as_undetermined_and_not_as_error():
-    """A gripper with radial clearance r and axial clearance a on two bent beams."""
+def test_clearance_outside_the_loop_is_not_a_numerical_error():
+    """A gripper with radial clearance r and axial clearance a is on two beams."""
     r, a = 3e-5, 2e-5
     beams = coaxial_beams([0, 0, 0, 1e-4, 0, 0], (4e4, 4e4))
     hand = Frame("hand", "end_one", clearance=Clearance(radial=r, axial=a))
@@ -191,8 +191,8 @@ def test_clearance_outside_the_loop_is_reported_as_undetermined_and_not_as_error
 
 
 @pytest.mark.parametrize("name", ["irsbot2", "hexapod", "delta"])
-def test_undetermined_range_without_errors_equals_the_largest_pose_error(name):
-    """The computed screw is zero, so `solve` and `error` report the same quantity."""
+def test_screw_bound_without_errors_equals_the_largest_pose_error(name):
+    """The computed screw is zero, so both bounds refer to the same quantity."""
     assembly = solve_assembly(home_posture(load_robot(name)))
     assert not assembly.platform_screw.any()
     found = bound_screw(assembly)

@@ -1,8 +1,9 @@
 """Rotation of a 3-UPU robot within its clearances, computed from finite geometry.
 
-The table of docs/seoul.md.  A leg's twist is the angle about the leg between the inner
-axes of its two universal joints.  Four hinges that tilt by at most c permit a twist of
-4 c / (u n), where u is along the leg and n normal to the axes of a universal joint.
+The expected values are those of docs/seoul.md.  The twist of a leg is the angle about
+the leg between the inner axes of its two universal joints.  Four hinges that tilt by at
+most c allow a twist of 4 c / (u . n), with u along the leg and n normal to the axes of
+a universal joint.
 """
 
 from itertools import product
@@ -15,7 +16,7 @@ from forcefit import bound_pose_error, place_robot, solve_assembly
 from forcefit.assembly.exchange.robot_files import load_robot
 from tests.test_tutorials import DOCS, ROOT, blocks
 
-BASE, PLATFORM, TILT = 0.24, 0.08, 2e-4  # [m], [m], [rad]
+BASE, PLATFORM, TILT = 0.24, 0.08, 2e-4  # radii [m] and hinge tilt [rad]
 ANGLES = 2 * np.pi * np.arange(3) / 3
 RADIAL = np.stack([np.cos(ANGLES), np.sin(ANGLES), 0 * ANGLES], axis=1)
 TANGENTIAL = np.cross([0, 0, 1], RADIAL)
@@ -27,12 +28,12 @@ def unit(vectors):
 
 
 def hinge_tilts(position, outer, turns):
-    """(n, 3) [rad] total tilt of the hinges of each leg, drives locked."""
+    """Return the total hinge tilt of each leg with locked drives, (n, 3) [rad]."""
     lengths = np.linalg.norm(position + (PLATFORM - BASE) * RADIAL, axis=1)
     rotations = Rotation.from_rotvec(turns).as_matrix()
     corners = np.einsum("nab,kb->nka", rotations, RADIAL) * PLATFORM - BASE * RADIAL
     x = np.tile(position, (len(turns), 1))
-    for _ in range(6):  # Newton: lengths to the position
+    for _ in range(6):  # Newton iterations for the position at given leg lengths
         legs = x[:, None] + corners
         longer = np.linalg.norm(legs, axis=-1) - lengths
         x = x - np.linalg.solve(unit(legs), longer[..., None])[..., 0]
@@ -45,7 +46,7 @@ def hinge_tilts(position, outer, turns):
 
 
 def farthest(position, outer, tilt, rays, step):
-    """Rays with the largest rotation [rad] before a hinge reaches its limit."""
+    """Return the directions with the largest rotation [rad] within the hinge limits."""
     rays, steps = unit(rays), 0
     while True:
         tilts = hinge_tilts(position, outer, (steps + 1) * step * rays)
@@ -56,10 +57,10 @@ def farthest(position, outer, tilt, rays, step):
 
 
 def largest_finite_rotation(position, outer, tilt):
-    """[rad] of rotations that are reached along a ray, drives locked.
+    """Return the largest rotation [rad] with locked drives.
 
-    Rays lead to the corners of the first-order limits, and near the plane of the two
-    most sensitive rotations; then near the farthest of these rays.
+    The search is along rays from the nominal orientation.  A second search is near the
+    ray with the largest rotation.
     """
     limits = hinge_tilts(position, outer, 1e-6 * np.eye(3)).T / 1e-6
     corners = [np.linalg.pinv(limits) @ signs for signs in product([1, -1], repeat=3)]
@@ -76,7 +77,7 @@ def largest_finite_rotation(position, outer, tilt):
 
 @pytest.fixture(scope="module")
 def seoul(tmp_path_factory):
-    """The robot of the example page."""
+    """Return the robot of docs/seoul.md."""
     path = tmp_path_factory.mktemp("seoul") / "seoul.toml"
     texts = {title: text for _, title, text in blocks(DOCS / "seoul.md")}
     path.write_text(texts["seoul.toml"])
@@ -84,7 +85,7 @@ def seoul(tmp_path_factory):
 
 
 def first_order(robot, position):
-    """[rad] bound of (27)."""
+    """Return the bound of (27) on the rotation [rad]."""
     pose = dict(zip(("tx", "ty", "tz"), position, strict=True))
     return bound_pose_error(solve_assembly(place_robot(robot, pose))).rotation_error[1]
 
@@ -94,18 +95,15 @@ def first_order(robot, position):
     ("x", "y", "shown"),
     [(0.0, 0.0, 45), (0.02, 0.01, 74), (0.05, 0.02, 21.5), (0.1, 0.05, 8.9)],
 )
-def test_finite_rotation_is_at_least_the_value_of_the_example_page(x, y, shown):
-    """A search along rays cannot exceed the largest rotation."""
+def test_finite_rotation_agrees_with_the_documentation(x, y, shown):
+    """The search along rays gives a lower bound on the largest rotation."""
     found = largest_finite_rotation((x, y, 0.45), RADIAL, TILT)
     assert shown <= 1e3 * found <= 1.04 * shown
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("factor", [1e-1, 1e-2])
-def test_first_order_rotation_is_the_limit_of_finite_rotations_for_small_clearances(
-    seoul, factor
-):
-    """The relative difference is of the order of the rotation divided by 49 mrad."""
+def test_finite_rotation_approaches_first_order_rotation(seoul, factor):
     position = (0.02, 0.01, 0.45)
     bound = first_order(seoul, position)
     finite = largest_finite_rotation(position, RADIAL, factor * TILT) / factor
@@ -113,8 +111,8 @@ def test_first_order_rotation_is_the_limit_of_finite_rotations_for_small_clearan
 
 
 @pytest.mark.slow
-def test_first_order_rotation_of_tsais_robot_equals_that_of_finite_geometry():
-    """Its axes are far from a singular posture: rotations of 3 mrad are small."""
+def test_first_order_rotation_of_tsai_robot_equals_finite_rotation():
+    """The robot is far from singular, so rotations of 3 mrad are small."""
     robot = load_robot(ROOT / "examples" / "drawn" / "three_upu.toml")
     for position in ((0.0, 0.0, 0.45), (0.02, 0.01, 0.45)):
         finite = largest_finite_rotation(position, TANGENTIAL, TILT)

@@ -18,7 +18,7 @@ METHODS = ["compiled", "reference"]
 
 
 def test_pose_of_a_chain_is_the_product_of_matrix_exponentials(rng):
-    """Product of exponentials of the twists [w; p x w + h w] at home, base origin."""
+    """The twists in the home pose are [w; p x w + h w] at the base origin."""
     frames, twists, parent = [], [], "base"
     for k, pitch in enumerate([0.3, -0.2, 0.0, 0.7]):
         kind = "helical" if pitch else "revolute"
@@ -42,7 +42,7 @@ def test_pose_of_a_chain_is_the_product_of_matrix_exponentials(rng):
 
 
 def held_nut(turned, shifted, k=None):
-    """A nut with 25 um axial clearance on a seat with an error along the thread."""
+    """Return a nut with an axial clearance of 25 um and an error of its seat."""
     K = None if k is None else np.diag([np.inf, np.inf, 0, np.inf, np.inf, k])
     thread = Frame(
         "thread", joint="helical", pitch=0.004, joint_stiffness=K,
@@ -54,8 +54,8 @@ def held_nut(turned, shifted, k=None):
 
 
 @pytest.mark.parametrize(("turned", "shifted"), [(0.05, 1e-5), (-0.1, 2e-5), (0, 3e-5)])
-def test_margin_of_a_nut_is_its_offset_from_the_thread(turned, shifted):
-    """The margin is |TZ - h RZ| / b, since only the motion along the thread is free."""
+def test_margin_of_a_nut_equals_its_offset_divided_by_clearance(turned, shifted):
+    """The margin is |TZ - h RZ| / b for an error (RZ, TZ) and a clearance b."""
     at = held_nut(turned, shifted)
     expected = abs(shifted - 0.004 / (2 * np.pi) * turned) / 25e-6
     for method in METHODS:
@@ -65,8 +65,8 @@ def test_margin_of_a_nut_is_its_offset_from_the_thread(turned, shifted):
     assert margin_as_printed(at) == pytest.approx(expected, rel=1e-6)
 
 
-def test_energy_of_a_forced_nut_equals_that_of_its_offset_beyond_the_clearance():
-    """The energy is k (|TZ - h RZ| - b)^2 / 2, also exactly, for a common axis."""
+def test_energy_of_a_nut_equals_the_closed_form():
+    """The energy is k (|TZ - h RZ| - b)^2 / 2."""
     at = held_nut(-0.1, 2e-5, 1e7)
     over = 2e-5 + 0.1 * 0.004 / (2 * np.pi) - 25e-6
     for method in METHODS:
@@ -80,7 +80,7 @@ def test_energy_of_a_forced_nut_equals_that_of_its_offset_beyond_the_clearance()
 
 
 def random_threads(seed):
-    """Three legs of random joints, with helical instead of revolute joints."""
+    """Return a robot of three legs with random helical joints."""
     rng, frames = np.random.default_rng(seed), []
     robot = random_robot(rng, legs=3, joints=4, link_share=1.0)
     for f in robot.frames:
@@ -94,7 +94,7 @@ def random_threads(seed):
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_three_solvers_agree_on_random_loops_with_oblique_threads(seed):
+def test_three_solvers_agree_on_random_helical_joints(seed):
     at = home_posture(random_threads(seed))
     found, expected = (solve_assembly(at, method=method) for method in METHODS)
     assert found.energy == pytest.approx(expected.energy, rel=1e-7, abs=1e-12)
@@ -106,8 +106,8 @@ def test_three_solvers_agree_on_random_loops_with_oblique_threads(seed):
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_exact_solution_differs_by_the_square_of_the_errors(seed):
-    """Halving the errors reduces the difference by a factor of 4, to third order."""
+def test_difference_to_exact_solution_is_quadratic_in_errors(seed):
+    """Halving the errors divides the difference by 4, up to third-order terms."""
     robot = random_threads(seed)
     tight = replace(
         robot, frames=tuple(replace(f, clearance=None) for f in robot.frames)

@@ -1,4 +1,4 @@
-"""Zone margin (21): closed forms, properties, and the printed problem in cvxpy."""
+"""Zone margin (21), compared with closed forms and with the problem in cvxpy."""
 
 from dataclasses import replace
 
@@ -27,15 +27,15 @@ PLAY = Clearance(radial=2e-5, axial=1e-5, tilt=1e-3, spin=2e-3)
 @pytest.mark.parametrize(
     ("gap", "margin"),
     [
-        ([0, 0, 0, 3e-5, 4e-5, 0], 2.5),  # 5e-5 m across, 2e-5 m of clearance
+        ([0, 0, 0, 3e-5, 4e-5, 0], 2.5),  # radial error 5e-5 m, clearance 2e-5 m
         ([0, 0, 0, 0, 0, -7e-6], 0.7),  # along
         ([6e-4, 8e-4, 0, 0, 0, 0], 1.0),  # tilt
-        ([0, 0, -3e-3, 0, 0, 0], 1.5),  # spin, clearance on a fixed joint
-        ([0, 0, 0, 2e-5, 0, 2e-5], 2.0),  # the worst of several
+        ([0, 0, -3e-3, 0, 0, 0], 1.5),  # spin error of a fixed joint with clearance
+        ([0, 0, 0, 2e-5, 0, 2e-5], 2.0),  # the largest of two ratios
         ([0] * 6, 0.0),
     ],
 )
-def test_margin_of_one_joint_is_gap_over_clearance(gap, margin):
+def test_margin_of_one_joint_equals_gap_divided_by_clearance(gap, margin):
     robot = coaxial_beams(np.array(gap, dtype=float), clearance=PLAY)
     zone = zone_margin(home_posture(robot))
     assert zone.margin == pytest.approx(margin, rel=1e-9, abs=1e-12)
@@ -50,7 +50,7 @@ def test_margin_is_infinite_without_clearance_in_the_error_direction():
 
 
 def test_passive_joints_compensate_in_plane_errors_without_clearance():
-    """The pins of a four-bar take up in-plane errors, but no out-of-plane errors."""
+    """The pins of a four-bar compensate in-plane errors but not out-of-plane errors."""
     errors = np.zeros((6, 6))
     errors[2] = [0, 0, 1e-3, 1e-4, 2e-4, 0]
     robot = planar_four_bar(errors=errors)
@@ -61,7 +61,7 @@ def test_passive_joints_compensate_in_plane_errors_without_clearance():
 
 @pytest.mark.parametrize("method", METHODS)
 def test_range_of_a_passive_joint_does_not_scale_with_the_margin(method):
-    """Slider range 1e-4 and axial clearance 1e-5: (3e-4 - 1e-4) / 1e-5."""
+    """The margin is (3e-4 - 1e-4) / 1e-5 for a slider range of 1e-4 m."""
     frames = (
         Frame("slide", joint="prismatic", clearance=Clearance(axial=1e-4)),
         Frame("joint", "slide", clearance=Clearance(axial=1e-5)),
@@ -79,7 +79,7 @@ def test_range_of_a_passive_joint_does_not_scale_with_the_margin(method):
         assert zone.bound == pytest.approx(margin, rel=1e-6, abs=1e-12)
 
 
-def test_clearances_scaled_by_the_margin_just_assemble():
+def test_clearances_multiplied_by_the_margin_allow_assembly():
     robot = irsbot2_with(NUMBERS["cases"][0])
     margin = zone_margin(home_posture(robot), "free").margin
 
@@ -105,14 +105,14 @@ def test_unknown_compliant_option_is_rejected():
 
 @settings(deadline=None, max_examples=12)
 @given(seed=st.integers(0, 2**32 - 1), legs=st.integers(2, 3))
-def test_margin_of_random_robots_matches_the_paper_in_cvxpy(seed, legs):
+def test_margin_of_random_robots_agrees_with_cvxpy(seed, legs):
     rng = np.random.default_rng(seed)
     posture = home_posture(random_robot(rng, legs, 3))
     for compliant in ("rigid", "free"):
         zone = zone_margin(posture, compliant)
         try:
             expected = margin_as_printed(posture, compliant == "free")
-        except RuntimeError:  # cvxpy gave up, as it does on some without an answer
+        except RuntimeError:  # cvxpy does not converge for some infeasible problems.
             assert zone.margin == np.inf
             continue
         if expected is None:
@@ -125,7 +125,7 @@ def test_margin_of_random_robots_matches_the_paper_in_cvxpy(seed, legs):
 
 @pytest.mark.parametrize("compliant", ["rigid", "free"])
 def test_margins_of_many_robots_equal_the_reference_method(compliant, rng):
-    """Both margins agree within their certified bounds, to 1e-8."""
+    """The margins agree to 1e-8."""
     homes = [home_posture(make()) for make in BUILT_IN.values()]
     for seed in range(80):
         draw = np.random.default_rng(seed)
@@ -143,8 +143,7 @@ def test_margins_of_many_robots_equal_the_reference_method(compliant, rng):
     assert compiled
 
 
-def test_margins_of_several_errors_or_postures_are_gap_over_clearance():
-    """Several errors at one posture, errors for each posture, and several postures."""
+def test_margins_of_many_points_equal_gap_divided_by_clearance():
     gaps = np.array([1e-5, 4e-5, -3e-5])
     sets = np.zeros((3, 6, 6))
     sets[:, 2, 5] = gaps
@@ -161,8 +160,8 @@ def test_margins_of_several_errors_or_postures_are_gap_over_clearance():
     assert zone_margin([erring] * 2).margin == pytest.approx(expected[[1, 1]])
 
 
-def test_margins_are_selected_by_index_and_one_point_has_no_length():
-    """Gap over clearance at one point; the norms of the cone forces add up to 1."""
+def test_margins_can_be_selected_by_index():
+    """The norms of the forces on the cones add up to 1."""
     sets = np.zeros((3, 6, 6))
     sets[:, 2, 5] = [1e-5, 4e-5, -3e-5]
     at = home_posture(coaxial_beams(np.zeros(6), clearance=PLAY))

@@ -115,7 +115,9 @@ def test_load_on_free_motion_raises_free_motion():
     )
     couple = np.zeros((3, 6))
     couple[1, 2] = 2.0
-    with pytest.raises(FreeMotion, match="it moves wheel rz; the platform is at rest"):
+    with pytest.raises(
+        FreeMotion, match="it moves wheel rz; the platform does not move"
+    ):
         solve_assembly(home_posture(Robot("beside", "tip", frames)), bodies=couple)
 
 

@@ -83,7 +83,7 @@ def test_text_of_many_points_contains_number_and_maximum():
     errors[:, 2, 5] = [1e-5, 2e-5, 4e-5]
     zones = zone_margin(at, errors=errors)
     assert repr(zones) == (
-        "Zone\n  points  3, 1 assemble rigidly\n  margin  at most 4 where there is one"
+        "Zone\n  points  3, 1 assemble rigidly\n  margin  at most 4 where finite"
     )
     bounds = bound_pose_error(solve_assembly(at, errors=errors))
     assert "points       3, 3 bounded" in repr(bounds)

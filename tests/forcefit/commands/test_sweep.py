@@ -188,7 +188,7 @@ def test_sweep_prints_the_reason_of_the_first_failed_point(run, tmp_path):
     robot.write_text(STIFF)
     status, out, _ = run("assembly", "sweep", robot, "--grid", "q.drive=0", "-o", file)
     assert status == 0
-    assert "\ncannot assemble, for example: a rigid part stays open by 0.0001" in out
+    assert "\ncannot assemble, for example: a rigid loop stays open by 0.0001" in out
 
 
 def test_sweep_without_a_reachable_point_has_a_summary_and_a_figure(run, tmp_path):
