@@ -6,12 +6,12 @@ symbol  code                  shape    meaning
 c-bar   ``clearance_bounds``  (n, 5)   [RXY RZ TXY TZ TXYZ], 0 rigid, inf free
 ======  ====================  =======  ==========================================
 
-The first four bounds are those of the paper.  The last one limits (TX, TY, TZ): it is
-the clearance of a ball joint in its socket and replaces TXY and TZ.  Bounds that a
+The first four bounds are those of the paper.  TXYZ is the clearance of a ball joint in
+its socket, limits the norm of (TX, TY, TZ), and replaces TXY and TZ.  Bounds that a
 joint does not use are NaN.
 
-The free motion of a passive joint is treated as a clearance in the corresponding
-direction, which is unbounded unless the robot file specifies a bound.
+The motion of a passive joint is treated as a clearance that is unbounded unless the
+robot file contains a bound.
 """
 
 import numpy as np
@@ -62,7 +62,7 @@ def component_bounds(bounds: NDArray) -> NDArray:
 
 
 def bound_name(columns: NDArray) -> str:
-    """Return the key of the bound that belongs to a cone, for example ``"tilt"``.
+    """Return the key of the bound of a cone, for example ``"tilt"``.
 
     Args:
         columns: columns of the cone (6n, 1 to 3); see
@@ -83,7 +83,7 @@ def own_cone(frame: Frame) -> int | None:
 
 
 def scales_with_margin(robot: Robot) -> NDArray:
-    """Return a mask (n, 5): True for clearances, False for limits on free motions."""
+    """Return True for clearances and False for motion limits, (n, 5)."""
     scaled = np.ones((len(robot.frames), len(BOUNDS)), dtype=bool)
     for i, frame in enumerate(robot.frames):
         own = own_cone(frame)
@@ -136,7 +136,7 @@ def clearance_excess(screws: NDArray, bounds: NDArray) -> NDArray:
     limited = np.isfinite(bounds)
     where_rigid = np.where(limited & (bounds == 0.0), sizes, 0.0)
     limited = np.broadcast_to(limited & (bounds > 0.0), sizes.shape)
-    with np.errstate(over="ignore"):  # a very small bound may cause overflow
+    with np.errstate(over="ignore"):  # division by a very small bound can overflow
         excess = np.divide(sizes, bounds, where=limited, out=np.ones_like(sizes)) - 1.0
     worst = np.maximum(excess, where_rigid).max(axis=(-2, -1))
     return np.maximum(0.0, worst)

@@ -1,8 +1,9 @@
-"""Closures between parallel contacts in a joint, which are not loops of the mechanism.
+"""Closures between parallel contacts of one joint.
 
 A guide or a pad is modelled by two chains between the same two bodies
 (:mod:`forcefit.assembly.drawing.contacts`).  Each chain consists of fixed frames with
-clearances, and a closure connects the ends of both chains.
+clearances, and a closure connects the ends of both chains.  This closure is not a loop
+of the mechanism.
 """
 
 from functools import lru_cache
@@ -39,7 +40,7 @@ def contact_frames(robot: Robot) -> frozenset[str]:
 
 
 def _apart(robot: Robot, first: str, second: str) -> list[Frame]:
-    """Return the frames on the path from the base to exactly one of two frames."""
+    """Return the frames that are on the path to only one of two frames."""
     paths = robot.on_path[[robot.index(first), robot.index(second)]]
     return [robot.frames[i] for i in np.flatnonzero(paths[0] != paths[1])]
 
@@ -56,7 +57,7 @@ def _is_unbounded(frame: Frame) -> bool:
 
 
 def _moves_by_clearance(frame: Frame) -> bool:
-    """Return whether a frame moves relative to its parent only within a clearance."""
+    """Return whether clearance is the only motion of a frame."""
     others = frame.locked_at, frame.link, frame.joint_stiffness
     return frame.joint == "fixed" and all(other is None for other in others)
 

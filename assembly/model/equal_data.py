@@ -1,8 +1,7 @@
-"""Comparison of objects by their data, using a digest that is computed once per object.
+"""Comparison of objects by a digest of their data.
 
-Numbers are compared bit by bit, so that equal objects have identical results, which can
-be cached.  For example, 0.0 differs from -0.0, because an angle computed from them can
-be pi or -pi.  An integer equals the float with the same value.
+Numbers are compared bit by bit, so that equal objects have identical results.  For
+example, 0.0 differs from -0.0.  An integer equals the float with the same value.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -44,11 +43,11 @@ class EqualData:
 
     @cached_property
     def _hash(self) -> int:
-        return hash(self._digest)  # subclasses can compute a faster hash
+        # Subclasses can override this method with a faster hash.
+        return hash(self._digest)
 
     def __getstate__(self) -> dict[str, Any]:
-        # the digest is not pickled, because hashes differ between processes and pickled
-        # links do not contain their solutions
+        # The digest is not pickled, because hashes differ between processes.
         return {key: value for key, value in vars(self).items() if key not in _CACHED}
 
 
@@ -58,7 +57,7 @@ def _fields_of(thing: Any) -> Iterable[Any]:
 
 
 def _feed(update: Callable[[bytes], None], value: Any) -> None:
-    """Add a value to a digest, with its type and length to avoid ambiguity."""
+    """Add a value with its type and length to a digest."""
     kind = type(value)
     if kind is np.ndarray:
         update(_head(value.dtype.char, value.shape))
@@ -77,7 +76,7 @@ def _feed(update: Callable[[bytes], None], value: Any) -> None:
 
 
 def _feed_parts(update: Callable[[bytes], None], value: Any) -> None:
-    """Add the items of a value to a digest, or its string if it has no items."""
+    """Add the items of a value to a digest, or the value as a string."""
     if is_dataclass(value):
         update(type(value).__name__.encode())
         parts = _fields_of(value)

@@ -10,9 +10,9 @@ normal      s ~ N(0, 1); the scale is the standard deviation
 truncated   normal, truncated where abs(s) exceeds ``limit`` standard deviations
 =========== ======================================================================
 
-The random numbers for draw i are taken from a fixed position of a counter-based
-generator, independently of previous draws.  A run can therefore be interrupted, resumed
-or distributed over several processes without changing its results.
+The random numbers of a draw depend on the seed and on the index of the draw, because
+the generator is counter-based.  A run can therefore be interrupted, resumed or
+distributed over processes without a change of its results.
 
 Sources:
     Salmon, Moraes, Dror, Shaw (2011), Parallel random numbers: as easy as 1, 2, 3
@@ -33,12 +33,12 @@ from forcefit.inputs.table import BadInput, Table, nearest, quoted, read_toml
 from forcefit.results.display import html_table, short_repr
 
 KINDS = ("uniform", "normal", "truncated")
-_LARGEST = 1e3  # [rad, m] upper limit for numbers in a file with error distributions
-# names of the columns in the rows returned by _rows
+_LARGEST = 1e3  # [rad, m] largest number in a file of error distributions
+# columns of the result of _rows
 _COLUMNS = (
     "frame", "component", "kind", "centre", "scale", "least", "limit", "signed",
 )  # fmt: skip
-_WORDS = 4  # number of random numbers produced in one step of the Philox generator
+_WORDS = 4  # number of random numbers in one step of the Philox generator
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +91,7 @@ class ErrorSources:
         uniform_values = np.where(self.signed, np.copysign(size, v), size)
         if not (self.kind > 0).any():
             return uniform_values
-        # the normal distribution is truncated at the limits
+        # The normal distribution is truncated at the limits.
         tail = np.where(self.kind == 2, ndtr(-self.limit), 0.0)
         normal_values = ndtri(tail + np.maximum(uniform, 2.0**-54) * (1.0 - 2.0 * tail))
         return np.where(self.kind == 0, uniform_values, normal_values)
@@ -147,7 +147,7 @@ class ErrorSources:
         return self.scale**2 * np.where(self.kind == 0, uniform, normal)
 
     def of_numbers(self, slopes: NDArray) -> NDArray:
-        """Select derivatives by source (..., m) from those by error (..., n, 6)."""
+        """Select the derivatives (..., m) with respect to the sources."""
         return np.asarray(slopes[..., self.frame, self.component])
 
     @property
@@ -157,7 +157,7 @@ class ErrorSources:
 
     @property
     def identity(self) -> list[NDArray]:
-        """Arrays that determine the draws for a given seed."""
+        """Arrays that, together with the seed, determine the draws."""
         return [
             self.frame, self.component, self.kind, self.centre, self.scale,
             self.least, self.limit, self.signed,
@@ -165,7 +165,7 @@ class ErrorSources:
         ]  # fmt: skip
 
     def scaled(self, scale: NDArray) -> "ErrorSources":
-        """Return these sources with new scales (m,) [rad or m]."""
+        """Return the same error sources with new scales (m,) [rad or m]."""
         return replace(self, scale=np.asarray(scale, dtype=float))
 
 
@@ -249,7 +249,7 @@ def read_sources(
         the robot.
 
     Raises:
-        BadInput: the file violates a rule.
+        BadInput: the file contains invalid data.
     """
     root = read_toml(path)
     tables = root.tables("errors")

@@ -14,12 +14,12 @@ def with_drive_forces(robot: Robot, forces: Mapping[str, float]) -> Robot:
     """Switch the named drives to force control.
 
     The joint of a force-controlled drive becomes passive, and its stiffness and
-    clearance along the joint motion are removed.  The force acts between the body of
-    the frame and the part carried by the joint.
+    clearance along the joint motion are removed.  The force acts between the two bodies
+    that the joint connects.
 
     Args:
         robot: robot with the drives.
-        forces: force [N m or N] by the name of the drive's frame, positive in the
+        forces: mapping from frame names of drives to forces [N m or N], positive in the
             direction of increasing joint coordinate.
 
     Returns:

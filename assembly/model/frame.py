@@ -2,8 +2,8 @@
 
 The body connects the parent to the frame (``docs/robot_files.md``).  The following
 small screws are composed at the frame, in its axes and in this order: geometric error,
-link deformation, joint clearance and joint deformation.  Last comes the motion of the
-joint about or along the z axis of the frame, which moves the child frames.
+link deformation, joint clearance and joint deformation.  The motion of the joint about
+or along the z axis of the frame follows, and moves the child frames.
 """
 
 import math
@@ -65,26 +65,27 @@ class Clearance:
             raise BadInput(f"clearance.{key}: {ONE_OF_BALL}")
 
 
-# rules that determine the position in which a joint is bolted
+# rules for the position within the clearance at which a joint is bolted
 LEFT = ("least", "uniform", "worst")
 
 
 @dataclass(frozen=True, eq=False)
 class LockedAt:
-    """Fixed joint with clearance that is bolted at one pose and is rigid thereafter.
+    """Data of a fixed joint with clearance that is bolted at one pose.
 
     Attributes:
         clearance: clearance of the joint before bolting.
         pose: platform pose at which the joint is bolted, ``tx .. rz`` [m, rad].
         joints: drive coordinates [rad or m] at that pose, as an alternative to
             ``pose``.  If both are empty, the joint is bolted in the home pose.
-        left: position of the joint within its clearance at the time of bolting, used
-            for random draws.  Each rule selects one of the minimum-energy positions:
-            ``"least"`` the one with the minimum sum of squares, ``"uniform"`` a random
-            one, ``"worst"`` the one with the largest pose error, for which ``assembly
-            error`` computes bounds.
-        screw: locked-in clearance (6,) [rad, m], which is part of the geometric error.
-            Computed by :func:`forcefit.assembly.steps.bolted.bolt_joints`.
+        left: rule for the position within the clearance at which the joint is bolted,
+            used for random draws.  Each rule selects one of the minimum-energy
+            positions: ``"least"`` the one with the minimum sum of squares,
+            ``"uniform"`` a random one, ``"worst"`` the one with the largest pose error,
+            for which ``assembly error`` computes bounds.
+        screw: position (6,) [rad, m] within the clearance after bolting, which is part
+            of the geometric error.  Computed by
+            :func:`forcefit.assembly.steps.bolted.bolt_joints`.
     """
 
     clearance: Clearance
@@ -104,7 +105,7 @@ class LockedAt:
 
 @dataclass(frozen=True, eq=False)
 class Frame(EqualData):
-    """Body and the joint at its distal end, as described at the top of this module.
+    """Body and the joint at its distal end.
 
     Attributes:
         name: unique name of the frame; the part before a dot is the name of the leg.
@@ -124,8 +125,8 @@ class Frame(EqualData):
         tolerance: standard deviations of delta l about the given value (6,) [rad, m]; 0
             for exact components, None if unknown.
         clearance: clearance of the joint, or None.
-        locked_at: pose at which a fixed joint is bolted, and its clearance before
-            bolting; None if the joint is not bolted.
+        locked_at: pose at which a fixed joint is bolted, and its clearance before; None
+            if the joint is not bolted.
         joint_stiffness: stiffness K_B of the joint (6, 6), or None.  Rigid directions
             have ``inf`` on the diagonal.  Zeros in the row and column of a passive
             joint's own motion leave this motion free.  An array (6,), as in robot
@@ -202,18 +203,18 @@ class Frame(EqualData):
             fault = inertia_fault(self.inertia)
             if fault:
                 raise BadInput(f"frame {quoted(self.name)}.inertia: {fault}")
-            # symmetrised, because robot files contain only the upper triangle
+            # Robot files contain only the upper triangle.
             J = locked((self.inertia + self.inertia.T) / 2, (3, 3), "inertia")
             object.__setattr__(self, "inertia", J)
 
     @cached_property
     def _hash(self) -> int:
-        # these numbers distinguish robots with different errors or identified geometry
+        # Robots that are compared often differ only in these numbers.
         numbers = self.translation.tobytes() + self.geometric_error.tobytes()
         return hash((self.name, numbers))
 
     def _figures(self) -> Figures:
-        """Return the fields in short form; rarely used fields are shown if nonzero."""
+        """Return the fields for the printed summary."""
         shown = {f.name: brief(getattr(self, f.name)) for f in fields(self)[1:]}
         for name in ("drive_force", "pitch"):
             if not getattr(self, name):
@@ -230,12 +231,12 @@ class Frame(EqualData):
 
     @property
     def compliant(self) -> bool:
-        """Whether the joint is passive and its motion is resisted by a spring."""
+        """Whether the joint is passive and a spring resists its motion."""
         return self.passive and bool(self.own_stiffness)
 
     @property
     def resistance(self) -> NDArray | None:
-        """K_B of the joint (6, 6), zero along a passive motion; None if rigid."""
+        """Stiffness K_B (6, 6), zero along a passive motion; None if rigid."""
         if self.joint_stiffness is not None or not self.passive:
             return self.joint_stiffness
         K = np.full(6, np.inf)
@@ -244,7 +245,7 @@ class Frame(EqualData):
 
     @property
     def lead(self) -> float:
-        """Translation of a helical joint per angle [m/rad]; 0 for other joint types."""
+        """Translation of a helical joint per angle [m/rad]; 0 for other joints."""
         return self.pitch / (2 * math.pi)
 
     @property
@@ -263,13 +264,13 @@ class Frame(EqualData):
 
     @property
     def own_stiffness(self) -> float | None:
-        """K_B along the joint motion [N m/rad or N/m]; None without K_B."""
+        """Stiffness along the joint motion [N m/rad or N/m]; None if not given."""
         K = self.joint_stiffness
         return None if K is None else float(K[self.own_axis, self.own_axis])
 
     @property
     def springs(self) -> NDArray | None:
-        """K_B of the springs (6, 6), with ``inf`` along a free motion, or None."""
+        """Stiffness K_B (6, 6) with ``inf`` along a free motion, or None."""
         K = self.joint_stiffness
         if K is None or self.compliant or not self.passive:
             return K
@@ -313,7 +314,7 @@ def locked(value: ArrayLike, shape: tuple[int, ...], whose: str) -> NDArray:
 
 
 def between_origins(frame: Frame) -> NDArray:
-    """Return the vector from the parent to the frame origin (3,) [m], in frame axes."""
+    """Return the vector from the parent origin to the frame origin (3,) [m]."""
     return np.asarray(rotation_matrix(frame.rotation).T @ frame.translation)
 
 
@@ -334,8 +335,8 @@ def beam_axis(frame: Frame) -> tuple[float, NDArray]:
     if frame.link.length is not None and frame.link.axis is not None:
         axis = np.array(frame.link.axis)
         return frame.link.length, axis / np.linalg.norm(axis)
-    # a revolute parent joint rotates the beam about its start, which changes neither
-    # its length nor its direction in the frame axes
+    # The rotation of a revolute parent joint does not change the length and direction
+    # of the beam in the frame axes.
     along = between_origins(frame)
     length = math.sqrt(along @ along)
     if length == 0.0:

@@ -1,8 +1,7 @@
 """Series of frames that form one joint with several degrees of freedom.
 
-A series is recognised by the frame names, the joint types and the common point of the
-frames.  The joints are therefore preserved when a robot file with bodies is converted
-to a file with frames.
+A series is identified by the frame names, the joint types and the common origin of the
+frames.
 """
 
 from collections.abc import Mapping, Sequence
@@ -13,9 +12,9 @@ import numpy as np
 from forcefit.assembly.model.frame import Frame
 from forcefit.stiffness.screws import rotation_matrix, transform
 
-_SAME = 1e-9  # [m] largest distance between frames that count as coincident
-# type of joint by the name endings and joint types of its frames, in order from the
-# first body to the second
+_SAME = 1e-9  # [m] largest distance between coincident frames
+# Joint types, by the name endings and joint types of the frames from the first to the
+# second body.
 _SERIES: dict[tuple[tuple[str, str], ...], str] = {
     (("first", "revolute"), ("second", "revolute")): "universal",
     (
@@ -41,7 +40,7 @@ class NamedJoint:
         kind: ``"universal"``, ``"spherical"``, ``"cylindrical"`` or ``"planar"``.
         frames: names of the moving frames of the joint, parents first.
         main: name of the frame whose origin and axes are those of the joint.
-        carriers: names of the frames that carry the geometric error of the joint: two
+        carriers: names of the frames whose geometric errors are those of the joint: two
             for a universal joint, otherwise one.
     """
 
@@ -53,7 +52,7 @@ class NamedJoint:
 
 
 def joints_of(frames: Sequence[Frame]) -> dict[str, NamedJoint]:
-    """Return the joints that consist of several frames, by name in frame order.
+    """Return the joints that consist of several frames, by name.
 
     Args:
         frames: frames of a robot, parents first.
@@ -84,7 +83,7 @@ def _joint(
 
 
 def _at_one_point(known: Mapping[str, Frame], stem: str, parts: list[Frame]) -> bool:
-    """Return whether frames coincide and are connected in series."""
+    """Return whether frames are connected in series at one point."""
     frame, T = parts[-1], np.eye(4)
     while frame is not parts[0]:
         T = transform(frame.translation, rotation_matrix(frame.rotation)) @ T

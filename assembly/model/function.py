@@ -1,4 +1,4 @@
-"""General effect: a small screw or a compliance that depends on variables.
+"""Effects that are functions of variables: a small screw or a compliance.
 
 :mod:`forcefit.assembly.effects.forms` defines the forms and their parameters;
 :mod:`forcefit.assembly.effects.functions` applies the effect.
@@ -8,30 +8,29 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 KINDS = ("screw", "compliance")
-PLACES = ("base", "reading", "load")  # places in addition to the frames of the robot
+PLACES = ("base", "reading", "load")  # values of ``where`` in addition to frame names
 
 
 @dataclass(frozen=True)
 class Function:
-    """Entry ``[[effect]]`` of a robot file with the name ``function``.
+    """General effect, given by a TOML table ``[[effect]]`` with the name ``function``.
 
     Attributes:
-        where: place at which the effect acts: a frame, ``"base"``, ``"reading"`` or
-            ``"load"``.
-        components: screw components ``rx`` .. ``tz`` in the axes of this place, or
-            ``mx`` .. ``fz`` if ``where`` is ``"load"``.
+        where: a frame, ``"base"``, ``"reading"`` or ``"load"``, at which the effect
+            acts.
+        components: screw components ``rx`` .. ``tz`` in the axes of ``where``, or
+            wrench components ``mx`` .. ``fz`` if ``where`` is ``"load"``.
         variables: one or two variables, for example ``q.drive``, ``load.fz`` or
             ``cov.temperature``.
         form: key of :data:`forcefit.assembly.effects.forms.FORMS`, or ``"formula"``.
-        parameters: values by name, in units that follow from the variables and the
-            kind.  If the effect has several components, names may be prefixed with a
-            component.
+        parameters: values by parameter name, in units that follow from the variables
+            and the kind.  A parameter of one component has the component as a prefix.
         kind: ``"screw"`` [rad, m], or ``"compliance"`` [rad/(N m), m/N], which is
-            multiplied by the wrench component at the same place.
+            multiplied by the corresponding wrench component.
         label: name used in reports.
         formula: formula, if ``form`` is ``"formula"``.
-        session: the only session in which the effect acts; None for all sessions.
-        std: standard deviations of parameters, where known, in parameter units.
+        session: session in which the effect acts; None for all sessions.
+        std: known standard deviations of parameters, in the units of the parameters.
     """
 
     where: str
@@ -47,6 +46,6 @@ class Function:
 
     @property
     def title(self) -> str:
-        """Name used in reports: the label, otherwise the place and the variables."""
+        """Name used in reports: the label, or ``where`` and the variables."""
         acts = f"{self.where} {', '.join(self.components)}"
         return self.label or f"{acts} of {', '.join(self.variables)}"

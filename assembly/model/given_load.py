@@ -29,7 +29,7 @@ def given_load(load: Load, whose: str = "load") -> NDArray:
 
     Raises:
         BadInput: a component is unknown, or its value is not a finite number of
-            magnitude at most 1e40; the message names the component.
+            magnitude at most 1e40.
     """
     if not isinstance(load, Mapping):
         return np.array(load, dtype=float)
@@ -68,7 +68,7 @@ def one_load(load: Load) -> NDArray:
 
 
 def _numbers(value: ArrayLike, whose: str, name: str) -> NDArray:
-    """Convert the value or values of a component to an array."""
+    """Convert the values of a component to an array."""
     expected = f"expected a number [{'N m' if name.startswith('m') else 'N'}]"
     whose = f"{whose} {name}"
     try:

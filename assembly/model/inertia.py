@@ -14,7 +14,7 @@ _SIX = (np.array([0, 1, 2, 0, 0, 1]), np.array([0, 1, 2, 1, 2, 2]))
 
 
 def inertia_matrix(six: ArrayLike) -> NDArray:
-    """Return the symmetric matrix (3, 3) of Ixx, Iyy, Izz, Ixy, Ixz and Iyz."""
+    """Return the symmetric inertia matrix (3, 3) for six moments of inertia."""
     J = np.zeros((3, 3))
     J[_SIX] = six
     J[_SIX[::-1]] = six
@@ -22,7 +22,7 @@ def inertia_matrix(six: ArrayLike) -> NDArray:
 
 
 def six_moments(J: NDArray) -> list[float]:
-    """Return the entries Ixx, Iyy, Izz, Ixy, Ixz, Iyz of a matrix (3, 3)."""
+    """Return the moments Ixx, Iyy, Izz, Ixy, Ixz, Iyz of an inertia matrix."""
     return [float(value) for value in J[_SIX]]
 
 
@@ -49,7 +49,7 @@ def inertia_fault(J: NDArray) -> str:
 
 
 def point_inertia(mass: float, arm: NDArray) -> NDArray:
-    """Return the inertia (3, 3) [kg m^2] of a point mass [kg] at ``arm`` (3,) [m]."""
+    """Return the inertia matrix [kg m^2] of a point mass [kg] at ``arm`` [m]."""
     return np.asarray(mass * (arm @ arm * np.eye(3) - np.outer(arm, arm)))
 
 

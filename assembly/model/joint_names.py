@@ -1,11 +1,10 @@
-"""Names of joints that consist of several frames, for example ``ball``.
+"""Find the frames of joints that consist of several frames.
 
 A joint with several degrees of freedom is a series of coincident passive frames, for
 example ``ball.first``, each with one degree of freedom
 (:mod:`forcefit.assembly.drawing.parts`).  One of these frames carries the geometric
-error, clearance and springs of the joint; in a universal joint, both frames do.  Users
-refer to the joint, and this module finds the corresponding frames.  The joints
-themselves are found by :mod:`forcefit.assembly.model.frame_series`.
+error, clearance and springs of the joint; in a universal joint, both frames do.  The
+joints are identified by :mod:`forcefit.assembly.model.frame_series`.
 """
 
 from collections.abc import Container, Sequence
@@ -27,8 +26,8 @@ CHAIN_START, CHAIN_END, FAR_END = "contacts_start", "contacts_end", "contacts_fa
 _CONTACTS = {
     *BORE, *BEARING, *GUIDE, *GUIDE_FAR, *PAD, CHAIN_START, CHAIN_END, FAR_END,
 }  # fmt: skip
-# for each component of a planar joint, the corresponding component of its frame
-# slide_x, whose z axis is the x axis of the joint
+# Component of the frame slide_x for each component of a planar joint. The z axis of
+# this frame is the x axis of the joint.
 _OF_PLANE = (2, 0, 1, 5, 3, 4)
 
 
@@ -51,16 +50,16 @@ def row_of(robot: Robot, name: str) -> int:
 
 
 def error_rows(robot: Robot, name: str) -> list[tuple[int, list[int]]]:
-    """Return the frames and components that carry the geometric error of a joint.
+    """Return the frames and components to which the geometric error of a joint belongs.
 
     Args:
         robot: robot with the joint.
         name: name of a frame, or of a joint that consists of several frames.
 
     Returns:
-        For each frame that carries the error, its index and its components that
-        correspond to RX .. TZ in the joint axes.  A universal joint has two such
-        frames, one per bearing; all remaining joints have one.
+        For each of these frames, its index and the components that correspond to RX ..
+        TZ in the joint axes.  A universal joint has two such frames, one per bearing;
+        other joints have one.
 
     Raises:
         BadInput: neither a frame nor a joint has this name.
@@ -81,8 +80,8 @@ def error_label(robot: Robot, row: int, component: int) -> str:
         component: index of the component at the frame, 0 to 5 for RX .. TZ.
 
     Returns:
-        Name and component of the joint, if the frame is the only one that carries the
-        error of this joint.  Otherwise the name and component of the frame.
+        Name and component of the joint if its error belongs to this frame alone,
+        otherwise name and component of the frame.
     """
     name = robot.frames[row].name
     for joint in robot.joints.values():
@@ -94,15 +93,15 @@ def error_label(robot: Robot, row: int, component: int) -> str:
 
 
 def shown_name(robot: Robot, row: int) -> str:
-    """Return the displayed name for the clearance and springs of a frame.
+    """Return the name that is printed for the clearance and springs of a frame.
 
     Args:
         robot: robot with the frame.
         row: index of the frame.
 
     Returns:
-        Name of the joint, if the frame is the only one that carries the clearance and
-        springs of this joint.  Otherwise the name of the frame.
+        Name of the joint if its clearance and springs belong to this frame alone,
+        otherwise the name of the frame.
     """
     name = robot.frames[row].name
     for joint in robot.joints.values():
@@ -112,7 +111,7 @@ def shown_name(robot: Robot, row: int) -> str:
 
 
 def clearance_name(robot: Robot, row: int, bound: str) -> str:
-    """Return the displayed name of a clearance bound.
+    """Return the name that is printed for a clearance bound.
 
     Args:
         robot: robot with the frame.
@@ -120,9 +119,8 @@ def clearance_name(robot: Robot, row: int, bound: str) -> str:
         bound: key of the bound: ``radial``, ``axial``, ``tilt``, ``spin`` or ``ball``.
 
     Returns:
-        A name such as ``"hinge.tilt"``.  For contacts of a joint ``rail``, the name is
-        ``"rail.clearance"``, because their bounds all follow from the gaps of the
-        joint.
+        A name such as ``"hinge.tilt"``.  The name for all contacts of a joint ``rail``
+        is ``"rail.clearance"``.
     """
     if owner_of_contact(robot.frames[row].name, names_of(robot)):
         return f"{joint_of(robot, row)}.clearance"
@@ -130,15 +128,15 @@ def clearance_name(robot: Robot, row: int, bound: str) -> str:
 
 
 def joint_of(robot: Robot, row: int) -> str:
-    """Return the name of the drawn joint to which a frame belongs.
+    """Return the name of the joint to which a frame belongs.
 
     Args:
         robot: robot with the frame.
         row: index of the frame.
 
     Returns:
-        Name of the joint, for example ``foot`` for the contact ``foot.bore_start``.  If
-        the frame does not belong to such a joint, the name of the frame.
+        Name of the joint, for example ``foot`` for the contact ``foot.bore_start``.
+        Without such a joint, the name of the frame.
     """
     frame = robot.frames[row]
     fixed = frame.joint == "fixed"
@@ -151,15 +149,15 @@ def joint_of(robot: Robot, row: int) -> str:
 
 
 def owner_of_contact(name: str, names: Container[str]) -> str:
-    """Return the joint or frame to which a contact belongs.
+    """Return the name of the joint or frame to which a contact belongs.
 
     Args:
         name: name of a frame, for example ``"foot.bore_start"``.
         names: names of all frames and joints.
 
     Returns:
-        For this example ``"foot"``, if it is contained in ``names``.  An empty string
-        if the frame is not a contact.
+        For this example ``"foot"``, if ``names`` contains it; an empty string if the
+        frame is not a contact.
     """
     stem, _, end = name.rpartition(".")
     return stem if stem in names and end in _CONTACTS else ""
@@ -168,10 +166,11 @@ def owner_of_contact(name: str, names: Container[str]) -> str:
 def closing_names(
     closures: Sequence[Sequence[str]], names: Container[str]
 ) -> dict[str, str]:
-    """Return displayed names for the frames that a drawing adds at loop closures.
+    """Return the printed names of the frames that are added at loop closures.
 
-    A drawn joint ``yrail`` that closes a loop ends with a frame ``yrail.end``.  If the
-    loop is closed at the base, a frame ``yrail.base`` is added to the base.
+    In a robot described by bodies and joints, a joint ``yrail`` that closes a loop ends
+    with a frame ``yrail.end``.  If the loop is closed at the base, a frame
+    ``yrail.base`` is added to the base.
 
     Args:
         closures: pairs of frame names.
@@ -201,17 +200,16 @@ def names_of(robot: Robot) -> list[str]:
 
 
 def joint_paths(joint: NamedJoint, path: str) -> list[str]:
-    """Translate the path of a joint value to the paths of the frame values.
+    """Convert the path of a value of a joint to the paths of the values of its frames.
 
     Args:
         joint: joint that consists of several frames.
-        path: path such as ``"ball.clearance.ball"`` or ``"cross.geometric_error.rx"``;
-            the leg name at the start may be omitted.
+        path: path such as ``"ball.clearance.ball"`` or ``"cross.geometric_error.rx"``,
+            with or without the leg name.
 
     Returns:
-        Paths in which the joint name is replaced by the name of the frame that carries
-        the value: two paths for a universal joint, and none if the path does not belong
-        to this joint.
+        Paths with frame names in place of the joint name: two paths for a universal
+        joint, and none if the path does not belong to this joint.
     """
     for name in (joint.name, joint.name.partition(".")[2]):
         if name and path.startswith(f"{name}."):

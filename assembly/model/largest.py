@@ -1,5 +1,5 @@
-"""Upper limits for numbers in files and options; larger numbers are rejected."""
+"""Largest accepted numbers in files and options."""
 
-# [m] upper limit for lengths, also used for angles [rad] and direction components
+# [m] largest length, also used for angles [rad] and direction components
 LARGEST_LENGTH = 1e6
-LARGEST = 1e40  # [SI units] limit for other numbers; its inverse is the lower limit
+LARGEST = 1e40  # [SI units] largest value of other numbers; its inverse is the smallest

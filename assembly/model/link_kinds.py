@@ -24,10 +24,9 @@ class BeamLink:
         density: density [kg/m^3]; None if the link has no declared mass.
         theory: ``"timoshenko"`` or ``"euler"``.
         length: length of the beam [m]; None for the distance between both origins.
-        axis: unit vector from base to tip in the frame axes, given together with
-            ``length``.
+        axis: unit vector from base to tip in the frame axes, used with ``length``.
         up: direction of the height of the cross section in the frame axes, or None.
-        pieces: number of springs in series for finite motions; without effect on small
+        pieces: number of elements in series for finite motions; not used for small
             motions.
     """
 
@@ -44,7 +43,7 @@ class BeamLink:
 
 @dataclass(frozen=True, eq=False)
 class MatrixLink(EqualData):
-    """Link given by its stiffness matrix.
+    """Link defined by its stiffness matrix.
 
     Attributes:
         stiffness: symmetric positive definite K_E (6, 6) [N m/rad .. N/m] at the frame,
@@ -76,7 +75,7 @@ class MeshSolution(EqualData):
     mass: NDArray
 
     def _data(self) -> tuple[Any, ...]:
-        # the finite-element solution depends only on these data
+        # These data determine the finite-element solution.
         return self.solved.link.compliance, self.young, self.digest, self.mass
 
 
@@ -98,7 +97,7 @@ class MeshLink:
         axis: direction from base to tip in the frame axes; None for the direction from
             the parent origin to the frame origin.
         interface: ``"rigid"`` or ``"distributing"``.
-        parts: parts with different materials, in the format of
+        parts: regions with different materials, in the format of
             :func:`forcefit.stiffness.fem.part_text.parse_part`.
         solution: finite-element solution; None until
             :func:`forcefit.assembly.files.solved_links.solve_links` sets it.  It is
@@ -120,11 +119,11 @@ class MeshLink:
     solution: MeshSolution | None = field(default=None, compare=False, repr=False)
 
     def __getstate__(self) -> dict[str, Any]:
-        # solutions of tens of megabytes are not pickled but recomputed by workers
+        # Solutions are large, so they are not pickled but recomputed.
         return {**vars(self), "solution": None}
 
     def __deepcopy__(self, memo: dict[int, Any]) -> "MeshLink":
-        return self  # instances are immutable
+        return self  # Instances are immutable.
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Lengths of links that extend from the origin of the parent to that of the frame."""
+"""Lengths of links between the origins of the parent and the frame."""
 
 from dataclasses import replace
 
@@ -11,7 +11,7 @@ from forcefit.inputs.table import BadInput, quoted
 from forcefit.stiffness.beam.beam import section_axes
 from forcefit.stiffness.screws import rotation_matrix
 
-_SAME_POINT = 1e-9  # [m] largest distance between origins that count as coincident
+_SAME_POINT = 1e-9  # [m] largest distance between coincident origins
 
 
 def with_spans(robot: Robot, home: NDArray) -> Robot:
@@ -35,7 +35,7 @@ def with_spans(robot: Robot, home: NDArray) -> Robot:
     links: dict[str, Link] = {}
     for i, frame in enumerate(robot.frames):
         parent = robot.parents[i]
-        # a joint moves its children along z, by q if prismatic and by h q if helical
+        # A joint moves its children along z by q if prismatic, and by h q if helical.
         travel = own_screw(robot.frames[parent])[5] if parent >= 0 else 0.0
         shift = float(home[parent] * travel)
         shift = shift if abs(shift) > _SAME_POINT else 0.0
@@ -64,7 +64,7 @@ def _with_span(frame: Frame, link: BeamLink, shift: float) -> BeamLink:
 
 
 def _check_mesh(frame: Frame, link: MeshLink, shift: float) -> None:
-    """Check that the direction and rotation of a mesh are defined."""
+    """Check that the axis and rotation of a mesh are defined."""
     if link.axis is None and shift:
         raise BadInput(
             f"frame {quoted(frame.name)}.link.mesh: found a mesh on a frame "
@@ -81,7 +81,7 @@ def _check_mesh(frame: Frame, link: MeshLink, shift: float) -> None:
 
 
 def _span(frame: Frame, shift: float) -> NDArray:
-    """Return the vector from the parent to the frame origin (3,) [m], in frame axes."""
+    """Return the vector from the parent origin to the frame origin (3,) [m]."""
     span = rotation_matrix(frame.rotation).T @ (frame.translation + [0.0, 0.0, shift])
     if np.linalg.norm(span) < _SAME_POINT:
         mesh = isinstance(frame.link, MeshLink)

@@ -4,9 +4,9 @@ A link is clamped at its base and loaded at the tip by the wrench at its frame; 
 with a density is also loaded by its own weight.  Beams are evaluated with the formulas
 in :mod:`forcefit.stiffness.beam.beam_stress`.  For links given by a surface, the
 stresses due to unit wrenches are computed by finite elements
-(:mod:`forcefit.stiffness.fem.stress`).  Because the stress is singular at the edge of a
-clamped interface, points closer to this edge than the interface radius are omitted.
-The stress is unknown for a link that is given only by its stiffness.
+(:mod:`forcefit.stiffness.fem.stress`).  The stress is singular at the edge of a clamped
+interface, so points that are closer to the edge than the interface radius are omitted.
+No stress is computed for a link that is given by its stiffness.
 """
 
 from collections.abc import Callable
@@ -21,8 +21,8 @@ from forcefit.assembly.model.robot import BeamLink, Frame, MeshLink, Robot, beam
 from forcefit.stiffness.beam.beam import section_axes
 from forcefit.stiffness.beam.beam_stress import peak_beam_stress
 
-WEIGHTLESS = np.zeros(6)  # [N m, N]
-_CHUNK = 64  # wrenches per block; 64 x 20000 nodes x 6 numbers occupy 61 MB
+WEIGHTLESS = np.zeros(6)  # wrench of a link without weight [N m, N]
+_CHUNK = 64  # number of wrenches that are evaluated together, limited by memory
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,11 +32,10 @@ class LinkStress:
     Attributes:
         frame: name of the frame to which the link belongs.
         row: index of this frame.
-        method: ``"beam"`` or ``"finite elements"``, with a note on omitted points.
+        method: ``"beam"`` or ``"finite elements"``, with a remark on omitted points.
         peak: function that returns the peak stress (k,) [Pa] for wrenches of the link
-            spring (k, 6) [N m, N].  Its second argument, (k, 6) or (6,), is the part of
-            the wrenches due to the weight of the link.  Both refer to the frame and its
-            axes.
+            spring (k, 6) [N m, N].  The second argument (k, 6) or (6,) contains the
+            wrenches due to the link's weight.
         relative_error: estimated relative error due to the mesh [-]; 0 for beams.
     """
 
@@ -55,7 +54,7 @@ def stressed_links(robot: Robot) -> tuple[LinkStress, ...]:
         robot: robot with the links.
 
     Returns:
-        Beams with a declared cross section shape, and links given by a surface.
+        Beams with a known cross section, and links given by a surface.
 
     Raises:
         BadInput: a mesh was not solved when the robot was loaded.
@@ -69,7 +68,7 @@ def stressed_links(robot: Robot) -> tuple[LinkStress, ...]:
 
 
 def stressed_names(robot: Robot) -> tuple[str, ...]:
-    """Return the frame names of :func:`stressed_links` without solving any link."""
+    """Return the names of the frames whose links have a computable stress."""
     return tuple(
         frame.name for frame in robot.frames
         if isinstance(frame.link, MeshLink)
@@ -87,8 +86,8 @@ def peak_stresses(
         wrenches: wrenches of the link springs (..., n, 6) [N m, N], at each frame in
             its axes; see
             :attr:`forcefit.assembly.linear.assembled.Assembly.wrenches`.
-        at_tips: part of the wrenches due to the weight of the links (..., n, 6)
-            [N m, N]; see :attr:`forcefit.assembly.linear.load.FrameLoads.at_tips`.
+        at_tips: wrenches due to the weight of the links (..., n, 6) [N m, N]; see
+            :attr:`forcefit.assembly.linear.load.FrameLoads.at_tips`.
 
     Returns:
         Peak stresses (..., links) [Pa], in the order of :func:`stressed_links`.
@@ -121,7 +120,7 @@ def _of_beam(frame: Frame) -> Callable[..., NDArray]:
     def peak(wrench: NDArray, at_tip: NDArray = WEIGHTLESS) -> NDArray:
         tip = wrench - at_tip
         in_section_axes = np.hstack([tip[:, :3] @ R, tip[:, 3:] @ R])
-        # half of the weight of the beam acts at its tip
+        # The equivalent load at the tip contains half of the weight.
         weight = 2 * at_tip[..., 3:] @ R
         return peak_beam_stress(section, length, in_section_axes, weight)[0]
 

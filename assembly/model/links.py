@@ -20,7 +20,7 @@ from forcefit.stiffness.beam.sections import declared_section
 
 
 def link_compliances(robot: Robot) -> NDArray:
-    """Return the compliances of all bodies, K_E^-1 in eq. (6).
+    """Return the compliances of all bodies, the inverse of K_E in eq. (6).
 
     Args:
         robot: robot with n frames.
@@ -40,7 +40,7 @@ def link_compliances(robot: Robot) -> NDArray:
     return C
 
 
-# cached by frame, so that a change to one frame does not invalidate the others
+# Cached by frame, because robots often share frames.
 @lru_cache(maxsize=4096)
 def link_compliance(frame: Frame) -> NDArray:
     """Return the read-only compliance (6, 6) of a frame's body, in the frame axes."""
@@ -69,7 +69,7 @@ def _compliance(frame: Frame) -> NDArray:
 
 
 def joint_compliances(robot: Robot) -> NDArray:
-    """Return the compliances of all joints, K_B^-1.
+    """Return the compliances of all joints, the inverse of K_B.
 
     Args:
         robot: robot with n frames.
@@ -87,14 +87,14 @@ def joint_compliances(robot: Robot) -> NDArray:
 
 
 def spring_compliances(robot: Robot) -> NDArray:
-    """Return K_B^-1 of all joints in joint components; see :func:`motion_map`.
+    """Return the compliances of all joints in joint components.
 
     Args:
         robot: robot with n frames.
 
     Returns:
-        Compliances (n, 6, 6) [rad/(N m) .. m/N]; zero for directions that are rigid,
-        free or not specified.
+        Compliances (n, 6, 6) [rad/(N m) .. m/N], for the components of
+        :func:`motion_map`; zero for directions that are rigid, free or not specified.
     """
     C = np.zeros((len(robot.frames), 6, 6))
     for i, frame in enumerate(robot.frames):
@@ -116,8 +116,8 @@ def compliance_factor(C: NDArray) -> NDArray:
     """
     size = np.sqrt(np.diag(C))
     soft = np.flatnonzero(size > 0)
-    # C is scaled to a unit diagonal, because entries in rad and in m differ by many
-    # orders of magnitude
+    # The diagonal is scaled to 1, because angular and linear compliances differ by
+    # orders of magnitude.
     scaled = C[np.ix_(soft, soft)] / np.outer(size[soft], size[soft])
     L = np.zeros((6, len(soft)))
     L[soft] = size[soft, None] * np.linalg.cholesky(scaled)
@@ -143,8 +143,7 @@ def motion_map(frame: Frame) -> NDArray:
 
     The map is the identity except for helical joints.  Component RZ of a helical joint
     is the motion along the thread, [0 0 1 0 0 h], and component TZ is the additional
-    translation, TZ - h RZ.  K_B and clearances refer to these components and therefore
-    act relative to the thread.
+    translation, TZ - h RZ.  K_B and clearances refer to these components.
 
     Args:
         frame: frame with the joint.
@@ -158,10 +157,10 @@ def motion_map(frame: Frame) -> NDArray:
 
 
 def in_series(stiffness: NDArray | None, row: int, compliance: float) -> NDArray:
-    """Add a spring in series to K_B of a joint in one direction.
+    """Add a spring in series with a joint in one direction.
 
     Args:
-        stiffness: declared stiffness (6, 6); None if rigid.
+        stiffness: stiffness K_B of the joint (6, 6); None if rigid.
         row: index of the direction.
         compliance: compliance of the added spring [rad/(N m) or m/N].
 
@@ -169,7 +168,7 @@ def in_series(stiffness: NDArray | None, row: int, compliance: float) -> NDArray
         Stiffness (6, 6), with ``inf`` on the diagonal for rigid directions.
     """
     K = np.diag(np.full(6, np.inf)) if stiffness is None else np.array(stiffness)
-    free = np.diag(K) == 0.0  # free motions stay free with a spring in series
+    free = np.diag(K) == 0.0  # Free motions remain free with a spring in series.
     K[free, free] = np.inf
     soft = np.isfinite(np.diag(K))
     C = np.zeros((6, 6))

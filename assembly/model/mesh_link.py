@@ -1,4 +1,4 @@
-"""Finite-element solutions of mesh links, transformed to frame axes.
+"""Stiffness and mass of mesh links in frame axes.
 
 The finite elements are solved by
 :func:`forcefit.assembly.files.solved_links.solve_links` when a robot is loaded.
@@ -25,8 +25,8 @@ def mesh_solution(frame: Frame) -> MeshSolution:
         frame: frame whose link is a :class:`forcefit.assembly.model.robot.MeshLink`.
 
     Returns:
-        Solution, whose stiffness must be multiplied by :func:`modulus_factor` to obtain
-        the stiffness for Young's modulus of the link.
+        Solution.  Its stiffness times :func:`modulus_factor` is the stiffness of the
+        link.
 
     Raises:
         BadInput: the link was not solved when the robot was loaded.
@@ -115,7 +115,7 @@ def mesh_rotation(
     up: tuple[float, float, float] | None = None,
     frame_up: tuple[float, float, float] | None = None,
 ) -> NDArray:
-    """Return the rotation from mesh axes to frame axes that aligns two spans.
+    """Return the rotation from mesh axes to frame axes that aligns two vectors.
 
     Args:
         mesh_span: vector from base to tip in the mesh axes (3,) [m].
@@ -134,14 +134,14 @@ def mesh_rotation(
     if sine < 1e-15:
         if cosine > 0:
             return np.eye(3)
-        # for opposite spans, rotate by pi about a perpendicular direction
+        # For opposite spans, rotate by pi about a perpendicular axis.
         axis = np.cross(a, np.eye(3)[np.argmin(np.abs(a))])
         return rotation_matrix(np.pi * axis / np.linalg.norm(axis))
     return rotation_matrix(np.arctan2(sine, cosine) * axis / sine)
 
 
 def _triad(along: NDArray, up: NDArray) -> NDArray:
-    """Return right-handed axes: the first along a span, the third close to ``up``."""
+    """Return right-handed axes, the first along a span, the third close to ``up``."""
     side = np.cross(up, along)
     side = side / np.linalg.norm(side)
     return np.column_stack([along, side, np.cross(along, side)])

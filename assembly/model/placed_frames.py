@@ -1,4 +1,4 @@
-"""Conversion of home poses in base axes to frame poses relative to their parents."""
+"""Convert home poses in base axes to poses relative to the parent frames."""
 
 from collections.abc import Iterable
 from dataclasses import replace
@@ -17,8 +17,8 @@ def place_frames(placed: Iterable[PlacedFrame]) -> tuple[Frame, ...]:
 
     Args:
         placed: frames and their home poses (4, 4) in base axes, parents first.  A home
-            pose excludes the motion of the frame's own joint; the joints of all
-            preceding frames are at their ``position``.
+            pose excludes the motion of the frame's own joint, but includes the
+            ``position`` of all preceding joints.
 
     Returns:
         Frames with translation and rotation relative to their parents.

@@ -1,4 +1,4 @@
-"""Results at one point, or at many points along the first axis of each array."""
+"""Base class of results at one or many points."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -22,10 +22,9 @@ class PointResults:
     """Result at one point, or at many points along the first axis of its arrays.
 
     Attributes:
-        AXES: number of axes for one point, by field.  In a result at many points, an
-            array with only this number of axes applies to all points.
-        VARIABLES: field with the values of each variable in :meth:`to_xarray`, by the
-            name of the variable.
+        AXES: number of array axes for one point, by field.  In a result at many points,
+            an array with this number of axes applies to all points.
+        VARIABLES: name of the field for each variable in :meth:`to_xarray`.
     """
 
     AXES: ClassVar[Mapping[str, int]]

@@ -23,9 +23,7 @@ class ErrorDraw:
         most: maximum absolute value of each component (6,) [rad, m].
         seed: random seed.
         signs: ``"literal"`` for positive errors only, as the interval is printed in the
-            paper, or ``"signed"`` for the same absolute values with random signs.  The
-            paper does not state which one was used; the median energies differ by a
-            factor of five.
+            paper, or ``"signed"`` for the same absolute values with random signs.
     """
 
     frames: tuple[str, ...]
@@ -67,7 +65,7 @@ def draw_errors(robot: Robot, draw: ErrorDraw) -> NDArray:
 
 
 def frames_named(robot: Robot, names: Sequence[str]) -> tuple[str, ...]:
-    """Expand names that apply to all legs to the full names of frames and joints.
+    """Expand names without a leg to the full names of frames and joints.
 
     Args:
         robot: robot with the frames.
@@ -84,7 +82,7 @@ def frames_named(robot: Robot, names: Sequence[str]) -> tuple[str, ...]:
     frames = known[: len(robot.frames)]
     chosen = set()
     for name in names:
-        # frames take precedence over joints with the same name
+        # A frame takes precedence over a joint with the same name.
         among = frames if name in frames else known
         fits = {k for k in among if k == name or k.split(".", 1)[-1] == name}
         if not fits:

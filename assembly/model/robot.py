@@ -51,8 +51,8 @@ __all__ = [
 class Robot(EqualData):
     """Manipulator.
 
-    Frames are stored with parents first, and the arrays of this class have one row per
-    frame in this order.  Robots are equal if all of their data are bit-identical.
+    Parents precede their children in ``frames``.  The arrays of this class have one row
+    per frame.  Robots are equal if all of their data are bit-identical.
 
     Attributes:
         name: name of the robot.
@@ -60,22 +60,21 @@ class Robot(EqualData):
         frames: all frames.
         closures: pairs of frames that must coincide after assembly.
         description: one-line description.
-        effects: parameters of the known effects of the machine, by name; see
+        effects: parameters of the known effects, by effect name; see
             :mod:`forcefit.assembly.effects`.
-        session_effects: effects that act in only one session, by session.
-        functions: known general effects of the machine.
-        learned_range: minimum and maximum of each variable, by public name, in the data
-            from which the effects were identified.
+        session_effects: additional effects of each session, by session name.
+        functions: known effects of type :class:`Function`.
+        learned_range: minimum and maximum of each variable in the data from which the
+            effects were identified, by variable name.
         reference_point: point at which the robot was identified (3,) [m], in platform
             axes; None if the robot was not identified.
-        diagnosis: data about the diagnosis that identified the robot: verdict, fitted
-            rows, hold-out error, hash of the campaign, path of the covariance.
-        remarks: sentences about default values in the file that are easily overlooked.
-        callouts: tolerance callouts of features, as stated in the drawing.
+        diagnosis: data of the diagnosis that identified the robot: verdict, number of
+            fitted rows, hold-out error, hash of the campaign, path of the covariance.
+        remarks: sentences about default values that a user can overlook.
+        callouts: tolerance callouts of features.
         fits: ISO 286 fits by frame, for example ``"12 H7/g6"``; ``radial`` of the
             clearance is the mean clearance of the fit.
-        fitted_ends: data of fits that determine ``tilt`` or ``spin`` instead of
-            ``radial``, by frame.
+        fitted_ends: data of fits that determine ``tilt`` or ``spin``, by frame.
     """
 
     name: str
@@ -165,7 +164,7 @@ class Robot(EqualData):
 
     @cached_property
     def on_path(self) -> NDArray:
-        """Mask (n, n) whose row i selects the frames on the path from the base to i."""
+        """Mask (n, n); row i selects frame i and its ancestors."""
         count = len(self.frames)
         marks = np.eye(count, dtype=bool)
         for i, parent in enumerate(self.parents):
@@ -186,7 +185,7 @@ class Robot(EqualData):
 
     @property
     def declared_errors(self) -> NDArray:
-        """Geometric errors (n, 6) [rad, m] without locked-in clearances."""
+        """Geometric errors (n, 6) [rad, m] without those due to bolting."""
         errors = self.errors.copy()
         for error, frame in zip(errors, self.frames, strict=True):
             if frame.locked_at is not None:
@@ -195,7 +194,7 @@ class Robot(EqualData):
 
     @cached_property
     def positions(self) -> NDArray:
-        """Joint coordinates (n,) [rad or m] from which the home pose is computed."""
+        """Joint coordinates in the home pose (n,) [rad or m]."""
         return np.array([f.position for f in self.frames])
 
     @property
@@ -219,8 +218,8 @@ class Robot(EqualData):
         """Return the robot with new geometric errors.
 
         Args:
-            errors: delta l of all frames (n, 6) [rad, m]; previously locked-in
-                clearances are discarded.
+            errors: delta l of all frames (n, 6) [rad, m].  They also replace errors due
+                to bolting.
 
         Returns:
             Robot with the given errors.
@@ -238,7 +237,7 @@ class Robot(EqualData):
 
 
 def _with_error(frame: Frame, error: NDArray) -> Frame:
-    """Return the frame with a new geometric error and no locked-in clearance."""
+    """Return the frame with a new geometric error, which replaces that of bolting."""
     bolt = frame.locked_at
     if bolt is not None:
         bolt = replace(bolt, screw=np.zeros(6))
@@ -302,7 +301,7 @@ def parents_first(frames: Iterable[Frame]) -> tuple[Frame, ...]:
 
 
 def _stable(frames: tuple[Frame, ...], depth: dict[str, int]) -> tuple[Frame, ...]:
-    """Return frames unchanged if parents come first, otherwise sorted by depth."""
+    """Return frames sorted by depth, or unchanged if parents come first."""
     seen = {BASE}
     for frame in frames:
         if frame.parent not in seen:

@@ -1,6 +1,6 @@
 """Statuses of points and verdicts of comparisons, with their meanings.
 
-A status states whether a result is available at a point.  A verdict assesses a result.
+A status describes whether a point has a result.  A verdict assesses a result.
 """
 
 OK = "ok"
@@ -33,19 +33,19 @@ MEANINGS = {
     UNSTABLE: "the equilibrium has a direction of negative stiffness",
     NOT_PROVED: "the certificate of the solution is not sufficient",
 }
-# statuses of sweep points; files store the index of the status in this tuple
+# Statuses of sweep points. Files contain the index of the status in this tuple.
 OF_POINTS = (
     OK, OUT_OF_REACH, CANNOT_ASSEMBLE, SOLVER_FAILED, INVALID_ROBOT, NO_EQUILIBRIUM,
     SINGULAR, BEYOND_LIMITS, BEYOND_SINGULARITY,
 )  # fmt: skip
-# statuses of points at which no quantity is computed
+# Statuses of points without results.
 UNUSABLE = {OUT_OF_REACH, INVALID_ROBOT, SINGULAR, BEYOND_LIMITS}
 
-# verdicts on a single value: OK, or one of the following
+# Verdicts on a single value: OK, or one of the following.
 FAILS = "fails"
 UNDECIDED = "undecided"
 NO_SIGNAL = "no signal"
-# verdicts on a complete comparison: NO_SIGNAL, or one of the following
+# Verdicts on a complete comparison: NO_SIGNAL, or one of the following.
 PASSED = "passed"
 FAILED = "failed"
 NOT_DECIDED = "not decided"

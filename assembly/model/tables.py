@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-# variables whose name differs from that in forcefit/results/quantities.py
+# names of quantities whose variable has a different name
 _RENAMED = {
     "clearance_screw": "clearance", "link_screw": "link", "joint_screw": "joint",
     "stiffness": "axis_stiffness", "stiffness_matrix": "stiffness", "read_at": "point",
@@ -29,7 +29,7 @@ NO_LABELS: Mapping[str, Sequence[Any]] = {}
 
 
 class PlacedRobot(Protocol):
-    """Robot in a nominal posture."""
+    """Protocol of a robot in a nominal posture."""
 
     @property
     def robot(self) -> Robot:
@@ -40,7 +40,7 @@ class PlacedRobot(Protocol):
 
 
 class ForcedAssembly(Protocol):
-    """Assembly computed with the linear model or with finite motions."""
+    """Protocol of an assembly, computed with small or finite motions."""
 
     @property
     def posture(self) -> PlacedRobot:
@@ -129,15 +129,15 @@ def frame_table(data: "xarray.Dataset", *rows: str) -> "pandas.DataFrame":
         rows: dimensions that become the index of the table.
 
     Returns:
-        Table whose columns are pairs (variable, component).  The component consists of
-        the labels along the remaining dimensions, joined by dots; it is empty if there
-        are none.  ``attrs["units"]`` contains the unit of each variable and dimension.
+        Table whose columns are pairs (variable, component).  The component contains the
+        labels along the remaining dimensions, joined by dots.  ``attrs["units"]``
+        contains the unit of each variable and dimension.
     """
     import pandas
 
     columns: dict[tuple[str, str], NDArray] = {}
     sizes = {row: data.sizes[row] for row in rows}
-    # coordinates along the rows, for example the pose components in a list of postures
+    # coordinates of the rows, for example the pose components
     kept = {
         str(name): v.variable.set_dims(sizes) for name, v in data.coords.items()
         if name not in data.dims and v.dims and {*v.dims} <= {*rows}
@@ -171,11 +171,11 @@ def component_unit(unit: str, component: str) -> str:
 
     Args:
         unit: unit of the variable, for example ``"rad, m"``.
-        component: component as in :func:`frame_table`, with labels that start with R or
-            T, or M or F, or equal ``rotation`` or ``translation``.
+        component: component as in :func:`frame_table`, for example ``RX``, ``FZ`` or
+            ``rotation``.
 
     Returns:
-        Unit of the component; the unit of the variable if all components share it.
+        Unit of the component.
     """
     kinds = [label[:1].upper() for label in component.split(".")]
     if unit.count(", ") == 1:
@@ -195,11 +195,11 @@ def labelled(
     """Combine arrays into a dataset with units and descriptions.
 
     Args:
-        values: for each variable, the array of the quantity with the same name, or a
-            pair of a :class:`~forcefit.results.quantities.Quantity` and its array.
+        values: array of each variable; or a pair of a
+            :class:`~forcefit.results.quantities.Quantity` and its array.
         axis: name of a common first dimension of all arrays, or empty.
         points: labels along this dimension.
-        labels: labels along dimensions for which the table of quantities defines none.
+        labels: labels along dimensions without standard labels.
 
     Returns:
         Labelled dataset.

@@ -1,4 +1,4 @@
-"""Equality of robots with equal data, and separate results for different robots."""
+"""Equality of robots and of their links."""
 
 import pickle
 import subprocess
@@ -57,7 +57,7 @@ OTHER_FRAME = {
 }  # fmt: skip
 
 
-def test_robots_made_of_equal_data_are_equal_and_have_equal_hashes():
+def test_robots_with_equal_data_have_equal_hashes():
     assert made() is not made()
     assert made() == made()
     assert hash(made()) == hash(made())
@@ -65,7 +65,7 @@ def test_robots_made_of_equal_data_are_equal_and_have_equal_hashes():
     assert made() != "arm"
 
 
-def test_integer_and_equal_float_make_equal_robots():
+def test_robots_with_equal_integer_and_float_are_equal():
     two = [Frame("a", mass=2, position=0), Frame("a", mass=2.0, position=0.0)]
     assert Robot("r", "a", (two[0],)) == Robot("r", "a", (two[1],))
 
@@ -86,15 +86,15 @@ def test_robots_that_differ_in_one_field_of_a_frame_are_unequal(name):
 
 
 @pytest.mark.parametrize("name", sorted(BUILT_IN))
-def test_robot_written_and_read_equals_the_written_one(name, tmp_path):
+def test_robot_read_from_its_file_equals_the_original(name, tmp_path):
     robot = ff.load_robot(name)
     ff.write_robot(robot, tmp_path / "robot.toml")
     assert ff.load_robot(tmp_path / "robot.toml") == robot
     assert ff.load_robot(name) == robot
 
 
-def test_links_of_different_stiffness_with_equal_keys_do_not_share_results():
-    """C = screw of a unit wrench; the library's file was replaced in between."""
+def test_library_links_with_equal_keys_can_have_different_stiffness():
+    """The file of the library is replaced between the two computations."""
     screws = []
     for factor in (1.0, 2.0):
         link = LibraryLink(Path("links.h5"), "arm", factor * np.linalg.inv(K))
@@ -104,8 +104,8 @@ def test_links_of_different_stiffness_with_equal_keys_do_not_share_results():
     np.testing.assert_allclose(screws, [1e-5, 2e-5])
 
 
-def test_robot_whose_link_solution_was_lost_in_a_pickle_is_unequal():
-    """Tens of megabytes of finite elements are not pickled."""
+def test_pickled_robot_without_link_solution_is_unequal():
+    """Finite-element solutions are not pickled."""
     solved = SimpleNamespace(link=SimpleNamespace(compliance=np.linalg.inv(K)))
     solution = MeshSolution(solved, 2e11, "abc", np.zeros((12, 12)))
     link = MeshLink(Path("a.stl"), "x", "y", 2e11, 0.3, solution=solution)
@@ -118,7 +118,7 @@ def test_robot_whose_link_solution_was_lost_in_a_pickle_is_unequal():
 
 
 def test_equal_robots_are_equal_in_another_process(tmp_path):
-    """Hashes of texts begin with a random number in every process."""
+    """Python hashes strings differently in each process."""
     robot = ff.load_robot("hexapod")
     hash(robot)
     (tmp_path / "robot").write_bytes(pickle.dumps(robot))
@@ -130,7 +130,7 @@ def test_equal_robots_are_equal_in_another_process(tmp_path):
     subprocess.run([sys.executable, "-c", code, tmp_path / "robot"], check=True)
 
 
-def test_diagonal_of_a_joint_stiffness_equals_that_of_its_matrix():
+def test_joint_stiffness_given_by_its_diagonal_equals_the_matrix():
     diagonal = [np.inf, np.inf, 10.0, np.inf, np.inf, 2e5]
     short, full = (
         Frame("hinge", joint_stiffness=K) for K in (diagonal, np.diag(diagonal))

@@ -37,7 +37,7 @@ def sources(write_file):
     return read_sources(write_file(FILE), load_robot("four_bar"))
 
 
-def test_draws_do_not_depend_on_their_division_into_blocks(sources):
+def test_draws_do_not_depend_on_the_block_size(sources):
     whole = sources.draw(0, 1000, seed=7)
     cut = [sources.draw(a, b - a, seed=7) for a, b in ((0, 1), (1, 400), (400, 1000))]
     np.testing.assert_array_equal(np.vstack(cut), whole)
@@ -49,8 +49,8 @@ def test_different_seeds_and_streams_have_different_random_numbers(sources):
         assert not np.any(draws[a] == draws[b])
 
 
-def test_every_source_has_the_requested_distribution(sources):
-    """Kolmogorov's test against SciPy's own distributions, 1e5 draws each."""
+def test_draws_have_the_requested_distribution(sources):
+    """Kolmogorov-Smirnov test of 1e5 draws against the distributions of SciPy."""
     x = sources.draw(0, 100_000, seed=3).T
     laws = {
         "crank_pin.RX": stats.uniform(-1e-3, 2e-3),
@@ -71,7 +71,7 @@ def test_every_source_has_the_requested_distribution(sources):
         assert variance == pytest.approx(law.var(), rel=1e-9), label
 
 
-def test_errors_with_random_signs_respect_their_minimum_absolute_value():
+def test_errors_with_random_signs_have_a_minimum_magnitude():
     robot = load_robot("four_bar")
     sources = tolerance_sources(robot, [1e-3, 0, 0, 0, 0, 0])
     gapped = replace(sources, least=np.full(len(sources), 0.4))
@@ -79,7 +79,7 @@ def test_errors_with_random_signs_respect_their_minimum_absolute_value():
     assert np.abs(s).min() >= 0.4
     assert np.abs(s).max() <= 1.0
     assert abs((s > 0).mean() - 0.5) < 5 / np.sqrt(s.size)
-    # mean of s^2 over [0.4, 1] is (1 + 0.4 + 0.16)/3 = 0.52
+    # The mean of s^2 over [0.4, 1] is (1 + 0.4 + 0.16)/3 = 0.52.
     np.testing.assert_allclose(gapped.variance, 0.52 * 1e-6, rtol=1e-12)
     assert np.mean(s**2) == pytest.approx(0.52, abs=0.003)
 
@@ -99,9 +99,7 @@ def test_errors_with_random_signs_respect_their_minimum_absolute_value():
          "deviation: expected numbers >= 0"),
     ],
 )  # fmt: skip
-def test_mistake_in_a_tolerance_file_is_refused_with_its_place(
-    change, message, write_file
-):
+def test_invalid_tolerance_file_is_rejected(change, message, write_file):
     path = write_file(FILE.replace(*change, 1))
     with pytest.raises(BadInput) as error:
         read_sources(path, load_robot("four_bar"))

@@ -15,7 +15,8 @@ from forcefit.commands.options import parse_load
 from forcefit.inputs.table import BadInput
 
 FORCE, LENGTH = 50.0, 0.4
-STIFFNESS = 2e11 * np.pi * 0.01**4 / 4  # [N m^2] of a round bar of 10 mm radius
+# [N m^2] bending stiffness of a round bar of 10 mm radius
+STIFFNESS = 2e11 * np.pi * 0.01**4 / 4
 ROOT = Path(__file__).parents[3]
 HEXAPOD = ff.load_robot("hexapod")
 SOURCES = sources_of(HEXAPOD, ROOT / "examples" / "hexapod_errors.toml")
@@ -28,22 +29,22 @@ def cantilever():
     return home_posture(Robot("bar", "tip", (tip,)))
 
 
-def test_force_by_name_bends_a_cantilever():
-    """F L^3 / (3 E I)."""
+def test_cantilever_deflection_under_a_named_force_equals_beam_theory():
+    """The deflection is F L^3 / (3 E I)."""
     forced = ff.solve_assembly(cantilever(), {"fz": -FORCE})
     assert forced.platform_screw[5] == pytest.approx(TIP)
     exact = ff.solve_exact(cantilever(), load={"fz": -FORCE})
     assert exact.platform_screw[5] == pytest.approx(TIP, rel=1e-4)
 
 
-def test_moment_and_force_by_name_superpose():
-    """M L^2 / (2 E I) of a moment about -y is up; this one removes the deflection."""
+def test_named_moment_and_force_superpose():
+    """The deflection M L^2 / (2 E I) of the moment cancels that of the force."""
     moment = -2 / 3 * FORCE * LENGTH
     forced = ff.solve_assembly(cantilever(), {"fz": -FORCE, "my": moment})
     assert abs(forced.platform_screw[5]) < 1e-9 * abs(TIP)
 
 
-def test_list_of_numbers_by_component_name_is_a_load_for_each_point():
+def test_list_of_values_of_a_component_gives_one_load_per_point():
     forces = np.array([-50.0, 0.0, 25.0])
     many = ff.solve_assembly(cantilever(), {"fz": forces})
     np.testing.assert_allclose(
@@ -72,13 +73,13 @@ SAME = {
 
 
 @pytest.mark.parametrize("name", sorted(SAME))
-def test_load_given_by_component_names_equals_the_load_given_in_order(name):
+def test_load_given_by_components_equals_load_given_as_array(name):
     by_name, in_order = {"fz": -50, "mx": 1.5}, [1.5, 0, 0, 0, 0, -50]
     np.testing.assert_array_equal(SAME[name](by_name), SAME[name](in_order))
     assert not np.array_equal(SAME[name](by_name), SAME[name]([0.0] * 6))
 
 
-def test_command_line_and_python_read_the_same_load():
+def test_command_line_and_python_accept_the_same_loads():
     assert parse_load(["fz=-50,mx=1.5"]) == [1.5, 0, 0, 0, 0, -50]
     assert given_load({"fz": -50, "mx": 1.5}).tolist() == [1.5, 0, 0, 0, 0, -50]
 
@@ -93,12 +94,12 @@ def test_command_line_and_python_read_the_same_load():
         ({"fz": [1, 2], "fx": [1, 2, 3]}, "load: found fz 2, fx 3 numbers"),
     ],
 )  # fmt: skip
-def test_message_about_a_value_that_is_not_a_load_names_the_value(load, message):
+def test_message_about_an_invalid_load_contains_the_value(load, message):
     with pytest.raises(BadInput) as found:
         ff.solve_assembly(cantilever(), load)
     assert str(found.value).startswith(message)
 
 
-def test_message_about_several_loads_where_one_is_expected_states_their_number():
+def test_message_about_too_many_loads_contains_their_number():
     with pytest.raises(BadInput, match=r"load: found .* expected 6 numbers \[N m, N\]"):
         ff.platform_stiffness(cantilever(), load={"fz": [1.0, 2.0]})

@@ -1,4 +1,4 @@
-"""Joints with several degrees of freedom, referred to by their user-defined names."""
+"""Joints with several degrees of freedom, identified by their names."""
 
 import numpy as np
 import pytest
@@ -18,19 +18,20 @@ from forcefit.stiffness.screws import SCREW
 
 
 def ring(radius, height, degrees):
-    """Points [m] on a circle about z."""
+    """Return points [m] on a circle about z."""
     angles = np.radians(degrees)
     x, y = radius * np.cos(angles), radius * np.sin(angles)
     return np.column_stack([x, y, np.full(len(x), height)]).tolist()
 
 
 FEET = ring(1.0, 0.0, [0, 50, 120, 170, 240, 290])
-BALLS = ring(0.5, 1.0, [-25, 75, 95, 195, 215, 315])  # at home, base axes
-AT = np.array([0.0, 0.0, 1.1])  # [m] the platform's point
+# [m] ball centres in the home pose, base axes
+BALLS = ring(0.5, 1.0, [-25, 75, 95, 195, 215, 315])
+AT = np.array([0.0, 0.0, 1.1])  # [m] origin of the platform
 
 
 def hexapod(tmp_path, ball=""):
-    """A 6-UPS; ``ball`` has further keys of the spherical joints."""
+    """Return a 6-UPS hexapod; ``ball`` contains keys of its spherical joints."""
     text = 'format = 2\nname = "six"\nplatform = "plate"\n'
     text += f'platform_at = {AT.tolist()}\n[[body]]\nname = "plate"\n'
     for k, (foot, top) in enumerate(zip(FEET, BALLS, strict=True), 1):
@@ -71,7 +72,7 @@ at = {top}
 
 
 def legs():
-    """(6, 6) unit wrench [M F] of each leg on the platform at its point."""
+    """Return the unit wrench [M F] of each leg at the platform origin, (6, 6)."""
     rows = []
     for foot, top in zip(FEET, BALLS, strict=True):
         u = np.subtract(top, foot)
@@ -80,10 +81,10 @@ def legs():
     return np.array(rows).T
 
 
-def test_wrench_of_a_ball_joint_is_the_force_along_its_leg(tmp_path):
-    """By the platform's equilibrium; a ball passes no moment."""
+def test_wrench_of_a_ball_joint_is_a_force_along_its_leg(tmp_path):
+    """The forces follow from the equilibrium of the platform."""
     load = np.array([3.0, -5.0, 2.0, 40.0, -70.0, -500.0])
-    forces = np.linalg.solve(legs(), load)  # of the platform on the legs
+    forces = np.linalg.solve(legs(), load)  # axial forces of the platform on the legs
     names = [f"leg{k}.ball" for k in range(1, 7)]
     poses = tmp_path / "poses.csv"
     poses.write_text("pose.tx,pose.ty,pose.tz\n0,0,1.1\n")
@@ -98,8 +99,8 @@ def test_wrench_of_a_ball_joint_is_the_force_along_its_leg(tmp_path):
     np.testing.assert_allclose(in_base, legs()[3:].T * forces[:, None], atol=1e-9)
 
 
-def test_errors_of_balls_have_the_covariance_of_leg_lengths(tmp_path):
-    """An error of a ball in each direction changes its leg's length by as much."""
+def test_errors_of_ball_joints_act_like_leg_length_errors(tmp_path):
+    """The error of a ball along its leg equals the change of the leg length."""
     sigma = 2e-5  # [m]
     errors = tmp_path / "errors.toml"
     errors.write_text(
@@ -114,7 +115,7 @@ def test_errors_of_balls_have_the_covariance_of_leg_lengths(tmp_path):
     response = linear_response(home_posture(robot))
     n = len(robot.frames)
     slopes = sources.of_numbers(response.screws[:, -6 * n :].reshape(6, n, 6))
-    J = np.linalg.inv(legs().T)  # platform's screw by the legs' lengths
+    J = np.linalg.inv(legs().T)  # platform screw per unit of each leg length
     np.testing.assert_allclose(
         sigma**2 * slopes @ slopes.T, sigma**2 * J @ J.T, rtol=0, atol=1e-18
     )
@@ -144,10 +145,8 @@ def one_joint(tmp_path, kind, more=""):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_error_and_tolerance_of_a_joint_equal_those_declared_in_the_file(
-    tmp_path, kind
-):
-    """In the joint's axes, for both bearings of a universal joint."""
+def test_error_and_tolerance_of_a_joint_equal_the_file(tmp_path, kind):
+    """The values are in the axes of the joint."""
     error = [1e-5, -2e-5, 3e-5, 4e-6, -5e-6, 6e-6]
     keys = f"geometric_error = {error}\ntolerance = {[abs(x) for x in error]}"
     declared = read_robot(one_joint(tmp_path, kind, keys))
@@ -173,17 +172,15 @@ def test_error_and_tolerance_of_a_joint_equal_those_declared_in_the_file(
     ("cylindrical", "clearance.tilt", "clearance = {{ radial = 1e-5, tilt = {} }}"),
     ("planar", "geometric_error.rx", "geometric_error = [{}, 0, 0, 0, 0, 1e-5]"),
 ])  # fmt: skip
-def test_changing_a_number_of_a_joint_equals_changing_it_in_the_file(
-    tmp_path, kind, key, more
-):
+def test_changed_value_of_a_joint_equals_a_changed_file(tmp_path, kind, key, more):
     other = read_robot(one_joint(tmp_path, kind, more.format(3e-5)))
     design = load_design(one_joint(tmp_path, kind, more.format(1e-5)))
     changed = design.robot({f"j.{key}": 3e-5})
     assert changed.frames == other.frames
 
 
-def test_compliance_of_a_ball_joint_is_shown_under_the_name_of_the_joint(tmp_path):
-    """Of six springs in series with the drives: the shares add up to one."""
+def test_compliance_report_contains_the_name_of_a_ball_joint(tmp_path):
+    """The contributions of springs and drives to the compliance sum to one."""
     K = "joint_stiffness = [[0,0,0,0,0,0],[0,0,0,0,0,0],[0,0,0,0,0,0],"
     K += "[0,0,0,1e6,0,0],[0,0,0,0,1e6,0],[0,0,0,0,0,1e6]]"
     robot = read_robot(hexapod(tmp_path, K))
@@ -192,11 +189,11 @@ def test_compliance_of_a_ball_joint_is_shown_under_the_name_of_the_joint(tmp_pat
     assert sorted(joints) == sorted(
         f"leg{k}.{name}" for k in range(1, 7) for name in ("ball", "drive")
     )
-    # both springs of a leg are equally stiff along it
+    # Both springs of a leg have the same axial stiffness.
     assert sum(joints[f"leg{k}.ball"] for k in range(1, 7)) == pytest.approx(0.5)
 
 
-def test_unknown_joint_is_refused_with_a_similar_name(tmp_path):
+def test_message_about_an_unknown_joint_suggests_a_name(tmp_path):
     file = hexapod(tmp_path)
     poses = tmp_path / "poses.csv"
     poses.write_text("pose.tz\n1.1\n")
@@ -207,8 +204,8 @@ def test_unknown_joint_is_refused_with_a_similar_name(tmp_path):
         robot.index("leg1.ball")
 
 
-def test_frames_at_different_points_are_not_combined_to_a_joint(tmp_path):
-    """Two hinges of a leg that are named as the frames of a joint are."""
+def test_frames_at_different_points_do_not_form_a_joint(tmp_path):
+    """Two hinges of a leg have the frame names of a joint."""
     file = tmp_path / "arm.toml"
     file.write_text(
         'name = "arm"\nplatform = "tip"\n'
@@ -226,8 +223,8 @@ BORE = "clearance = { radial = 1e-5, length = 0.04, axial = 1e-5 }"
 @pytest.mark.parametrize(("kind", "loose"), [
     ("universal", []), ("revolute", []), ("cylindrical", []), ("fixed", ['"j"']),
 ])  # fmt: skip
-def test_only_fixed_joints_are_reported_as_loose(tmp_path, kind, loose):
-    """The frames of a bore are no joints of their own."""
+def test_fixed_joints_are_reported_as_loose(tmp_path, kind, loose):
+    """The frames of a bore are not reported as joints."""
     key = BORE if kind != "cylindrical" else BORE.replace(", axial = 1e-5", "")
     robot = read_robot(one_joint(tmp_path, kind, key))
     (text,) = loose_over_poses(robot) or [""]
@@ -240,8 +237,8 @@ def plan_of(tmp_path, text):
     return read_steps(file, read_robot(hexapod(tmp_path)))
 
 
-def test_plan_of_steps_refers_to_joints_of_several_frames_by_name(tmp_path):
-    """A closure by its joint, in either order, and a frame at the joint's point."""
+def test_assembly_plan_accepts_names_of_joints(tmp_path):
+    """The plan contains the names of a closure and of a frame."""
     plan = plan_of(
         tmp_path,
         '[[step]]\njoin = ["plate", "leg2.ball"]\n'

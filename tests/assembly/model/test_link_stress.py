@@ -1,4 +1,4 @@
-"""Peak stress of links in a robot, compared with formulas."""
+"""Peak stress of links, compared with formulas."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -24,7 +24,7 @@ PLAIN = Path(__file__).parents[3] / "meshes" / "distal_plain.stl"
 
 
 def two_bars(gap):
-    """Coaxial bars of 0.5 m from wall to wall that are ``gap`` too short together."""
+    """Return two coaxial bars between walls with a gap."""
     bar = BeamLink({"radius": 0.01}, 70e9, 0.3)
     frames = (
         Frame("one", translation=[0.5, 0, 0], link=bar),
@@ -36,23 +36,24 @@ def two_bars(gap):
     return Robot("bars", "end_one", frames, (("end_one", "end_two"),))
 
 
-def test_stress_of_bars_forced_together_equals_modulus_times_strain():
+def test_stress_of_stretched_bars_equals_modulus_times_strain():
     robot = two_bars([0, 0, 0, 1e-4, 0, 0])
     answer = solve_assembly(place_robot(robot))
-    # strain 1e-4 / 1 m over both bars
+    # The strain is 1e-4 m / 1 m in both bars.
     stress = peak_stresses(robot, answer.wrenches)
     np.testing.assert_allclose(stress, 70e9 * 1e-4, rtol=1e-9)
 
 
-def test_von_mises_stress_of_a_bar_equals_hand_calculation():
-    """Tip force across: M = F L at the base, sigma = 4 F L / (pi r^3)."""
+def test_von_mises_stress_of_a_bar_equals_formulas():
+    """The bending stress at the base is sigma = 4 F L / (pi r^3)."""
     robot = two_bars(np.zeros(6))
     w = np.zeros((3, 5, 6))
     w[0, 2, 4], w[1, 2, 5], w[2, 2, 0] = 100.0, -100.0, 10.0
     expected = 4 * 100.0 * 0.5 / (np.pi * 0.01**3)
     stress = peak_stresses(robot, w)
     np.testing.assert_allclose(stress[:2, 1], expected, rtol=1e-9)
-    # torsion: tau = 2 T / (pi r^3), von Mises sqrt(3) times that
+    # The torsional stress is tau = 2 T / (pi r^3), and the von Mises stress is sqrt(3)
+    # tau.
     twist = np.sqrt(3) * 2 * 10.0 / (np.pi * 0.01**3)
     assert stress[2, 1] == pytest.approx(twist, rel=1e-9)
     assert not stress[:, 0].any()
@@ -67,11 +68,11 @@ def test_links_without_a_section_have_no_stress():
 
 
 @pytest.mark.slow
-def test_finite_element_stress_equals_the_beam_away_from_the_ends():
-    """Evaluated from one radius above the base: F / A there, and F (L - r) / W.
+def test_finite_element_stress_agrees_with_beam_theory():
+    """The stress is F / A, and F (L - r) / W for bending.
 
-    The effect of the clamped ends on an axial force has decayed to 3.9 % at a distance
-    of one radius, and to 0.02 % at three (Saint-Venant); it is still visible here.
+    Points within one radius r of the base are omitted.  At this distance, the effect of
+    the clamped end has decayed to 3.9 % (Saint-Venant).
     """
     link = MeshLink(PLAIN, "z=0", "z=0.452", 6e10, 0.3)
     frame = Frame("distal", translation=[0.452, 0, 0], link=link)
@@ -83,7 +84,7 @@ def test_finite_element_stress_equals_the_beam_away_from_the_ends():
     expected = [1000 / (np.pi * r**2), 4000 * (0.452 - r) / (np.pi * r**3)]
     found = peak_stresses(robot, w)[:, 0]
     assert 1.0 <= found[0] / expected[0] <= 1.05
-    # of unit wrenches, bending and torsion among them
+    # The error estimate is for unit wrenches, including bending and torsion.
     told = stressed_links(robot)[0].relative_error
     assert 0.001 < told < 0.2
     drive = Frame("drive", joint="revolute", actuated=True)
@@ -99,7 +100,7 @@ def test_finite_element_stress_equals_the_beam_away_from_the_ends():
 
 
 def heavy(pinned):
-    """A square bar of 20 mm, 1 m long, fixed at one end or pinned at both."""
+    """Return a square bar of 20 mm x 1 m, clamped at one end or pinned at both ends."""
     link = BeamLink({"width": 0.02, "height": 0.02}, 2e11, 0.3, density=7850.0)
     if not pinned:
         return Robot("sag", "tip", (Frame("tip", translation=[1, 0, 0], link=link),))
@@ -114,8 +115,8 @@ def heavy(pinned):
 
 
 @pytest.mark.parametrize(("pinned", "share"), [(False, 2), (True, 8)])
-def test_stress_under_own_weight_equals_the_bending_formula(pinned, share):
-    """sigma = 6 M / h^3, M = W L / 2 at the wall or W L / 8 in the middle."""
+def test_stress_under_self_weight_equals_beam_theory(pinned, share):
+    """The stress is 6 M / h^3 with M = W L / 2 at the wall or W L / 8 at midspan."""
     robot, gravity = heavy(pinned), [0, 0, -9.81]
     weight = 7850 * 0.02**2 * 9.81
     expected = 6 * weight / share / 0.02**3
@@ -124,8 +125,8 @@ def test_stress_under_own_weight_equals_the_bending_formula(pinned, share):
     assert found[0] == pytest.approx(expected, rel=1e-9)
 
 
-def test_sweeps_and_draws_include_the_stress_of_the_link_weight():
-    """W L / 2 at the base again, and a wrench of zero at the tip."""
+def test_stress_in_sweeps_and_draws_includes_link_weight():
+    """The moment is W L / 2 at the base and zero at the tip."""
     turned = Frame("drive", joint="revolute", actuated=True)  # about z
     bar = replace(heavy(pinned=False).frames[0], parent="drive")
     robot = Robot("sag", "tip", (turned, bar))
@@ -138,21 +139,20 @@ def test_sweeps_and_draws_include_the_stress_of_the_link_weight():
     )  # fmt: skip
     data = sweep_in_memory(Sweep(question, targets))
     np.testing.assert_allclose(data["stress"].squeeze(), expected, rtol=1e-9)
-    assert (data["stress_error"] == 0).all()  # a formula has no mesh
+    assert (data["stress_error"] == 0).all()  # formulas have no mesh error
     assert np.abs(data["wrench"]).max() < 1e-9
     sources = tolerance_sources(robot, [0, 0, 0, 1e-4, 0, 0])
     experiment = Experiment(home_posture(robot), sources, gravity=gravity)
     rows = experiment.solve(0, 2)
     np.testing.assert_allclose(rows["stress"][:, 0], expected, rtol=1e-9)
     errors = draws_dataset(experiment, rows)["stress"].attrs["estimated_relative_error"]
-    assert errors.tolist() == [0.0]  # a formula has no mesh
+    assert errors.tolist() == [0.0]  # formulas have no mesh error
     weight = 7850 * 0.02**2 * 9.81  # through the drive
     np.testing.assert_allclose(rows["force"], weight, rtol=1e-9)
     np.testing.assert_allclose(rows["moment"], weight / 2, rtol=1e-9)
 
 
-def test_sweep_stress_and_safety_equal_those_of_single_solutions():
-    """Compared at points whose energy is not zero."""
+def test_stress_and_safety_in_sweeps_equal_single_solutions():
     robot = load_robot("irsbot2")
     errors = np.zeros_like(robot.errors)
     errors[robot.index("leg1.link_a"), 3] = 1e-3

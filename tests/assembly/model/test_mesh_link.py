@@ -38,8 +38,8 @@ def test_mesh_rotation_aligns_parallel_and_opposite_spans(b):
     assert np.allclose(R @ [0, 0, 1], np.array(b) / 2, atol=1e-15)
 
 
-def test_up_directions_determine_the_roll():
-    """Mesh z along the frame's x, mesh x up along the frame's z: worked by hand."""
+def test_up_directions_determine_the_rotation_about_the_span():
+    """The mesh z axis is the x axis of the frame; the mesh x axis is its z axis."""
     R = mesh_rotation(
         np.array([0, 0, 1.0]), np.array([2.0, 0, 0]), (1, 0, 0), (0, 0, 1)
     )
@@ -48,7 +48,8 @@ def test_up_directions_determine_the_roll():
     assert np.allclose(R @ [0, 0, 1], [1, 0, 0])
 
 
-# --- below a prismatic joint ---------------------------------------------------------
+# --- mesh links after a prismatic joint
+# ---------------------------------------------------------
 
 RAM = """
 name = "ram"
@@ -72,13 +73,13 @@ poisson = 0.3
 
 @pytest.fixture(scope="module")
 def cache(tmp_path_factory):
-    """Of meshes: the bar's is made once."""
+    """Return a folder for meshes that the tests share."""
     return tmp_path_factory.mktemp("meshes")
 
 
 @pytest.fixture
 def ram(tmp_path, monkeypatch, cache):
-    """A prismatic joint's robot file whose link is a square bar's surface."""
+    """Return the path of a robot file with a mesh link after a prismatic joint."""
     pyvista = pytest.importorskip("pyvista")
     monkeypatch.setenv("FORCEFIT_CACHE", str(cache))
     bar = shape_surface("rectangle", {"length": 0.08, "width": 0.02, "height": 0.02})
@@ -94,13 +95,13 @@ def ram(tmp_path, monkeypatch, cache):
 
 
 def stiffness(frame):
-    """Of a mesh link, solved here."""
+    """Return the stiffness of a mesh link."""
     return mesh_link_stiffness(replace(frame, link=solved_link(frame)))
 
 
 @pytest.mark.slow
-def test_stiffness_of_a_mesh_below_a_slide_is_rotated_by_its_axis(ram):
-    """Along z the result is that of a translation; along x K in turned axes."""
+def test_mesh_stiffness_after_a_slide_is_rotated_to_its_axis(ram):
+    """The stiffness for an axis along x is the rotated stiffness for z."""
     spelt = read_robot(ram(more="translation = [0, 0, 0.08]")).frame("tool")
     K = stiffness(spelt).stiffness
     along_z = read_robot(ram(", axis = [0, 0, 2]")).frame("tool")
@@ -112,7 +113,7 @@ def test_stiffness_of_a_mesh_below_a_slide_is_rotated_by_its_axis(ram):
     assert turned[3, 3] == pytest.approx(K[5, 5])
 
 
-def test_mesh_axis_below_a_moved_slide_is_read_and_written(ram, tmp_path):
+def test_mesh_axis_after_a_slide_is_read_and_written(ram, tmp_path):
     robot = read_robot(ram(", axis = [0, 0, 1]", position=0.05))
     assert robot.frame("tool").link.axis == (0.0, 0.0, 1.0)
     write_robot(robot, tmp_path / "again.toml")
@@ -131,12 +132,12 @@ def test_mesh_axis_below_a_moved_slide_is_read_and_written(ram, tmp_path):
          r'"tool".up: up = .* lies along the axis .*; expected a different direction'),
     ],
 )  # fmt: skip
-def test_mesh_without_a_direction_is_refused(ram, changes, message):
+def test_mesh_without_a_direction_is_rejected(ram, changes, message):
     with pytest.raises(BadInput, match=message):
         read_robot(ram(**changes))
 
 
-def test_up_direction_along_the_mesh_axis_is_refused(ram):
+def test_up_direction_along_the_mesh_axis_is_rejected(ram):
     path = ram(", axis = [0, 0, 1], up = [0, 0, 1]", "up = [1, 0, 0]")
     message = r'"tool".link.mesh: up = .* lies along the axis .*; expected a different'
     with pytest.raises(BadInput, match=message):

@@ -1,4 +1,4 @@
-"""Errors drawn at random, and frames selected by name."""
+"""Random geometric errors, and the selection of frames by name."""
 
 import numpy as np
 import pytest
@@ -13,14 +13,14 @@ def robot():
     return load_robot("irsbot2")
 
 
-def test_frame_name_without_a_leg_selects_every_leg(robot):
+def test_frame_name_without_a_leg_selects_all_legs(robot):
     assert frames_named(robot, ["link_a"]) == ("leg1.link_a", "leg2.link_a")
     assert frames_named(robot, ["leg2.tip", "leg1.tip"]) == ("leg1.tip", "leg2.tip")
     with pytest.raises(BadInput, match='no frame "link_q"; valid: leg1.drive'):
         frames_named(robot, ["link_q"])
 
 
-def test_random_errors_lie_between_their_limits_and_repeat_with_the_seed(robot):
+def test_random_errors_are_within_limits_and_reproducible(robot):
     least, most = np.arange(1.0, 7), np.arange(2.0, 8)
     draw = ErrorDraw(("leg1.tip", "leg2.tip"), tuple(least), tuple(most), 5, "signed")
     one, other = draw_errors(robot, draw), draw_errors(robot, draw)
@@ -31,7 +31,7 @@ def test_random_errors_lie_between_their_limits_and_repeat_with_the_seed(robot):
     assert np.count_nonzero(one) == 12
 
 
-def test_unknown_signs_option_is_refused(robot):
+def test_unknown_signs_option_is_rejected(robot):
     draw = ErrorDraw(("leg1.tip",), (0.0,) * 6, (1.0,) * 6, signs="positive")
     with pytest.raises(ValueError, match="signs is 'positive', expected one of"):
         draw_errors(robot, draw)
