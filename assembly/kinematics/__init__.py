@@ -1,4 +1,4 @@
-"""Postures of a robot: nominal loop closure, and maps of small screws, eqs (13)-(15).
+"""Postures of a robot with closed loops, and maps of small screws, eqs (13)-(15).
 
 Start with ``posture.py``.
 """

@@ -2,8 +2,8 @@
 
 In the home pose, the three axes are at right angles.  If the middle joint rotates by 90
 degrees, two axes coincide, and the model loses a degree of freedom.  A real ball joint
-has no such singularity, because it can rotate about any axis through its centre.  Such
-frames are therefore treated as a ball joint at every posture.
+has no such singularity.  Such frames are therefore treated as a ball joint at every
+posture.
 """
 
 from collections import Counter
@@ -16,8 +16,7 @@ from forcefit.assembly.kinematics.nominal import size_of
 from forcefit.assembly.model.robot import Robot
 from forcefit.stiffness.screws import rotation_matrix
 
-# accepted distance of axes from a common point [reference lengths], and cosine of right
-# angles
+# largest accepted distance of axes [reference lengths] and cosine of right angles
 _SAME = 1e-9
 
 
@@ -29,10 +28,10 @@ def ball_joints(robot: Robot) -> tuple[tuple[int, int, int], ...]:
         robot: any robot.
 
     Returns:
-        Index triples of passive frames without springs.  Each frame is the only child
-        of the previous frame.  Their axes pass through one point, and adjacent axes are
-        at right angles.  The bodies between them have no mass, link, closure or
-        platform.
+        Three indices for each ball joint.  The frames are passive and without springs,
+        each is the only child of the previous frame, their axes pass through one point,
+        and adjacent axes are at right angles.  The bodies between them have no mass,
+        link, closure or platform.
     """
     children = Counter(f.parent for f in robot.frames)
     used = {robot.platform, *(name for pair in robot.closures for name in pair)}
@@ -67,7 +66,7 @@ def _turns(robot: Robot, i: int) -> bool:
 
 
 def with_balls(robot: Robot, T: NDArray, screws: NDArray) -> NDArray:
-    """Replace the motion screws of ball joints by rotations about the base axes.
+    """Replace the joint screws of ball joints by rotations about the base axes.
 
     Args:
         robot: robot of n frames.
@@ -75,8 +74,7 @@ def with_balls(robot: Robot, T: NDArray, screws: NDArray) -> NDArray:
         screws: (n, 6) screws of unit joint motions, at the base's origin.
 
     Returns:
-        (n, 6) screws that span the same motions, with three independent rotations for
-        every ball joint at every posture.
+        (n, 6) screws with three independent rotations for every ball joint.
     """
     screws = screws.copy()
     for ball in ball_joints(robot):

@@ -1,12 +1,13 @@
 """Map tolerance callouts of drawings to geometric errors delta l of the frames.
 
 Each feature of a body deviates from its nominal position by a small screw: the screw
-within its tolerance zone plus the screw of its datum frame.  The datum frame is built
-from the datums A, B and C in this order: A fixes the components that its shape
-determines, B fixes components that A leaves free, and C the remaining ones.  A feature
-before its joint is the end of a body; its screw is the geometric error delta l of the
-frame.  A feature after its joint is the start of the next body.  All frames carried by
-the joint then move relative to the feature by the opposite screw.
+within its tolerance zone plus the screw of its datum frame.  The datum frame is
+constructed from the datums A, B and C.  Datum A fixes the components that its shape
+determines, B fixes components that A does not fix, and C fixes the remaining
+components.  A feature before its joint is the end of a body; its screw is the geometric
+error delta l of the frame.  A feature after its joint is the start of the next body.
+The frames that the joint carries then move relative to the feature by the opposite
+screw.
 """
 
 from collections.abc import Mapping
@@ -37,7 +38,7 @@ from forcefit.assembly.model.robot import Robot
 from forcefit.inputs.table import BadInput, quoted
 from forcefit.stiffness.screws import screw_map, transform
 
-_RANK = 1e-9  # singular values below this are round-off
+_RANK = 1e-9  # smaller singular values are round-off
 
 # name of a frame; True for the body after its joint, False for the body before it
 Side = tuple[str, bool]
@@ -45,36 +46,36 @@ Side = tuple[str, bool]
 
 @dataclass(frozen=True, eq=False)
 class _Bodies:
-    """Rigid bodies of a robot in its home pose, with the frames at their features."""
+    """Rigid bodies of a robot in its home pose."""
 
     robot: Robot
-    before: NDArray  # (n, 4, 4) frames before the motion of their joints, base axes
-    after: NDArray  # (n, 4, 4) frames after the motion of their joints, base axes
-    groups: tuple[int, ...]  # body carried by each frame's joint; the base is last
+    before: NDArray  # (n, 4, 4) frames before their joint motion, seen from the base
+    after: NDArray  # (n, 4, 4) frames after their joint motion, seen from the base
+    # body that each frame's joint carries; the last is the base
+    groups: tuple[int, ...]
 
     def body(self, side: Side) -> int:
-        """Return the number of the body on a side of a frame."""
+        """Return the index of the body before or after the joint of a frame."""
         row = self.robot.index(side[0])
         return self.groups[row if side[1] else self.robot.parents[row]]
 
     def pose(self, side: Side) -> NDArray:
-        """Return the (4, 4) pose of a frame at home, before or after its joint."""
+        """Return the home pose of a frame before or after its joint motion, (4, 4)."""
         return (self.after if side[1] else self.before)[self.robot.index(side[0])]
 
 
 def place_callouts(home: Posture) -> tuple[PlacedCallout, ...]:
-    """Compute the effect of a robot's tolerance callouts on its frame errors.
+    """Compute the frame errors due to the tolerance callouts of a robot.
 
     Args:
         home: home posture of the robot.
 
     Returns:
-        The callouts in the order of the robot, followed by datum shifts at maximum
-        material.
+        The callouts in the order of the robot, followed by the datum shifts.
 
     Raises:
-        BadInput: a feature has two callouts, a datum is not on the body of the feature,
-            datums form a cycle, or a callout contradicts the nominal geometry.
+        BadInput: a feature has two callouts, a datum is on another body, datums form a
+            cycle, or a callout contradicts the nominal geometry.
     """
     callouts = home.robot.callouts
     if not callouts:
@@ -124,14 +125,14 @@ def place_callouts(home: Posture) -> tuple[PlacedCallout, ...]:
 
 
 def _own_screw(zone: Zone, end: int, total: int) -> NDArray:
-    """Return the (6, total) screw of a zone per unit coordinate of all zones."""
+    """Return the screw of a feature per unit of the coordinates of all zones."""
     screw = np.zeros((6, total))
     screw[:, end - sum(zone.dimensions) : end] = zone.columns
     return screw
 
 
 def _check_names(names: list[str], callouts: tuple[Callout, ...]) -> None:
-    """Raise BadInput if two features would have the same name in tables."""
+    """Raise BadInput if two features have the same name in tables."""
     for k, name in enumerate(names):
         if name in names[:k]:
             fault = f"found {quoted(name)} twice, expected a different name per feature"
@@ -139,9 +140,9 @@ def _check_names(names: list[str], callouts: tuple[Callout, ...]) -> None:
 
 
 def _bodies(home: Posture) -> _Bodies:
-    """Return the bodies: groups of frames that closures or fixed joints connect."""
+    """Group the frames that are connected by fixed joints or closures."""
     robot, n = home.robot, len(home.robot.frames)
-    # the last entry is the base, because parent index -1 refers to it
+    # The parent index -1 refers to the last entry, the base.
     group = list(range(n + 1))
 
     def root(i: int) -> int:
@@ -164,7 +165,7 @@ def _bodies(home: Posture) -> _Bodies:
 def _datum_sides(
     bodies: _Bodies, callout: Callout, sides: Mapping[Side, int]
 ) -> list[Side]:
-    """Return the frame of each datum, and its side on the body of the feature."""
+    """Return the frame and side of each datum on the body of a feature."""
     body = bodies.body((callout.feature, callout.after))
     found = []
     for name in (datum.frame for datum in callout.datums):
@@ -177,7 +178,7 @@ def _datum_sides(
             fault = f"found the datum {quoted(name)}, which is the feature itself"
             fault += ", expected another feature of the body"
             raise BadInput(fault_of(callout, fault))
-        # if both sides of a rigid connection qualify, prefer the one with callouts
+        # Of two rigidly connected sides, the side with callouts is selected.
         found.append(next((side for side in here if side in sides), here[0]))
     return found
 
@@ -185,7 +186,7 @@ def _datum_sides(
 def _order(
     callouts: tuple[Callout, ...], datums: list[list[Side]], sides: Mapping[Side, int]
 ) -> list[int]:
-    """Return the callouts sorted so that datums precede features that refer to them."""
+    """Return the callouts sorted with datums before the features that refer to them."""
     needs = {
         k: [sides[side] for side in datums[k] if side in sides]
         for k in range(len(callouts))
@@ -199,7 +200,7 @@ def _order(
 
 
 def _feature_pose(bodies: _Bodies, callout: Callout) -> NDArray:
-    """Return the (4, 4) home pose of a feature: origin in its middle, z its axis."""
+    """Return the home pose of a feature: origin at its middle, z along its axis."""
     pose = bodies.pose((callout.feature, callout.after))
     return pose @ transform(np.array(callout.at), callout.axes)
 
@@ -208,7 +209,7 @@ def _datum_pose(
     bodies: _Bodies, datum: Datum, side: Side, callouts: tuple[Callout, ...],
     sides: Mapping[Side, int],
 ) -> NDArray:  # fmt: skip
-    """Return the (4, 4) home pose of a datum, in the axes of its own callouts."""
+    """Return the home pose of a datum."""
     if side in sides:
         return _feature_pose(bodies, callouts[sides[side]])
     return bodies.pose(side) @ transform(np.array(datum.at), axes_along(datum.axis))
@@ -226,7 +227,7 @@ def _zone(
     offset = R.T @ (pose[:3, 3] - of_datum[:3, 3])
     axis = None if shape == "point" else R.T @ of_datum[:3, 2]
     try:
-        same = None  # the feature at a fixed joint can be a face or a bore
+        same = None  # a feature at a fixed joint can be a face or a bore
         if shape != "body":
             same = (shape == "plane") == (callout.shape == "plane")
         check_orientation(callout, np.eye(3)[2], axis, same)
@@ -236,7 +237,7 @@ def _zone(
 
 
 def _to_feature(pose: NDArray) -> NDArray:
-    """Return the (6, 6) map of screws from the base's origin to a pose and its axes."""
+    """Return the map of screws from the base origin to a pose and its axes, (6, 6)."""
     R = pose[:3, :3]
     return screw_map(-R.T @ pose[:3, 3], R.T)
 
@@ -246,7 +247,7 @@ def _datum_frame(
     callouts: tuple[Callout, ...], sides: Mapping[Side, int], screws: NDArray,
     shifts: Mapping[int, NDArray],
 ) -> NDArray:  # fmt: skip
-    """Return the (6, M) screw of the datum frame per unit of each zone coordinate."""
+    """Return the screw of the datum frame per unit of each zone coordinate, (6, M)."""
     D, free = np.zeros(screws.shape[1:]), np.eye(6)
     for j, (datum, side) in enumerate(zip(callout.datums, datums, strict=True)):
         pose = _datum_pose(bodies, datum, side, callouts, sides)
@@ -254,8 +255,8 @@ def _datum_frame(
         if j in shifts:
             own = own + shifts[j]
         to_datum = _to_feature(pose)
-        # divide lengths by the distance from the feature, so that rad and m have equal
-        # weights
+        # Lengths are divided by the distance to the feature, so that rad and m have
+        # equal weights.
         gap = pose[:3, 3] - _feature_pose(bodies, callout)[:3, 3]
         scale = np.repeat([1.0, 1.0 / max(float(np.linalg.norm(gap)), 1e-3)], 3)[
             :, None
@@ -276,7 +277,7 @@ def _datum_frame(
 def _add_errors(
     errors: NDArray, bodies: _Bodies, callout: Callout, screw: NDArray
 ) -> None:
-    """Add the frame errors delta l caused by a feature's screw (6, M)."""
+    """Add the frame errors delta l that the screw of a feature causes."""
     robot, row = bodies.robot, bodies.robot.index(callout.feature)
     pose = _feature_pose(bodies, callout)
     if not callout.after:
@@ -291,5 +292,5 @@ def _add_errors(
 
 
 def _carried(old: NDArray, new: NDArray) -> NDArray:
-    """Return the (6, 6) map of screws from one pose to another, in the poses' axes."""
+    """Return the map of screws from one pose and its axes to another, (6, 6)."""
     return _to_feature(new) @ np.linalg.inv(_to_feature(old))

@@ -1,10 +1,9 @@
-"""Close robots whose nominal loops are open, by assigning the mismatch to a part.
+"""Close robots whose nominal loops are open.
 
-Published dimensions and coordinates of redundant drives are rounded, so closures may
-not hold exactly.  The mismatch is assigned either to the body of a frame, as a
-geometric error, or to the elastic drives, as a preload.  The nominal geometry of the
-returned robot closes.  Together, its nominal geometry and geometric errors reproduce
-the given robot.
+Published dimensions and coordinates of redundant drives are rounded, so loops may not
+close exactly.  The mismatch becomes either a geometric error of a body or a preload of
+the elastic drives.  The loops of the nominal geometry then close.  Nominal geometry and
+geometric errors together are equivalent to the given robot.
 """
 
 from collections.abc import Callable, Mapping
@@ -25,8 +24,8 @@ from forcefit.assembly.model.robot import Robot
 from forcefit.inputs.table import BadInput, nearest
 from forcefit.stiffness.screws import rotation_matrix, rotation_vector, transform
 
-_OPEN = 1e-9  # [rad, m] mismatch up to which a closure counts as closed
-_SMALL = 0.1  # [rad, m] limit below which a mismatch counts as a small motion
+_OPEN = 1e-9  # [rad, m] largest mismatch of a closed loop
+_SMALL = 0.1  # [rad, m] largest mismatch that is a small motion
 
 
 def closing_of(
@@ -42,12 +41,11 @@ def closing_of(
         mismatch: ``"spring"``, see :func:`preloaded`.
         joints: coordinates of drives for ``mismatch``.
         own_errors: whether to retain the geometric errors of the robot.  If False, only
-            the errors due to its closures are retained, because random samples replace
-            the others.
+            the errors due to its closures are retained.
 
     Returns:
-        A function that maps a declared robot to a closed one; None if neither ``rest``
-        nor ``mismatch`` is given.
+        A function that closes a robot; None if neither ``rest`` nor ``mismatch`` is
+        given.
 
     Raises:
         BadInput: ``mismatch`` is not ``"spring"``.
@@ -70,21 +68,20 @@ def closing_of(
 
 
 def rest_in(robot: Robot, name: str) -> Robot:
-    """Assign the closure mismatch of a robot to a frame as a geometric error.
+    """Assign the closure mismatch to a frame as a geometric error.
 
     Args:
-        robot: any robot.  Its drives are at their ``position``, and its passive joints
+        robot: any robot, with drives at their ``position``.  Its passive joints
             minimise the mismatch.
-        name: name of a frame, or of a joint of several frames, in the loop that does
-            not close.  For a universal joint, the mismatch is assigned to its first
-            bearing.
+        name: name of a frame or joint in the open loop.  For a universal joint, the
+            mismatch is assigned to its first bearing.
 
     Returns:
-        A robot whose nominal geometry closes.  Including its geometric errors, it is
-        identical to the given robot.
+        A robot whose nominal loops close.  Including its geometric errors, it is
+        equivalent to the given robot.
 
     Raises:
-        BadInput: there is no such frame, no loop through it is open, or the mismatch is
+        BadInput: there is no such frame, it is not in an open loop, or the mismatch is
             not a small motion.
     """
     if name not in (names := names_of(robot)):
@@ -103,7 +100,7 @@ def rest_in(robot: Robot, name: str) -> Robot:
             return _corrected(robot, row, own @ to @ np.linalg.inv(at) @ T[row])
     raise BadInput(
         f'--rest: frame "{name[:60]}": found no open loop through it; expected '
-        "a frame between the two frames of a closure that does not hold"
+        "a frame between the two frames of an open closure"
     )
 
 
@@ -134,7 +131,7 @@ def _corrected(robot: Robot, row: int, X: NDArray) -> Robot:
 
 
 def preloaded(robot: Robot, joints: Mapping[str, float] | None = None) -> Robot:
-    """Preload the elastic drives of a robot by its closure mismatch.
+    """Preload the elastic drives of a robot with its closure mismatch.
 
     Args:
         robot: robot with redundant drives that are elastic.
@@ -142,13 +139,13 @@ def preloaded(robot: Robot, joints: Mapping[str, float] | None = None) -> Robot:
             ``position``.
 
     Returns:
-        A robot whose home pose is the nearest pose that closes.  The error of each
-        drive is the difference from its requested coordinate, which is taken up by the
-        spring of the drive.
+        A robot whose home pose is the nearest pose at which all loops close.  The
+        geometric error of each drive is the difference from its requested coordinate.
+        The drive spring compensates this difference.
 
     Raises:
-        BadInput: a drive is unknown, no closing coordinates exist nearby, or a drive
-            that must take up a difference is rigid.
+        BadInput: a drive is unknown, the loops do not close at nearby coordinates, or a
+            drive that must deform is rigid.
     """
     target = joint_target(robot, joints or {})
     assert target.coordinates is not None
@@ -164,8 +161,8 @@ def preloaded(robot: Robot, joints: Mapping[str, float] | None = None) -> Robot:
     closes = near.reached[0] and there.mismatch[0] <= _OPEN
     if not closes or np.abs(differs).max() > _SMALL:
         raise BadInput(
-            f"{robot.name}: no posture near these drive coordinates closes; "
-            "expected coordinates at which all loops close except for rounded digits"
+            f"{robot.name}: the loops do not close near these drive coordinates; "
+            "expected coordinates at which all loops close up to rounded digits"
         )
     closed = _positioned(robot, there.coordinates[0])
     frames = []
@@ -200,12 +197,12 @@ def _positioned(robot: Robot, q: NDArray) -> Robot:
 
 
 def _independent(robot: Robot, T: NDArray) -> NDArray:
-    """Return (n,) bool, True for a set of non-redundant drives, in file order."""
+    """Return a mask (n,) of non-redundant drives."""
     A = closure_matrices(robot, T)[0][0]
     driven = np.array([f.actuated for f in robot.frames])[mobile(robot)]
     loose = ~driven
     for column in np.flatnonzero(driven)[::-1]:
-        # a drive is redundant if the other drives determine it through the closures
+        # A drive is redundant if the other drives determine its coordinate.
         others = np.append(np.flatnonzero(loose), column)
         if _rank(A[:, others]) > _rank(A[:, loose]):
             loose[column] = True

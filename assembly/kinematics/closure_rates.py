@@ -1,4 +1,4 @@
-"""Velocities of the closures for given joint rates, with drives free or locked."""
+"""Velocities of the closures for given joint rates."""
 
 from functools import lru_cache
 
@@ -8,15 +8,15 @@ from numpy.typing import NDArray
 from forcefit.assembly.kinematics.nominal import mobile, motion_screws, size_of
 from forcefit.assembly.model.robot import Robot
 
-# relative size below which a singular value of the closures counts as zero. Closures
-# hold to 1e-10; near a singularity, the posture error is the square root of this value
+# Relative size below which a singular value of the closures is treated as zero. Closure
+# errors are 1e-10; near a singularity, the posture error is their square root.
 SINGULAR = 1e-6
-_NOISE = 30.0  # assumed noise of the singular values divided by the closure error
+_NOISE = 30.0  # assumed ratio of singular value noise to closure error
 
 
 @lru_cache(maxsize=64)
 def closure_signs(robot: Robot) -> NDArray:
-    """Return (closures, n): +1 on the first chain, -1 on the second, 0 if shared."""
+    """Return signs (closures, n): +1 on the first chain, -1 on the second, else 0."""
     paths = robot.on_path.astype(int)
     pairs = [(robot.index(a), robot.index(b)) for a, b in robot.closures]
     count = len(robot.frames)
@@ -35,7 +35,7 @@ def closure_matrices(robot: Robot, T: NDArray) -> tuple[NDArray, NDArray, NDArra
     Returns:
         (k, 6 c, m) velocities of the closures; (k, m, a + 6) velocities of the drives
         and the platform; (k, m, 6) velocities of the platform.  Lengths are in
-        reference lengths, at the platform's origin in base axes.
+        reference lengths.  Velocities refer to the platform's origin and base axes.
     """
     size = size_of(robot)
     i = robot.index(robot.platform)
@@ -69,7 +69,7 @@ def locked_closures(robot: Robot, T: NDArray) -> NDArray:
 
 
 def locked_ranks(robot: Robot, T: NDArray) -> NDArray:
-    """Return the (k,) ranks of the matrices of :func:`locked_closures`."""
+    """Return the ranks of the matrices of :func:`locked_closures`."""
     values = np.linalg.svd(locked_closures(robot, T), compute_uv=False)
     return (values > SINGULAR * values[:, :1].clip(1e-300)).sum(axis=1)
 
@@ -80,8 +80,8 @@ def redundant_drives(robot: Robot, T: NDArray, left_open: float = 0.0) -> int:
     Args:
         robot: robot of n frames.
         T: (n, 4, 4) frames seen from the base.
-        left_open: [rad, m] closure error at this posture; singular values of this size
-            count as zero.
+        left_open: [rad, m] closure error at this posture; smaller singular values are
+            treated as zero.
 
     Returns:
         The rank of all closures minus the rank with the drives locked.

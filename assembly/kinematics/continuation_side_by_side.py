@@ -17,10 +17,10 @@ def tree_of(fields: dict[str, Any]) -> Any:
     """Return the kinematic tree of a robot as a C++ object.
 
     Args:
-        fields: arrays and numbers of ``Tree`` in ``assembly/kernels/records.h``.
+        fields: arrays and numbers of the C++ structure ``Tree``.
 
     Returns:
-        The tree, whose arrays have been checked.
+        The tree with checked arrays.
 
     Raises:
         ValueError: the shape, type or memory order of an array is wrong.
@@ -40,8 +40,8 @@ def follow_side_by_side(
         poses: (k, 6) ``[tx ty tz rx ry rz]``, NaN for free components; no rows if no
             poses are given.
         held: (k, n) coordinates, NaN for free coordinates.
-        guess: whether ``start`` is a guess at which the closures are open.  In this
-            case, a single step of unlimited length is made.
+        guess: whether the closures are open at ``start``.  In this case, a single step
+            of unlimited length is made.
         track: track to fill.
     """
     out = (track.coordinates, track.progress, track.transforms, track.closure_mismatch)
@@ -51,7 +51,7 @@ def follow_side_by_side(
     asked = np.isfinite(np.hstack([poses, held]) if len(poses) else held)
     left = np.arange(len(held))
     while left.size:
-        # the targets of one call must prescribe the same components
+        # The targets of one call must prescribe the same components.
         same = (asked[left] == asked[left[0]]).all(axis=1)
         rows, left = left[same], left[~same]
         whole = len(rows) == len(held)
@@ -67,5 +67,5 @@ def _follow(
     tree: Any, given: tuple[NDArray, NDArray, NDArray], guess: bool,
     out: tuple[NDArray, ...],
 ) -> None:  # fmt: skip
-    """Follow targets that prescribe the same components of pose and coordinates."""
+    """Follow targets that prescribe the same components."""
     kernels.follow_all(tree, *map(np.ascontiguousarray, given), guess, *out)

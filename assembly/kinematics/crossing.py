@@ -1,9 +1,9 @@
-"""Test whether a posture is separated from the home pose by a singularity.
+"""Test whether there is a singularity between a posture and the home pose.
 
 With drives locked, the closure matrix A (6 c, p) of the passive joints has rank r at
-almost all postures.  In bases of its range and row space that are transported along a
-path from home, A is a square matrix.  A sign change of its determinant shows that the
-path crossed a singularity.
+almost all postures.  Along a path from home, A is expressed in bases of its range and
+row space and is then a square matrix.  The path crosses a singularity if the sign of
+the determinant changes.
 """
 
 from functools import lru_cache
@@ -17,15 +17,15 @@ from forcefit.assembly.kinematics.posture import Posture, home_posture, pose_com
 from forcefit.assembly.kinematics.singular_posture import rank_near
 from forcefit.assembly.model.robot import Robot
 
-_ALIKE = 0.3  # smallest accepted overlap of the bases at both ends of a step
+_ALIKE = 0.3  # smallest accepted overlap of the bases of two successive points
 _STEPS = (
     4,
     32,
-)  # numbers of steps per path, tried in this order if the bases rotate too far
+)  # numbers of steps per path; the second is used if the overlap is too small
 
 
 def beyond_singularity(robot: Robot, target: Target, T: NDArray) -> NDArray:
-    """Return which postures are separated from home by a singularity.
+    """Return True for postures with a singularity between home and the posture.
 
     Args:
         robot: robot of n frames.
@@ -64,8 +64,8 @@ def _compared(A: NDArray, B: NDArray, rank: int) -> tuple[NDArray, NDArray]:
     """Return the signs of det B in the bases of A, and the overlap of the bases.
 
     Returns:
-        (k,) signs of the determinants; (k,) overlaps, 1 if the bases of A and B span
-        the same space, 0 if a direction of one is missing in the other.
+        (k,) signs of the determinants; (k,) overlaps, 1 if A and B span the same space,
+        0 if a direction of one space is orthogonal to the other.
     """
     U, _, Vt = np.linalg.svd(A)
     U, V = U[..., :rank], np.swapaxes(Vt[:, :rank], -1, -2)
@@ -83,7 +83,7 @@ def _compared(A: NDArray, B: NDArray, rank: int) -> tuple[NDArray, NDArray]:
 def _along(
     robot: Robot, home: Posture, target: Target, steps: int, rank: int, ends: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Return signs and smallest overlaps of bases transported along paths from home."""
+    """Return signs and smallest overlaps along paths from home."""
     before = locked_closures(robot, home.transforms[None]).repeat(len(ends), axis=0)
     signs, alike = np.ones(len(ends)), np.ones(len(ends))
     for k in range(1, steps + 1):
@@ -91,7 +91,7 @@ def _along(
         if k < steps:
             track = follow(robot, home.coordinates, _part(home, target, k / steps))
             A = locked_closures(robot, track.transforms)
-            # a point of the path is omitted if it cannot be reached
+            # Unreachable points of the path are omitted.
             A = np.where(track.reached[:, None, None], A, before)
         sign, near = _compared(before, A, rank)
         signs, alike, before = signs * sign, np.minimum(alike, near), A
@@ -99,7 +99,7 @@ def _along(
 
 
 def _part(home: Posture, target: Target, part: float) -> Target:
-    """Return the target at a fraction of the straight line from home to it."""
+    """Return the point at a fraction of the straight line from home to a target."""
 
     def between(start: NDArray, end: NDArray | None) -> NDArray | None:
         return None if end is None else start + part * (end - start)

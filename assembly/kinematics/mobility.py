@@ -1,8 +1,8 @@
-"""Mobility and redundant constraints of the ideal robot, from ranks of its closures.
+"""Mobility and redundant constraints of the nominal robot.
 
 :func:`mobility` counts the degrees of freedom at one posture.  :func:`platform_screws`
-returns the free motions of the platform there.  :func:`mobility_near` counts the
-degrees of freedom at postures close to it.
+returns the free motions of the platform at this posture. :func:`mobility_near` counts
+the degrees of freedom at nearby postures.
 """
 
 from collections import Counter
@@ -20,32 +20,30 @@ from forcefit.assembly.kinematics.ranks import MISMATCH_FACTOR, rank_of
 from forcefit.assembly.model.contact_closures import contact_closures
 from forcefit.results.display import html_table
 
-# relative size below which singular values count as zero: files are rounded to 6
-# digits, and singular postures have errors of sqrt(1e-10), the closure error
+# Relative size below which singular values are treated as zero. Files are rounded to 6
+# digits, and singular postures have errors of sqrt(1e-10).
 ZERO = 1e-5
-# [rad, lengths] smallest platform motion that counts, for unit joint rates
+# [rad, lengths] smallest platform motion for unit joint rates that is not noise
 _PLATFORM_RANK = 1e-6
-_ERROR = 10.0  # assumed error of free motions times the ratio of singular values
+_ERROR = 10.0  # assumed error of free motions relative to the ratio of singular values
 _NOISE = 1e-14  # relative round-off error of singular values
 _DISTANCE = 0.05  # [rad or reference lengths] distance to nearby postures
 _NEIGHBOURS = 16  # largest number of nearby postures
-_AGREEING = 3  # number of nearby postures whose counts must agree
+_AGREEING = 3  # number of nearby postures that must have equal counts
 _EXACT = 1e-12  # [rad, m] closure error that is only round-off
-_LEAST = 1e-8  # relative size below which singular values count as zero at _EXACT
+_LEAST = 1e-8  # threshold of singular values for closure errors below _EXACT
 _CLOSED = 1e-6  # [rad, m] largest closure error of a nearby posture
-_BACK = 0.1  # fraction of the distance; a posture that moved less counts as unchanged
+_BACK = 0.1  # fraction of _DISTANCE; smaller motions are ignored
 
 
 @dataclass(frozen=True)
 class Mobility:
-    """Degrees of freedom at one posture, with joints rigid except for their motion.
+    """Degrees of freedom at one posture of a rigid robot without clearance.
 
     Attributes:
         freedoms: number of independent joint motions that preserve all closures, with
             the drives free.
-        platform_freedoms: number of independent motions of the platform among them.
-            The remaining ones are local motions of the legs that leave the platform at
-            rest.
+        platform_freedoms: number of independent motions of the platform.
         freedoms_drives_locked: number of independent joint motions that preserve all
             closures, with the drives locked.
         platform_freedoms_drives_locked: number of independent motions of the platform,
@@ -60,13 +58,14 @@ class Mobility:
         smallest_singular_value: [-] smallest nonzero singular value of the constraint
             matrix, with lengths divided by the size of the robot.  A value near zero
             indicates a nearby singularity.
-        local_freedoms: ``freedoms`` minus ``platform_freedoms``.
-        actuation_redundancy: number of redundant drives, which is the number of drives
-            minus the degrees of freedom that they lock.
-        singular_value_gap: [-] smallest singular value that counts as nonzero, divided
-            by the largest that counts as zero, or by the round-off error if there is
-            none.  The smaller of the two ratios with drives free and drives locked is
-            given.  If it is below about 100, the counts are uncertain.
+        local_freedoms: number of motions of the legs alone, ``freedoms`` minus
+            ``platform_freedoms``.
+        actuation_redundancy: number of drives minus the degrees of freedom that they
+            lock.
+        singular_value_gap: [-] ratio of the smallest nonzero singular value to the
+            largest value that is treated as zero, or to round-off.  The smaller of the
+            ratios with drives free and locked is given.  If it is below about 100, the
+            counts are uncertain.
     """
 
     freedoms: int
@@ -91,9 +90,9 @@ class NearMobility:
 
     Attributes:
         freedoms: smallest number of degrees of freedom at these postures; 0 if the
-            degrees of freedom at the given posture are only infinitesimal.
-        there: counts at a nearby posture with this number; None if no posture was
-            found.
+            given posture has only infinitesimal motions.
+        there: mobility at a nearby posture with this number of degrees of freedom, or
+            None.
     """
 
     freedoms: int
@@ -105,9 +104,8 @@ def mobility(posture: Posture, tolerance: float = ZERO) -> Mobility:
 
     Args:
         posture: the robot's configuration.
-        tolerance: relative size below which a singular value counts as zero.  It is
-            increased to 30 times the nominal closure error caused by rounded numbers in
-            the robot file.
+        tolerance: relative size below which a singular value is treated as zero.  The
+            smallest value is 30 times the nominal closure error.
 
     Returns:
         The counts.
@@ -148,9 +146,9 @@ def platform_screws(posture: Posture) -> tuple[NDArray, float]:
         posture: the robot's configuration.
 
     Returns:
-        (k, 6) [rad, m] screws of the k ``platform_freedoms``, at the platform's origin
-        in base axes, orthonormal after lengths are divided by the robot's size; and the
-        error [rad, reference lengths] of these screws.
+        (k, 6) [rad, m] screws of the k ``platform_freedoms`` at the platform's origin,
+        base axes.  They are orthonormal if lengths are in reference lengths.  Also
+        their error [rad, reference lengths].
     """
     A, P = _rates(posture)
     moves = mobile(posture.robot)
@@ -162,15 +160,15 @@ def platform_screws(posture: Posture) -> tuple[NDArray, float]:
 
 
 def mobility_near(posture: Posture, here: Mobility) -> NearMobility:
-    """Return the mobility near a posture, which can be lower than at the posture.
+    """Return the mobility at nearby postures, which can be lower.
 
     Args:
         posture: the robot's configuration.
         here: mobility at this posture.
 
     Returns:
-        The smallest number of degrees of freedom, and the counts at a nearby posture
-        with this number.
+        The smallest number of degrees of freedom, and the mobility at a posture with
+        this number.
     """
     robot, q = posture.robot, posture.coordinates
     if here.freedoms == 0 or _certainly_least(here):
@@ -184,8 +182,7 @@ def mobility_near(posture: Posture, here: Mobility) -> NearMobility:
         if np.linalg.norm((to - q) / scale) < _BACK * _DISTANCE:
             returned += 1
         elif open_by < _CLOSED:
-            # near a singularity, singular values are proportional to the squared
-            # distance
+            # Near a singularity, singular values can be quadratic in the distance.
             zero = _LEAST if open_by < _EXACT else ZERO
             near = mobility(Posture(robot, to, track.transforms[0], open_by), zero)
             found.append(near)
@@ -196,31 +193,30 @@ def mobility_near(posture: Posture, here: Mobility) -> NearMobility:
         if _AGREEING in {returned, *agreeing.values()}:
             break
     if not found:
-        # no nearby posture was found, so no smaller count is known
+        # Without a nearby posture, no smaller count is known.
         return NearMobility(0 if returned == _AGREEING else here.freedoms, None)
     least = min(found, key=lambda m: (m.freedoms, m.freedoms_drives_locked))
     return NearMobility(min(least.freedoms, here.freedoms), least)
 
 
 def _certainly_least(here: Mobility) -> bool:
-    """Return whether independent closures rule out lower mobility elsewhere."""
+    """Return whether the closures exclude a lower mobility at other postures."""
     return here.overconstraint == 0 and here.freedoms_drives_locked == 0
 
 
 def _tolerance(posture: Posture, least: float = ZERO) -> float:
-    """Return the relative size of singular values that count as zero."""
+    """Return the relative size below which singular values are treated as zero."""
     return max(least, MISMATCH_FACTOR * float(posture.mismatch))
 
 
 def _rates(posture: Posture) -> tuple[NDArray, NDArray]:
     """Return velocities of closures and platform for unit joint rates.
 
-    Lengths, including the unit rate of a prismatic joint, are measured in units of the
-    robot's size, so that the counts do not depend on it.
+    Lengths, including the unit rate of a prismatic joint, are in reference lengths.
 
     Returns:
-        (6 closures, n) at the base's origin, without the directions that contacts leave
-        free; (6, n) at the platform's origin.
+        (6 closures, n) velocities of closures at the base's origin, without the free
+        directions of contacts; (6, n) velocities of the platform at its origin.
     """
     robot = posture.robot
     size, i = size_of(robot), robot.index(robot.platform)
@@ -242,7 +238,7 @@ class _Motions:
     Attributes:
         values: singular values of the closures, the largest first.
         joints: (k, joints) orthonormal joint rates.
-        platform: (6, k) platform motions, lengths divided by the robot's size.
+        platform: (6, k) platform motions, with lengths in reference lengths.
     """
 
     values: NDArray
@@ -262,12 +258,12 @@ class _Motions:
 
     @property
     def error(self) -> float:
-        """[rad, reference lengths] platform motions below this size count as zero."""
+        """Size [rad, reference lengths] below which platform motions are zero."""
         return max(_PLATFORM_RANK, _ERROR / self.gap)
 
     @property
     def gap(self) -> float:
-        """Smallest singular value that counts as nonzero, relative to the next one."""
+        """Ratio of the smallest nonzero singular value to the next smaller value."""
         rank = self.joints.shape[1] - len(self.joints)
         if not rank:
             return np.inf
@@ -282,8 +278,8 @@ def _motions(A: NDArray, P: NDArray, tolerance: float, least: float = 0.0) -> _M
     Args:
         A: (6 closures, joints) velocities of closures for unit joint rates.
         P: (6, joints) velocities of the platform for unit joint rates.
-        tolerance: relative size below which a singular value of A counts as zero.
-        least: absolute size below which a singular value counts as zero.
+        tolerance: relative size below which a singular value of A is treated as zero.
+        least: absolute size below which a singular value is treated as zero.
 
     Returns:
         The motions with the singular values of A.

@@ -1,9 +1,8 @@
 """Continuation from a singular home pose, where several operation modes meet.
 
-At such a pose, the closures together with a partial pose, or with the drives, do not
-determine the operation mode, and round-off would select it.  Unspecified pose
-components are therefore held at their home values if possible: first all of them, then
-the rotation, then the translation.
+At such a pose, neither drive coordinates nor a partially specified platform pose
+determine the operation mode.  Unspecified pose components are therefore fixed at their
+home values if possible: first all components, then the rotation, then the translation.
 """
 
 from dataclasses import fields
@@ -16,25 +15,24 @@ from forcefit.assembly.kinematics.nominal import Target, follow
 from forcefit.assembly.kinematics.track import Track
 from forcefit.assembly.model.robot import Robot
 
-# [rad, m] largest error of closures and pose at which a target counts as reached
+# [rad, m] largest error of closures and pose for a reached target
 _CLOSED = 1e-8
-# pose components [tx ty tz rx ry rz] held at their home values, in the order of the
-# attempts
+# pose components [tx ty tz rx ry rz] that each attempt fixes at their home values
 _KEPT = (range(6), range(3, 6), range(3))
 
 
 def follow_in_mode(
     robot: Robot, home: NDArray, pose: NDArray, target: Target, singular: bool
 ) -> Track:
-    """Follow the closures from home to many targets within one operation mode.
+    """Move the robot from home to many targets within one operation mode.
 
     Args:
         robot: robot of n frames.
-        home: (n,) [rad or m] coordinates of the home pose.
-        pose: (6,) ``[tx ty tz rx ry rz]`` [m, rad] of the platform there.
+        home: (n,) [rad or m] joint coordinates of the home pose.
+        pose: (6,) ``[tx ty tz rx ry rz]`` [m, rad] of the platform at home.
         target: k poses or sets of coordinates.
-        singular: whether modes meet at home.  If False, unspecified components are held
-            only if the target cannot be reached otherwise.
+        singular: whether home is a singular pose.  If False, unspecified components are
+            fixed only at targets that cannot be reached otherwise.
 
     Returns:
         The ends of the tracks, and their progress.
@@ -53,7 +51,7 @@ def follow_in_mode(
 
 
 def _held(target: Target, pose: NDArray, kept: range) -> Target:
-    """Set selected unspecified components of a target to their home values."""
+    """Set selected unspecified components to their home values."""
     goal = np.full((len(target), 6), np.nan)
     if target.pose is not None:
         goal = np.array(target.pose, dtype=float)
@@ -65,7 +63,7 @@ def _try(
     robot: Robot, home: NDArray, target: Target, track: Track, rows: NDArray,
     whatever: bool,
 ) -> None:  # fmt: skip
-    """Follow modified targets, and store those that were reached."""
+    """Move to modified targets, and store the reached targets."""
     found = follow(robot, home, target)
     good = whatever | (found.reached & (found.mismatch < _CLOSED))
     for one in fields(Track):

@@ -13,7 +13,7 @@ from forcefit.assembly.kinematics.nominal import Target, follow, mobile, size_of
 from forcefit.assembly.kinematics.track import Track
 from forcefit.assembly.model.robot import Robot
 
-_CORRECTIONS = 3  # number of corrections; near a singularity they converge slowly
+_CORRECTIONS = 3  # number of corrections of the closure error
 _ROUNDING = 1e-13  # [rad, m] closure error that is only round-off
 
 
@@ -43,7 +43,7 @@ def near_postures(
 
 
 def _steps_aside(robot: Robot, T: NDArray, distance: float, count: int) -> NDArray:
-    """Return (count, n) random joint steps that are tangent to the closures."""
+    """Return random joint steps that are tangent to the closures, (count, n)."""
     A = closure_matrices(robot, T[None])[0][0]
     _, values, Vt = np.linalg.svd(A)
     rank = int((values > SINGULAR * values[:1]).sum())

@@ -1,9 +1,8 @@
 """Solve the nominal closures for the joint coordinates.
 
-Many targets are followed together, each along a straight line from the home pose.
-Steps are damped Gauss-Newton steps of minimum norm.  Coordinates that are not
-determined by closures and target therefore do not change, and overconstrained robots
-need no special treatment.  The loops are compiled:
+The robot moves to each target along a straight line from the home pose, by damped
+Gauss-Newton steps of minimum norm.  Coordinates that closures and target do not
+determine therefore do not change.  The iterations are compiled, see
 :mod:`forcefit.assembly.kinematics.continuation_side_by_side`.
 """
 
@@ -21,14 +20,14 @@ from forcefit.assembly.kinematics.continuation_side_by_side import (
 from forcefit.assembly.kinematics.track import Track
 from forcefit.assembly.model.robot import Robot
 
-# joint types in C++; a helical joint is a revolute joint with a lead
+# codes of joint types in C++; a helical joint is a revolute joint with a lead
 KINDS = {"fixed": 0, "revolute": 1, "prismatic": 2, "helical": 1}
-NOT_CLOSED = "expected a configuration in which every closure holds"
+NOT_CLOSED = "expected a configuration in which all loops close"
 
 
 @dataclass(frozen=True, eq=False)
 class Target:
-    """Targets of a continuation: poses or coordinates, NaN for free components.
+    """Targets of a motion from home: poses or coordinates, NaN for free components.
 
     Attributes:
         pose: (k, 6) ``[tx ty tz rx ry rz]`` [m, rad] of the platform, or None.
@@ -55,7 +54,7 @@ def size_of(robot: Robot) -> float:
 
 
 def mobile(robot: Robot) -> NDArray:
-    """Return (n,) bool, True for joints that are not fixed."""
+    """Return a mask (n,) of joints that are not fixed."""
     return np.array([f.joint != "fixed" for f in robot.frames])
 
 
@@ -81,9 +80,9 @@ def motion_screws(robot: Robot, T: NDArray) -> NDArray:
 
 @lru_cache(maxsize=64)
 def _tree(robot: Robot) -> dict[str, Any]:
-    """Return the fields of a compiled tree, cached for each robot."""
+    """Return the fields of the compiled tree of a robot."""
     pairs = [[robot.index(name) for name in pair] for pair in robot.closures]
-    # a frame is defined before its joint, so the joint does not move it
+    # A joint does not move its own frame.
     carries = robot.on_path - np.eye(len(robot.frames))
     moved = [carries[a] - carries[b] for a, b in pairs]
     moved.append(carries[robot.index(robot.platform)])
@@ -108,14 +107,14 @@ def _tree_side_by_side(robot: Robot) -> Any:
 
 
 def follow(robot: Robot, start: NDArray, target: Target, guess: bool = False) -> Track:
-    """Follow the nominal closures from one configuration to many targets.
+    """Move the nominal robot from one configuration to many targets.
 
     Args:
         robot: robot of n frames.
-        start: (n,) coordinates that close.
+        start: (n,) joint coordinates with closed loops.
         target: k poses or sets of prescribed coordinates.
-        guess: whether ``start`` is a guess at which the closures can be open.  In this
-            case, a single step is made.
+        guess: whether the loops can be open at ``start``.  In this case, a single step
+            is made.
 
     Returns:
         The ends of the tracks, and their progress.

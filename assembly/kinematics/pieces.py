@@ -1,9 +1,9 @@
-"""Subdivide beams: one link is modelled as several springs in series.
+"""Divide beams into elements in series.
 
-A single spring at the end of a beam is accurate for small bending angles: its error
-grows with the square of the angle.  If the beam is cut into n pieces of length L / n,
-each of them a frame with a spring, the bending angle of each piece is proportional to 1
-/ n and the error to 1 / n^2.  Results for small motions do not change.
+The error of a single spring at the end of a beam is proportional to the square of the
+bending angle.  If the beam is divided into n elements, each a frame with a spring, the
+bending angle of an element is proportional to 1 / n and the error to 1 / n^2.  Results
+for small motions do not change.
 """
 
 from dataclasses import dataclass, replace
@@ -18,15 +18,14 @@ from forcefit.stiffness.screws import rotation_matrix
 
 @dataclass(frozen=True, eq=False)
 class CutRobot:
-    """Robot whose beams are cut into pieces, each of which is a frame.
+    """Robot whose beams are divided into elements, each of which is a frame.
 
     Attributes:
         robot: robot of m frames, m >= n.
-        owner: (m,) index of the original frame to which each frame of the cut robot
-            belongs.
-        last: (n,) index in the cut robot of the last piece of each original frame.
-        back: (m,) [m] distance from the origin of the original frame to the end of the
-            piece, along the beam.
+        owner: (m,) index of the original frame for each frame of the divided robot.
+        last: (n,) index of the last element of each original frame.
+        back: (m,) [m] distance along the beam between the end of the element and the
+            origin of the original frame.
     """
 
     robot: Robot
@@ -35,14 +34,14 @@ class CutRobot:
     back: NDArray
 
     def cut(self, posture: Posture) -> Posture:
-        """Return one or many postures with a frame for each piece.
+        """Return one or many postures with a frame for each element.
 
         Args:
-            posture: posture of the robot before the cut, arrays (..., n) and (..., n,
-                4, 4).
+            posture: posture of the original robot, with arrays (..., n) and (..., n, 4,
+                4).
 
         Returns:
-            Posture of the cut robot, arrays (..., m) and (..., m, 4, 4).
+            Posture of the divided robot, with arrays (..., m) and (..., m, 4, 4).
         """
         T = posture.transforms[..., self.owner, :, :].copy()
         for row in np.flatnonzero(self.back):
@@ -54,20 +53,21 @@ class CutRobot:
         return Posture(self.robot, q, T, posture.mismatch)
 
     def spread(self, rows: NDArray) -> NDArray:
-        """Return (..., m, k): the given rows at the beam ends, and zeros elsewhere."""
+        """Return rows (..., m, k), with the given rows at the last elements."""
         spread = np.zeros((*rows.shape[:-2], len(self.owner), rows.shape[-1]))
         spread[..., self.last, :] = rows
         return spread
 
 
 def cut_beams(robot: Robot) -> CutRobot:
-    """Return a robot with one frame for every piece of its beams.
+    """Return a robot with one frame for every beam element.
 
     Args:
         robot: robot of n frames.
 
     Returns:
-        The cut robot; its frames are those of ``robot`` if no beam has several pieces.
+        The divided robot.  Without beams of several elements, its frames are those of
+        ``robot``.
     """
     frames: list[Frame] = []
     owner, last, back = [], [], []
@@ -83,7 +83,7 @@ def cut_beams(robot: Robot) -> CutRobot:
 
 
 def _pieces(frame: Frame) -> list[tuple[Frame, float]]:
-    """Return the pieces of one body from base to tip, with distances to its tip."""
+    """Return the elements of a body from base to tip, and distances to its tip."""
     link = frame.link
     if not isinstance(link, BeamLink) or link.pieces == 1:
         return [(frame, 0.0)]

@@ -17,12 +17,12 @@ class PlacedCallout:
     """A tolerance callout with its zone and the resulting frame errors.
 
     Attributes:
-        callout: callout as stated in the drawing.
+        callout: tolerance callout.
         zone: tolerance zone of the feature, in the feature's axes.
-        errors: (n, 6, m) [rad, m] delta l of all n frames per unit of each of the
-            zone's m coordinates.
-        datum: datum at maximum material if the zone describes the shift of this datum;
-            None for a zone of the feature itself.
+        errors: (n, 6, m) [rad, m] delta l of n frames per unit of the m zone
+            coordinates.
+        datum: datum at maximum material if the zone describes the shift of this datum,
+            otherwise None.
     """
 
     callout: Callout
@@ -32,34 +32,34 @@ class PlacedCallout:
 
     @property
     def words(self) -> str:
-        """Text with the toleranced characteristic, or with the datum that shifts."""
+        """Text about the toleranced characteristic, or about the shifted datum."""
         if self.datum is None:
             return self.callout.words
         return f"shift of datum {self.datum.hole_of}"
 
     @property
     def name(self) -> str:
-        """Name in tables, such as ``"position of bore 2 on link_a"``."""
+        """Printed name, such as ``"position of bore 2 on link_a"``."""
         return f"{self.words} of {self.callout.name}"
 
     @property
     def hole_of(self) -> str:
-        """Name of the hole whose actual size changes the zone's width; may be empty."""
+        """Name of the hole whose actual size changes the width of the zone, or ""."""
         return self.callout.hole_of if self.datum is None else self.datum.hole_of
 
     @property
     def hole(self) -> str:
-        """Size of the hole :attr:`hole_of`, such as ``"12 H7"``, or an empty text."""
+        """Nominal size and tolerance of the hole, such as ``"12 H7"``, or ""."""
         return self.callout.hole if self.datum is None else self.datum.hole
 
 
 def fault_of(callout: Callout, found: str) -> str:
-    """Return an error message that begins with the name of the callout's feature."""
+    """Return an error message about the feature of a callout."""
     return f"tolerance of {quoted(callout.name)}: {found}"
 
 
 def fits_by_parts(robot: Robot) -> dict[str, str]:
-    """Return the fits by part name, which defaults to the name of the frame."""
+    """Return the fits by part name, or by frame name for fits without part name."""
     ends = robot.fitted_ends
     return {ends[f].parts if f in ends else f: text for f, text in robot.fits.items()}
 
@@ -68,16 +68,16 @@ def check_holes(
     robot: Robot, placed: Sequence[PlacedCallout],
     body_of: Callable[[tuple[str, bool]], int],
 ) -> None:  # fmt: skip
-    """Reject contradictory data for holes with the maximum material condition.
+    """Check that data of holes with the maximum material condition are consistent.
 
     Args:
         robot: robot to which the callouts belong.
         placed: callouts of the robot, and shifts of its datums.
-        body_of: function that returns the number of the body on a side of a frame.
+        body_of: function that returns the index of the body before or after a joint.
 
     Raises:
-        BadInput: a hole has two sizes, its size differs from that of its fit, or it
-            lies on two bodies.
+        BadInput: a hole has two sizes, a size other than that of its fit, or two
+            bodies.
     """
     fits, seen = fits_by_parts(robot), dict[str, tuple[str, int]]()
     for one in placed:

@@ -1,4 +1,4 @@
-"""Robot at a posture: the poses of its frames, and the maps of small screws.
+"""Poses of the frames of a robot at a posture, and maps of small screws.
 
 ======  ==================  ============  =========================================
 symbol  code                shape         meaning
@@ -9,8 +9,9 @@ M_j     ``paths``           (..., n,6,6)  eqs (13)-(15): map from a screw at fra
                                           its axes, to the platform, in base axes
 ======  ==================  ============  =========================================
 
-The printed eq. (14) is off by one: its product down to h = j maps a screw expressed in
-frame ant(j).  ``paths`` maps a screw expressed in frame j, ``[R 0; [p_j - p]x R, R]``.
+The index in the printed eq. (14) is wrong by one, because its product down to h = j
+maps a screw in frame ant(j).  ``paths`` maps a screw in frame j, ``[R 0; [p_j - p]x R,
+R]``.
 """
 
 from collections.abc import Mapping, Sequence
@@ -41,8 +42,8 @@ from forcefit.results.display import (
 from forcefit.stiffness.screws import rotation_matrix, rotation_vector, screw_map
 
 POSE = ("tx", "ty", "tz", "rx", "ry", "rz")
-_HOME_TOLERANCE = 1e-6  # [rad, m] accepted mismatch at home, for rounded files
-# accepted mismatch relative to the reference length, for robots smaller than 100 mm
+_HOME_TOLERANCE = 1e-6  # [rad, m] largest mismatch at home due to rounded files
+# largest mismatch relative to the reference length, for small robots
 _SMALL = 1e-5
 
 
@@ -85,7 +86,7 @@ class Posture:
         }
 
     def __getitem__(self, rows: Any) -> "Posture":
-        """Return one of many postures by its number, or a selection."""
+        """Return one of many postures by its index, or a selection."""
         mismatch = np.broadcast_to(self.mismatch, self.transforms.shape[:-3])[rows]
         return replace(
             self, coordinates=self.coordinates[rows], transforms=self.transforms[rows],
@@ -94,12 +95,12 @@ class Posture:
 
     @cached_property
     def platform(self) -> NDArray:
-        """(..., 4, 4) nominal platform pose seen from the base."""
+        """Nominal platform pose in base axes, (..., 4, 4)."""
         return self.transforms[..., self.robot.index(self.robot.platform), :, :]
 
     @cached_property
     def paths(self) -> NDArray:
-        """(..., n, 6, 6) maps from screws at each frame to the platform, base axes."""
+        """Maps of screws at each frame to the platform, base axes, (..., n, 6, 6)."""
         platform = self.robot.index(self.robot.platform)
         if self.transforms.ndim > 3:
             return _paths(Unchanged(self.transforms), platform)
@@ -107,7 +108,7 @@ class Posture:
 
     @property
     def distinct(self) -> "tuple[Posture, NDArray]":
-        """The c distinct postures among R postures, and (R,) their indices."""
+        """Distinct postures, and the index of each posture among them."""
         coordinates, transforms, which = _distinct(
             Unchanged(self.coordinates), Unchanged(self.transforms)
         )
@@ -145,7 +146,7 @@ def together(postures: Sequence[Posture]) -> Posture:
 
 @dataclass(frozen=True)
 class Unchanged:
-    """Read-only array, so that results computed from it can be cached."""
+    """Read-only array for cached results."""
 
     numbers: NDArray
 
@@ -157,14 +158,14 @@ class Unchanged:
 
 
 def _maps_to(transforms: NDArray, platform: int) -> NDArray:
-    """Return (..., n, 6, 6) maps of screws at each frame to a platform, base axes."""
+    """Return the maps of screws at each frame to the platform, (..., n, 6, 6)."""
     offsets = transforms[..., :3, 3] - transforms[..., platform, None, :3, 3]
     return screw_map(offsets, transforms[..., :3, :3])
 
 
 @lru_cache(maxsize=2)
 def _paths(transforms: Unchanged, platform: int) -> NDArray:
-    """Return the maps at many postures, cached for all robots with these transforms."""
+    """Return the maps at many postures, cached by the transforms."""
     paths = _maps_to(transforms.numbers, platform)
     paths.flags.writeable = False
     return paths
@@ -174,7 +175,7 @@ def _paths(transforms: Unchanged, platform: int) -> NDArray:
 def _distinct(
     coordinates: Unchanged, transforms: Unchanged
 ) -> tuple[NDArray, NDArray, NDArray]:
-    """Return the distinct postures, and for each given posture its index among them."""
+    """Return the distinct postures, and the index of each given posture."""
     q = coordinates.numbers
     _, first, which = np.unique(q, axis=0, return_index=True, return_inverse=True)
     return q[first], transforms.numbers[first], which.reshape(-1)
@@ -204,10 +205,10 @@ def content_of(
         postures: one or many postures; the key contains their transforms and the
             parents of their frames.
         arrays: arrays of numbers.
-        names: any other data on which the result depends, compared by ``repr``.
+        names: other data on which the result depends, compared by ``repr``.
 
     Returns:
-        The key, which also holds references to the given objects.
+        The key with references to the given objects.
     """
     digest = blake2b(repr((names, [a.shape for a in arrays])).encode())
     for array in (postures.robot.parents, *arrays):
@@ -223,7 +224,7 @@ def pose_components(T: NDArray) -> NDArray:
 
 @lru_cache(maxsize=64)
 def home_posture(robot: Robot) -> Posture:
-    """Return the home pose: actuated joints at ``position``, passive joints solved.
+    """Return the posture of a robot at home, with drives at their ``position``.
 
     Args:
         robot: any robot.
@@ -233,8 +234,7 @@ def home_posture(robot: Robot) -> Posture:
 
     Raises:
         BadInput: the mismatch of a closure exceeds 1e-6 rad or m, or 1e-5 times the
-            length of the longest body if that is smaller; the message names the
-            closure.
+            length of the longest body if this is smaller.
     """
     actuated = np.array([f.actuated for f in robot.frames])
     held = np.where(actuated, robot.positions, np.nan)
@@ -248,9 +248,9 @@ def home_posture(robot: Robot) -> Posture:
         a, b = robot.closures[k]
         way_out = _way_out(robot, track.transforms[0], float(track.mismatch[0]))
         raise BadInput(
-            f'{robot.name}: closure[{k + 1}] ("{a}", "{b}") does not hold in the home '
-            f"pose: off by {_either(turned[k], shifted[k], least)}"
-            f"{way_out}; --rest NAME makes it a geometric error of a frame in that loop"
+            f'{robot.name}: closure[{k + 1}] ("{a}", "{b}") is open in the home pose: '
+            f"found a gap of {_either(turned[k], shifted[k], least)}"
+            f"{way_out}; with --rest NAME, the gap becomes a geometric error of a frame"
         )
     return _posture(robot, track, 0)
 
@@ -265,10 +265,10 @@ def _left_open(robot: Robot, T: NDArray) -> tuple[NDArray, NDArray]:
 
 
 def _either(turned: float, shifted: float, least: float) -> str:
-    """Describe the mismatch of a closure by its rotation or its translation."""
+    """Return the rotation or the translation of a closure mismatch as text."""
     if shifted < least:
-        return f"{turned:.3g} rad with the actuated joints held, expected < 1e-06"
-    return f"{shifted:.3g} m with the actuated joints held, expected < {least:.3g}"
+        return f"{turned:.3g} rad with locked drives, expected < 1e-06 rad"
+    return f"{shifted:.3g} m with locked drives, expected < {least:.3g} m"
 
 
 def _way_out(robot: Robot, T: NDArray, left_open: float = 0.0) -> str:
@@ -285,7 +285,7 @@ def _way_out(robot: Robot, T: NDArray, left_open: float = 0.0) -> str:
 
 @lru_cache(maxsize=64)
 def home_is_singular(robot: Robot) -> bool:
-    """Return whether operation modes meet at home; see :func:`is_singular`."""
+    """Return whether the home posture is singular."""
     home = home_posture(robot)
     return is_singular(robot, home.coordinates, home.transforms)
 
@@ -297,16 +297,15 @@ def place_robot(
 ) -> Posture:
     """Return the posture for a nominal platform pose, or for actuated coordinates.
 
-    The closures are followed from the home pose along a straight line, so the assembly
-    mode is that of the home pose.  Components that the input leaves undetermined stay
-    near their home values.  At a singular home pose, where several operation modes
-    meet, unspecified components are held at their home values if possible, with
-    priority given to the rotation.
+    The robot moves from the home pose along a straight line, so the assembly mode is
+    that of the home pose.  Undetermined components remain near their home values.  If
+    the home pose is singular, unspecified components are fixed at their home values if
+    possible, the rotation first.
 
     Args:
         robot: any robot.
-        pose: any of ``tx ty tz`` [m], ``rx ry rz`` [rad], the platform's translation
-            and rotation vector in base axes; unspecified components are free.
+        pose: translation ``tx ty tz`` [m] and rotation vector ``rx ry rz`` [rad] of the
+            platform in base axes; unspecified components are free.
         joints: coordinates [rad or m] of actuated joints by frame; the others stay at
             their ``position``.
 
@@ -315,7 +314,7 @@ def place_robot(
 
     Raises:
         BadInput: both arguments are given, a name is unknown, a value is not finite, or
-            the pose cannot be reached; the message states the remaining distance.
+            the pose cannot be reached.
     """
     if pose and joints:
         raise BadInput("found both a pose and joints, expected only one of the two")
@@ -355,7 +354,7 @@ def joint_target(robot: Robot, joints: Mapping[str, float]) -> Target:
 
 
 def _finite(whose: str, value: float, largest: float) -> float:
-    """Return the value; raise BadInput if it is not finite or its size is too large."""
+    """Return the value; raise BadInput if it is not finite or too large."""
     if not np.isfinite(value):
         raise BadInput(f"{whose}: found {value}, expected a finite number")
     if abs(value) > largest:
@@ -375,7 +374,7 @@ def place_many(
 
     Returns:
         Two lists with one entry for each pose: the posture, or None if the pose cannot
-            be reached; and the reason for the failure, or an empty string.
+        be reached; and the reason for the failure, or an empty string.
 
     Raises:
         BadInput: the robot's closures do not hold in its home pose.
@@ -405,7 +404,7 @@ def place_many_joints(
 def _follow_many(
     robot: Robot, target: Target
 ) -> tuple[list[Posture | None], list[str]]:
-    """Return the posture of each target, or None and the reason for failure."""
+    """Return the posture of each target, or None, and the reason of each failure."""
     track = _follow(robot, target)
     postures = [
         _posture(robot, track, i) if reached else None
@@ -419,7 +418,7 @@ def _follow_many(
 
 
 def _follow(robot: Robot, target: Target) -> Track:
-    """Follow targets from home within one operation mode."""
+    """Move from home to the targets within one operation mode."""
     home = home_posture(robot)
     pose = pose_components(home.platform)
     singular = home_is_singular(robot)
@@ -427,7 +426,7 @@ def _follow(robot: Robot, target: Target) -> Track:
 
 
 def unreached(robot: Robot, track: Track, target: Target, i: int) -> str:
-    """Explain why target i was not reached, with the remaining distance."""
+    """Return a message about a target that was not reached."""
     if target.pose is None:
         remaining = (1.0 - track.progress[i]) * 100
         return (
@@ -461,7 +460,7 @@ def unreached(robot: Robot, track: Track, target: Target, i: int) -> str:
 
 
 def _posture(robot: Robot, track: Track, i: int) -> Posture:
-    """Return the end of track i as a posture with read-only arrays."""
+    """Return the end of a track as a posture with read-only arrays."""
     q, T = track.coordinates[i].copy(), track.transforms[i].copy()
     q.setflags(write=False)
     T.setflags(write=False)

@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
 
-# both limits allow for files rounded to 6 digits; with parallel rods, the platform
-# rotates by ten times the rounding of the file
+# Both limits allow for robot files that are rounded to 6 digits.
 _TURN = 1e-4  # [rad] largest rotation per reference length of a pure translation
 _PITCH = 1e-5  # [reference lengths] largest translation per rad of a pure rotation
 
@@ -25,8 +24,8 @@ class PureMotion:
     Attributes:
         kind: ``"translation"``, ``"turn"`` (rotation) or ``"screw"`` (helical motion).
         direction: (3,) unit vector along the translation, or along the axis.
-        point: (3,) [m] a point on the axis; None for a translation, or for a rotation
-            whose axis is arbitrary.
+        point: (3,) [m] point on the axis; None for a translation, or for a rotation
+            about an arbitrary axis.
         pitch: [m] translation per turn of a helical motion; None for other kinds.
     """
 
@@ -41,15 +40,15 @@ def pure_motions(
 ) -> list[PureMotion]:
     """Return independent motions that span a space of screws.
 
-    Translations come first.  The remaining motions are rotations if all their axes can
-    meet at a single point; otherwise they are the principal screws of the system.
+    Translations come first.  The remaining motions are rotations if their axes can
+    intersect at one point, otherwise the principal screws of the system.
 
     Args:
         screws: (k, 6) [rad, m] independent screws at a point, base axes.
         at: (3,) [m] that point.
         size: [m] reference length used to compare translations with rotations.
-        error: [rad, reference lengths] error of the screws, below which components
-            count as zero.
+        error: [rad, reference lengths] error of the screws; smaller components are
+            treated as zero.
 
     Returns:
         k motions in base axes.
@@ -63,7 +62,7 @@ def pure_motions(
     if not turning:
         return slides
     axes = _plain_basis(Wt[:turning], zero)
-    # velocities at c due to these rotations, without free translations
+    # velocities at c due to the rotations, without free translations
     across = _complement(free, zero)
     rates = axes @ np.linalg.pinv(w, rcond=zero) @ v @ across.T @ across
     point, anywhere = _common_point(axes, rates, across, exact)
@@ -74,14 +73,14 @@ def pure_motions(
 
 
 def _plain_basis(rows: NDArray, zero: float) -> NDArray:
-    """Return unit vectors that span the row space, along base axes if possible."""
+    """Return unit vectors that span the row space, if possible along base axes."""
     rank = int((np.linalg.svd(rows, compute_uv=False) > zero).sum()) if len(rows) else 0
     if rank == 3:
         return np.eye(3)
     P = np.linalg.pinv(rows, rcond=zero) @ rows if rank else np.zeros((3, 3))
     basis: list[NDArray] = []
     for _ in range(rank):
-        # choose the base axis closest to the remaining space
+        # Select the base axis that is closest to the remaining space.
         k = int(np.argmax(np.round(np.diag(P), 9)))
         d = P[k] / np.linalg.norm(P[k])
         d = np.where(np.abs(d) < 1e-12, 0.0, d)
@@ -92,7 +91,7 @@ def _plain_basis(rows: NDArray, zero: float) -> NDArray:
 
 
 def _complement(rows: NDArray, zero: float) -> NDArray:
-    """Return (3 - rank, 3) orthonormal rows that are orthogonal to all rows."""
+    """Return an orthonormal basis of the vectors orthogonal to all rows."""
     if not len(rows):
         return np.eye(3)
     _, values, Vt = np.linalg.svd(rows)
@@ -102,18 +101,18 @@ def _complement(rows: NDArray, zero: float) -> NDArray:
 def _common_point(
     axes: NDArray, rates: NDArray, across: NDArray, zero: float
 ) -> tuple[NDArray | None, bool]:
-    """Return the point nearest to the origin through which all axes can pass.
+    """Return a point through which all axes can pass.
 
     Args:
         axes: (r, 3) unit vectors.
         rates: (r, 3) velocities at the origin, without free translations.
         across: (m, 3) directions in which translations are not free.
-        zero: [lengths] largest difference of velocities that counts as zero.
+        zero: [lengths] velocity difference below which velocities are equal.
 
     Returns:
-        (3,) the point, or None if there is none; and whether the point is arbitrary.
+        (3,) the point nearest to the origin, or None; and whether it is arbitrary.
     """
-    # p x axis must equal the velocity at the origin, except for free translations
+    # The product p x axis equals the velocity at the origin up to free translations.
     rows = np.vstack([across @ -_cross(axis) for axis in axes])
     goal = np.concatenate([across @ rate for rate in rates])
     point = np.linalg.lstsq(rows, goal, rcond=zero)[0]
@@ -123,14 +122,14 @@ def _common_point(
 
 
 def _cross(a: NDArray) -> NDArray:
-    """Return the (3, 3) matrix of the cross product a x."""
+    """Return the matrix of the cross product a x, (3, 3)."""
     return np.cross(a, np.eye(3)).T
 
 
 def _principal_screws(
     axes: NDArray, rates: NDArray, at: NDArray, size: float, zero: float
 ) -> list[PureMotion]:
-    """Return the principal screws, whose pitches w.v / w.w are stationary."""
+    """Return the principal screws of a screw system."""
     Q = axes @ rates.T
     pitches, mix = eigh((Q + Q.T) / 2, axes @ axes.T)
     found = []

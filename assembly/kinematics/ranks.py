@@ -1,4 +1,4 @@
-"""Thresholds below which singular values of closures count as zero.
+"""Thresholds below which singular values of closures are treated as zero.
 
 The same thresholds are used by the compiled methods.
 """
@@ -6,21 +6,22 @@ The same thresholds are used by the compiled methods.
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-RANK = 1e-10  # relative size below which a singular value counts as zero
-ROWS_RANK = 1e-9  # the same for closure equations that only clearances can satisfy
-# this factor times the nominal closure error is added to RANK, for rounded robot files
+RANK = 1e-10  # relative size below which a singular value is treated as zero
+# the same threshold for closure equations without springs and free motions
+ROWS_RANK = 1e-9
+# factor of the nominal closure error, which is added to RANK
 MISMATCH_FACTOR = 30.0
-# relative round-off of columns that a projection removes
+# relative round-off of columns after a projection
 NOISE = 1e-12
-UNBOUNDED = 1e-8  # [rad, m] smallest platform motion per unit of a free motion
+UNBOUNDED = 1e-8  # [rad, m] smallest platform motion per unit of an unbounded motion
 
 
 def rank_tolerance(mismatch: float, least: float = RANK) -> float:
-    """Return the relative size below which a singular value of closures counts as zero.
+    """Return the relative size below which singular values are treated as zero.
 
     Args:
         mismatch: [rad, m] nominal closure error.
-        least: threshold for closures that hold exactly.
+        least: threshold without closure error.
 
     Returns:
         The threshold.
@@ -29,12 +30,12 @@ def rank_tolerance(mismatch: float, least: float = RANK) -> float:
 
 
 def rank_of(values: NDArray, tolerance: float, noise: float = 0.0) -> int:
-    """Return the number of singular values that do not count as zero.
+    """Return the number of singular values above the thresholds.
 
     Args:
         values: (k,) singular values, the largest first.
-        tolerance: fraction of the largest value that a value must exceed.
-        noise: absolute threshold that a value must exceed.
+        tolerance: threshold relative to the largest value.
+        noise: absolute threshold.
 
     Returns:
         The rank; 0 without values.
@@ -43,7 +44,7 @@ def rank_of(values: NDArray, tolerance: float, noise: float = 0.0) -> int:
 
 
 def noise_of(columns: ArrayLike) -> float:
-    """Estimate the round-off in columns that a projection removes.
+    """Estimate the round-off of columns after a projection.
 
     Args:
         columns: (m, n) columns before the projection.

@@ -1,6 +1,6 @@
 r"""Finite motions on SE(3): exponential, logarithm, and their derivatives.
 
-A constant screw s that acts for unit time produces the finite motion ``exp(s)``; the
+A constant velocity screw s during unit time produces the finite motion ``exp(s)``.  The
 screw is expressed in the axes of the initial frame.  All functions are vectorised over
 leading axes.
 
@@ -32,7 +32,7 @@ _SERIES = 9
 _STUMPFF = np.array([
     [1 / math.factorial(2 * j + k) for k in range(6)] for j in range(_SERIES)
 ])  # fmt: skip
-_ROUNDING = 1e-16  # [-] size below which terms of the second derivative are omitted
+_ROUNDING = 1e-16  # [-] smaller terms of the second derivative are omitted
 
 
 def exponential(screw: ArrayLike) -> NDArray:
@@ -70,20 +70,20 @@ def logarithm(T: ArrayLike) -> NDArray:
 
 
 def inverse(T: NDArray) -> NDArray:
-    """Return the (..., 4, 4) inverse motions."""
+    """Return the inverse motions, (..., 4, 4)."""
     R_inverse = np.swapaxes(T[..., :3, :3], -1, -2)
     return transform(-(R_inverse @ T[..., :3, 3, None])[..., 0], R_inverse)
 
 
 def turn_jacobian(turn: ArrayLike) -> NDArray:
-    """Return (..., 3, 3) J of SO(3): small rotation per change of a rotation vector."""
+    """Return the left Jacobian of SO(3), (..., 3, 3)."""
     W = skew(turn)
     _, _, c2, c3, *_ = stumpff(np.asarray(turn, dtype=float))
     return np.eye(3) + c2 * W + c3 * (W @ W)
 
 
 def left_jacobian(screw: ArrayLike) -> NDArray:
-    """Return the small motion, in the initial axes, per change of a screw.
+    """Return the left Jacobian J of SE(3).
 
     Args:
         screw: (..., 6) [rad, m] screws.
@@ -111,8 +111,7 @@ def second_form(screw: ArrayLike, wrench: ArrayLike) -> NDArray:
     """Return the work of a wrench on the second-order term of the exponential.
 
     To second order, ``exp(s + h) = exp(J h + D(h, h) / 2) exp(s)``.  This function
-    returns the matrix of the quadratic form ``w.D(h, h)``, evaluated to machine
-    precision from the bracket series of J.
+    returns the matrix of the quadratic form ``w.D(h, h)``.
 
     Args:
         screw: (..., 6) s [rad, m].
@@ -141,7 +140,7 @@ def second_form(screw: ArrayLike, wrench: ArrayLike) -> NDArray:
 
 
 def _orders(screws: NDArray) -> int:
-    """Return the number of bracket orders whose terms exceed round-off."""
+    """Return the number of terms of the bracket series that exceed round-off."""
     most = float(np.linalg.norm(screws[..., :3], axis=-1).max(initial=0.0))
     order, size = 2, most
     while size > _ROUNDING:
@@ -151,7 +150,7 @@ def _orders(screws: NDArray) -> int:
 
 
 def bracket(screw: ArrayLike) -> NDArray:
-    """Return (..., 6, 6) matrix of the screws' bracket, ``bracket(a) @ b = [a, b]``."""
+    """Return the matrix of the Lie bracket, with ``bracket(a) @ b = [a, b]``."""
     s = np.asarray(screw, dtype=float)
     A = np.zeros((*s.shape[:-1], 6, 6))
     A[..., :3, :3] = A[..., 3:, 3:] = skew(s[..., :3])
@@ -160,7 +159,7 @@ def bracket(screw: ArrayLike) -> NDArray:
 
 
 def bracket_form(wrench: ArrayLike) -> NDArray:
-    """Return (..., 6, 6) antisymmetric Omega: ``a @ Omega @ b = wrench @ [a, b]``."""
+    """Return the antisymmetric form Omega: ``a @ Omega @ b = wrench @ [a, b]``."""
     w = np.asarray(wrench, dtype=float)
     form = np.zeros((*w.shape[:-1], 6, 6))
     form[..., :3, :3] = -skew(w[..., :3])
@@ -169,7 +168,7 @@ def bracket_form(wrench: ArrayLike) -> NDArray:
 
 
 def stumpff(turn: NDArray) -> list[NDArray]:
-    """Return Stumpff functions c_0 .. c_5 of the angle, c_k = sum (-a^2)^j / (2j + k)!.
+    """Return the Stumpff functions c_k = sum (-a^2)^j / (2j + k)! for k = 0 to 5.
 
     Args:
         turn: (..., 3) [rad] rotation vectors.

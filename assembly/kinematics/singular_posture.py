@@ -1,10 +1,8 @@
 """Singular postures, at which the robot with locked drives gains a degree of freedom.
 
-With locked drives, a robot retains the degrees of freedom that its closures allow.  At
-a singular posture it has more of them than at nearby postures, because its closures are
-linearly dependent to first order.  Small errors can then cause large motions, or none.
-Equations (17) to (27) are linear in the errors.  At a singular posture they determine
-neither whether the robot can be assembled nor how large its errors are.  Operation
+At such postures, the closure equations are linearly dependent to first order, and small
+errors can cause large motions.  Equations (17) to (27) are linear in the errors, so
+they determine neither whether the robot can be assembled nor its pose error.  Operation
 modes meet at singular postures (Zlatanov, Bonev, Gosselin 2002).
 
 Start with :func:`is_singular`.
@@ -21,11 +19,11 @@ from forcefit.assembly.kinematics.nominal import Target, follow
 from forcefit.assembly.model.robot import Robot
 
 _ASIDE = 0.02  # [rad or reference lengths] distance to nearby postures
-_NEIGHBOURS = 6  # number of nearby postures, at least one of which must not be singular
-# relative size above which a singular value at a nearby posture counts as nonzero
+_NEIGHBOURS = 6  # number of nearby postures
+# relative size above which singular values at nearby postures are nonzero
 _APART = 1e-5
 _CLOSED = 1e-8  # [rad, m] largest closure error of a nearby posture
-_NOISE = 1e3  # singular values below this factor times the closure error count as zero
+_NOISE = 1e3  # ratio to the closure error below which singular values are zero
 
 
 def is_singular(robot: Robot, q: NDArray, T: NDArray) -> bool:
@@ -37,17 +35,17 @@ def is_singular(robot: Robot, q: NDArray, T: NDArray) -> bool:
         T: (n, 4, 4) frames seen from the base.
 
     Returns:
-        True if the robot has more degrees of freedom than at nearby postures; False if
-        their number is the same nearby, as for robots without drives.
+        True if the robot has more degrees of freedom than at nearby postures.  False
+        for robots without drives.
     """
     rank = int(locked_ranks(robot, T[None])[0])
-    # the rank cannot exceed the number of columns
+    # The rank cannot exceed the number of columns.
     most = sum(f.passive for f in robot.frames)
     return rank < most and rank < rank_near(robot, q, T)
 
 
 def rank_near(robot: Robot, q: NDArray, T: NDArray) -> int:
-    """Return the largest rank of the locked closures at a posture and near it.
+    """Return the largest rank of the closures with locked drives near a posture.
 
     Args:
         robot: robot of n frames.

@@ -1,9 +1,9 @@
-r"""Distance of a posture from each kind of singularity, and the joints that move there.
+r"""Distance of a posture from each kind of singularity, and the singular motions.
 
-The closures of the rigid robot allow its drives and its platform a space of motions.
-In an orthonormal basis of this space, with rates (q_a, t) of drives and platform,
-Q_a^T Q_a + Q_t^T Q_t = 1.  The two parts have singular values cos(a_i) and sin(a_i),
-and the map from the drives to the platform has the singular values tan(a_i).
+The drives and the platform of the rigid robot have a space of possible rates (q_a, t).
+An orthonormal basis of this space satisfies Q_a^T Q_a + Q_t^T Q_t = 1.  The matrices
+Q_a and Q_t have singular values cos(a_i) and sin(a_i), and the map from the drives to
+the platform has the singular values tan(a_i).
 
 ======== ==================== ==================================================
 code     zero means           kind of Gosselin and Angeles
@@ -38,8 +38,8 @@ from forcefit.results.display import html_table, largest_row, short_repr
 from forcefit.stiffness.screws import SCREW
 
 KINDS = ("serial", "parallel", "closure")
-_RANK = 1e-9  # relative size below which a singular value counts as zero
-# [rad or lengths] motions of the drives at which ranks are computed
+_RANK = 1e-9  # relative size below which a singular value is treated as zero
+# [rad or lengths] drive motions at which ranks are computed
 _PERTURBATIONS = (0.0, 0.013, -0.021)
 
 
@@ -48,15 +48,14 @@ class Singularities:
     """Distances of k postures from the three kinds of singularity.
 
     Attributes:
-        serial: (k,) sine of the smallest angle a_i, 0 at a serial singularity; at most
-            1.
+        serial: (k,) sine of the smallest angle a_i, 0 at a serial singularity.
         parallel: (k,) cosine of the largest angle a_i, 0 at a parallel singularity.
-        closure: (k,) smallest singular value of the closures, excluding those that are
+        closure: (k,) smallest singular value of the closures, without values that are
             zero at every posture.
         serial_joints: (k, n) joint rates of the motion at the serial singularity.
         parallel_joints: (k, n) joint rates of the motion at the parallel singularity.
-        parallel_screws: (k, 6) the platform's motion at the parallel singularity.
-        closure_joints: (k, n) joint rates with the smallest resistance by the closures.
+        parallel_screws: (k, 6) platform motion at the parallel singularity.
+        closure_joints: (k, n) joint rates with the smallest closure velocity.
     """
 
     serial: NDArray
@@ -71,9 +70,9 @@ class Singularities:
 
     @property
     def condition(self) -> NDArray:
-        """(k,) tan(a_max) / tan(a_min): condition of the map from drives to platform.
+        """Condition number of the map from drives to platform, tan(a_max) / tan(a_min).
 
-        The number is defined for robots with as many drives as degrees of freedom; NaN
+        It is defined for robots with as many drives as degrees of freedom, and NaN
         without drives.
         """
         least, most = self.serial, self.parallel
@@ -86,7 +85,7 @@ class Singularities:
 
         Args:
             robot: the same robot.
-            near: distance below which a singularity is mentioned.
+            near: distance below which a singularity is described.
 
         Returns:
             Texts such as ``"parallel: left.elbow, platform TY"``; empty if no
@@ -117,20 +116,19 @@ def find_singularities(robot: Robot, transforms: NDArray) -> Singularities:
     """Return the distances of many postures from singularities.
 
     Args:
-        robot: robot of n frames; only its geometry matters.
+        robot: robot of n frames.
         transforms: (k, n, 4, 4) frames seen from the base.
 
     Returns:
         The distances in the order of the postures.  The distance is 1 for kinds of
-        singularity that the robot cannot have, for example closure singularities of a
-        robot without closures.
+        singularity that the robot cannot have.
     """
     return _measure(robot, transforms, _generic_ranks(robot))
 
 
 @dataclass(frozen=True)
 class _Ranks:
-    """Ranks of the closures, of Q and of its platform part, away from singularities."""
+    """Ranks of the closures, of Q and of Q_t at regular postures."""
 
     closures: int
     motions: int
@@ -139,13 +137,14 @@ class _Ranks:
 
 @lru_cache(maxsize=16)
 def _generic_ranks(robot: Robot) -> _Ranks:
-    """Return the largest ranks at home and at perturbed drives."""
+    """Return the largest ranks at home and for perturbed drives."""
     home = home_posture(robot)
     driven = np.array([f.actuated for f in robot.frames])
     unit = np.array([
         size_of(robot) if f.joint == "prismatic" else 1.0 for f in robot.frames
     ])
-    # the drives move by different amounts: equal steps can stay in a singular set
+    # The drives move by different amounts, because postures can remain singular for
+    # equal amounts.
     spread = 1.0 + 0.37 * np.arange(len(robot.frames)) % 1.0
     goals = np.where(
         driven, home.coordinates + np.outer(_PERTURBATIONS, unit * spread), np.nan
@@ -159,12 +158,12 @@ def _generic_ranks(robot: Robot) -> _Ranks:
 
 
 def _rank(A: NDArray, least: float = _RANK) -> int:
-    """Return the number of singular values above round-off, or above a given size."""
+    """Return the number of singular values above a relative size."""
     return rank_of(np.linalg.svd(A, compute_uv=False), least, noise=least)
 
 
 def _null_space(A: NDArray, rank: int) -> tuple[NDArray, NDArray, NDArray]:
-    """Return the null space, and the smallest nonzero singular value with its row."""
+    """Return the null space, the smallest nonzero singular value and its vector."""
     if not rank:
         return np.broadcast_to(np.eye(A.shape[2]), (len(A), *A.shape[2:] * 2)), *(
             np.ones(len(A)), np.zeros((len(A), A.shape[2]))
@@ -174,14 +173,13 @@ def _null_space(A: NDArray, rank: int) -> tuple[NDArray, NDArray, NDArray]:
 
 
 def _measure(robot: Robot, T: NDArray, ranks: _Ranks) -> Singularities:
-    """Return the distances, given the generic ranks."""
+    """Return the distances for given ranks."""
     A, B, _ = closure_matrices(robot, T)
     N, closure, resisting = _null_space(A, ranks.closures)
     measured = _drives_and_platform(N, B, ranks)
     closure = np.where(closure > SINGULAR, closure, 0.0)
     for i in np.flatnonzero(closure == 0.0).tolist():
-        # the closures allow more motions than at other postures, all of which count
-        # here
+        # Here, the closures allow more motions than at other postures.
         here = slice(i, i + 1)
         more, _, _ = _null_space(A[here], _rank(A[i], SINGULAR))
         own = _ranks_there(more[0] @ B[i], ranks)
@@ -209,9 +207,9 @@ def _measure(robot: Robot, T: NDArray, ranks: _Ranks) -> Singularities:
 
 
 def _ranks_there(moved: NDArray, generic: _Ranks) -> _Ranks:
-    """Return ranks at postures where the closures allow more motions than elsewhere."""
+    """Return the ranks at postures with additional motions."""
     motions = _rank(moved, SINGULAR)
-    # motions that never move the platform are not serial singularities
+    # Motions without platform motion at all postures are not serial singularities.
     always = generic.motions - generic.platform
     return _Ranks(generic.closures, motions, min(motions - always, 6))
 
@@ -219,11 +217,11 @@ def _ranks_there(moved: NDArray, generic: _Ranks) -> _Ranks:
 def _drives_and_platform(
     N: NDArray, B: NDArray, ranks: _Ranks
 ) -> tuple[NDArray, NDArray, NDArray, NDArray, NDArray]:
-    """Return both distances, joint rates of both motions, and a platform screw."""
+    """Return serial and parallel distances, joint rates, and a platform screw."""
     drives = B.shape[2] - 6
     W, t, Q = np.linalg.svd(N @ B, full_matrices=False)
     Q = Q[:, : ranks.motions]
-    # joint rates that correspond to the rows of Q
+    # joint rates for the rows of Q
     rates = np.swapaxes(W[:, :, : ranks.motions], 1, 2) @ N
     rates = rates / np.maximum(t[:, : ranks.motions, None], 1e-300)
     serial, still_platform = _least(Q[..., drives:], ranks.platform)
@@ -238,7 +236,7 @@ def _drives_and_platform(
 
 
 def _least(half: NDArray, rank: int) -> tuple[NDArray, NDArray]:
-    """Return the singular value number ``rank`` of each matrix, and its left vector."""
+    """Return the singular value with index ``rank`` and its left singular vector."""
     if not rank:
         return np.ones(len(half)), np.zeros(half.shape[:2])
     U, values, _ = np.linalg.svd(half, full_matrices=True)

@@ -1,4 +1,4 @@
-"""End points of a continuation to many targets."""
+"""End points of motions to many targets."""
 
 from dataclasses import dataclass
 
@@ -7,13 +7,12 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """Postures at which the continuation to each of many targets ended.
+    """Postures at the ends of motions to many targets.
 
     Attributes:
         coordinates: (k, n) joint coordinates at the end points.
         transforms: (k, n, 4, 4) frames at the end points.
-        progress: (k,) [-] fraction of the path that was followed; 1 if the target was
-            reached.
+        progress: (k,) [-] fraction of the path; 1 if the target was reached.
         closure_mismatch: (k, closures) [rad, m] largest component of each closure
             error.
     """
@@ -25,10 +24,10 @@ class Track:
 
     @property
     def reached(self) -> NDArray:
-        """(k,) bool, True if the target was reached."""
+        """True for targets that were reached, (k,)."""
         return self.progress == 1.0
 
     @property
     def mismatch(self) -> NDArray:
-        """(k,) [rad, m] largest component of all closure errors."""
+        """Largest component of all closure errors of each target, (k,) [rad, m]."""
         return self.closure_mismatch.max(axis=1, initial=0.0)

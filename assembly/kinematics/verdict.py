@@ -1,4 +1,4 @@
-"""Check a posture for joint limits, singularity, and singularities on the way to it."""
+"""Check a posture for joint limits and singularities."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ from forcefit.assembly.model.statuses import BEYOND_LIMITS, BEYOND_SINGULARITY, 
 
 SINGULAR_WORDS = "singular posture: the first-order analysis is inconclusive"
 _FAR_SIDE = "not connected to home without passing a singularity"
-# [rad, reference lengths] accepted excess of a coordinate over its limit
+# [rad, reference lengths] largest accepted excess over a joint limit
 _ROUNDING = 1e-8
 
 
@@ -32,7 +32,8 @@ def verdicts(
         target: k poses or sets of coordinates.
         q: (k, n) [rad or m] coordinates at the targets.
         T: (k, n, 4, 4) frames at the targets.
-        near: (k,) bool, True for postures to test for a singularity; None to test all.
+        near: (k,) bool, True for postures that are tested for a singularity; None for
+            all.
 
     Returns:
         For each posture :data:`BEYOND_LIMITS`, :data:`SINGULAR` or
@@ -56,7 +57,7 @@ def verdicts(
 
 
 def _singular(robot: Robot, q: NDArray, T: NDArray, near: NDArray) -> NDArray:
-    """Return (k,) bool, True if the closures with locked drives lose rank."""
+    """Return True for singular postures, (k,)."""
     singular = near.copy()
     if near.any():
         singular[near] = locked_ranks(robot, T[near]) < home_rank(robot)
@@ -66,7 +67,7 @@ def _singular(robot: Robot, q: NDArray, T: NDArray, near: NDArray) -> NDArray:
 
 
 def limits_passed(robot: Robot, q: NDArray) -> str:
-    """Describe the joints beyond their limits, with their coordinates and limits.
+    """Describe the joints that are beyond their limits.
 
     Args:
         robot: robot of n frames.
@@ -84,7 +85,7 @@ def limits_passed(robot: Robot, q: NDArray) -> str:
         room = _ROUNDING * (size_of(robot) if slides else 1.0)
         low, high = frame.limits[0] - room, frame.limits[1] + room
         if frame.passive and frame.joint == "revolute":
-            # full turns of a passive joint are subtracted from its coordinate
+            # Full turns are subtracted from the coordinate of a passive joint.
             value -= 2 * np.pi * np.floor((value - low) / (2 * np.pi))
         if not low <= value <= high:
             texts.append(
@@ -101,8 +102,8 @@ def posture_remarks(posture: Posture) -> list[str]:
         posture: posture of a robot.
 
     Returns:
-        Remarks on the operation mode if several modes meet at home, on joints beyond
-        their limits, and on a singularity between home and the posture.
+        Remarks on the operation mode if home is singular, on joints beyond their
+        limits, and on a singularity between home and the posture.
     """
     robot, q, T = posture.robot, posture.coordinates, posture.transforms
     remarks = []
@@ -122,11 +123,11 @@ def posture_remarks(posture: Posture) -> list[str]:
 
 
 def _mode(home: Posture, posture: Posture) -> str:
-    """Return the operation mode in which the platform left home."""
+    """Describe the operation mode between home and a posture."""
     moved = posture.platform @ np.linalg.inv(home.platform)
     turned = np.abs(moved[:3, :3] - np.eye(3)).max() > _ROUNDING
     shift = posture.platform[:3, 3] - home.platform[:3, 3]
     shifted = np.abs(shift).max() > _ROUNDING * size_of(posture.robot)
     if turned and shifted:
-        return "the mode in which the platform turns and shifts"
+        return "the mode in which the platform rotates and translates"
     return "pure rotation" if turned else "pure translation"

@@ -195,8 +195,8 @@ REFUSED = {
         "without clearance or joint_stiffness (add a frame after it)"),
     "a closure that does not hold": (
         "translation = [0.5, 0.0, 0.0]\njoint", "translation = [1.5, 0.0, 0.0]\njoint",
-        'four_bar: closure[1] ("coupler", "seat") does not hold in the home pose: off '
-        "by "),
+        'four_bar: closure[1] ("coupler", "seat") is open in the home pose: found a '
+        "gap of "),
     "one frame instead of many": (
         "[[closure]]", "[closure]",
         "closure: found {'frames': ['coupler', 'seat']}, expected tables "

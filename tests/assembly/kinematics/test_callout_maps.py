@@ -1,4 +1,4 @@
-"""Datum frames and frame errors, compared with hand calculation and finite motions."""
+"""Datum frames and frame errors, compared with formulas and finite motions."""
 
 from dataclasses import replace
 
@@ -13,8 +13,8 @@ from forcefit.inputs.table import BadInput
 from forcefit.stiffness.screws import rotation_matrix, rotation_vector
 
 TURN = np.pi / 2
-# body "plate": face A (normal z, at the origin), face B (normal x, at the origin, its
-# long side 60 mm along z), hole 80 mm along x from B
+# The plate has a face A with normal z, a face B with normal x that is 60 mm long along
+# z, and a hole at a distance of 80 mm from B along x.
 PLATE = Robot(
     "plate",
     "tip",
@@ -42,14 +42,16 @@ def hole(*datums):
 
 
 def with_bore(x, y):
-    """The plate with an additional bore along z at a point [m]."""
+    """Return the plate with an additional bore along z at a point [m]."""
     bore = Frame("bore", "plate", np.array([x, y, 0]))
     return replace(PLATE, frames=(*PLATE.frames, bore))
 
 
-def test_exchanging_two_datums_moves_a_hole_as_computed_by_hand():
-    """B out of square to A by 0.05 over 60 mm (0.833 mrad): the hole 80 mm from B moves
-    by 66.7 um normal to A in B|A, and by zero in A|B."""
+def test_hole_displacement_depends_on_the_order_of_datums():
+    """The hole moves by 66.7 um for datums B|A, and by zero for A|B.
+
+    B is tilted relative to A by 0.05 mm over 60 mm, and the hole is at 80 mm.
+    """
     row = PLATE.index("hole")
     largest = []
     for datums in ((A, B), (B, A)):
@@ -61,11 +63,11 @@ def test_exchanging_two_datums_moves_a_hole_as_computed_by_hand():
 
 
 def _on_screw(placed_callout, row):
-    """(6,) vector whose product with the screw of u equals row @ u."""
+    """Return a vector (6,) whose product with the screw of u equals row @ u."""
     return row @ np.linalg.pinv(placed_callout.zone.columns)
 
 
-def test_side_face_tilts_at_most_its_width_over_its_side():
+def test_tilt_of_a_face_equals_zone_width_divided_by_length():
     (face,) = placed(PLATE, SIDE_FACE)
     tilt = face.errors[PLATE.index("B"), 1]
     assert face.zone.support(_on_screw(face, tilt)) == pytest.approx(
@@ -73,21 +75,23 @@ def test_side_face_tilts_at_most_its_width_over_its_side():
     )
 
 
-def test_secondary_datum_fixes_only_the_remaining_degrees_of_freedom():
-    """Plane A fixes RX, RY, TZ; a bore B along z then fixes TX, TY but not RZ."""
+def test_secondary_datum_fixes_remaining_degrees_of_freedom():
+    """Plane A fixes RX, RY, TZ.  A bore B along z then fixes TX, TY but not RZ."""
     robot = with_bore(0.0, 0.05)
     bore = Callout("bore", "bore", (A,), extent=(0.02,), widths={"position": 0.1e-3})
     first, _ = placed(robot, bore, hole(A, Datum("bore")))
     moved = first.errors[robot.index("hole")]
     own = first.errors[robot.index("bore")]
-    # the shift of the bore carries the hole, its tilt does not
+    # The shift of the bore moves the hole, its tilt does not.
     assert moved[[3, 4]] == pytest.approx(own[[3, 4]], abs=1e-12)
     assert np.abs(moved[[0, 1, 2, 5]]).max() < 1e-12
 
 
-def test_shift_of_a_datum_at_maximum_material_depends_on_the_size_of_its_hole():
-    """Bore 12 H7 after face A: 0 to 18 um larger than its minimum size, so the datum
-    shifts by up to 9 um along x and y; uniform sizes and positions: 9 um / sqrt 12."""
+def test_shift_of_a_datum_depends_on_its_hole_size():
+    """A bore 12 H7 exceeds its minimum size by at most 18 um.
+
+    The datum shifts by up to 9 um, with a standard deviation of 9 um / sqrt 12.
+    """
     robot = with_bore(0.0, 0.05)
     shifting = Datum("bore", hole="12 H7", hole_of="bore")
     _, shift = placed(robot, hole(A, shifting))
@@ -105,9 +109,8 @@ def test_shift_of_a_datum_at_maximum_material_depends_on_the_size_of_its_hole():
     assert shift.name == "shift of datum bore of hole"
 
 
-def test_shift_of_a_second_bore_rotates_the_features_measured_from_it():
-    """Bore A at the origin fixes all but the rotation.  Bore B, 50 mm from A, shifts by
-    9 um: the hole, 80 mm from A, moves by 9 um x 80/50 = 14.4 um around A."""
+def test_shift_of_a_second_bore_rotates_the_datum_frame():
+    """Bore B at 50 mm shifts by 9 um, so the hole at 80 mm moves by 14.4 um."""
     robot = with_bore(0.05, 0.0)
     shifting = Datum("bore", hole="12 H7", hole_of="bore")
     _, shift = placed(robot, hole(Datum("A"), shifting))
@@ -118,7 +121,7 @@ def test_shift_of_a_second_bore_rotates_the_features_measured_from_it():
     assert max(supports[0], supports[1], supports[3], supports[5]) < 1e-12
 
 
-# crank 0.4 m, rod 0.3 m, the elbow's bore on the rod's side 20 mm long
+# crank 0.4 m, rod 0.3 m, bore of the rod at the elbow 20 mm long
 SERIAL = Robot(
     "serial",
     "tip",
@@ -132,10 +135,11 @@ SERIAL = Robot(
 
 
 @pytest.mark.parametrize(("after", "frame"), [(False, "elbow"), (True, "tip")])
-def test_shift_of_a_bore_moves_the_tip_as_in_finite_geometry(after, frame):
-    """Before the joint the bore is shifted on the crank: the tip follows.  After it the
-    bore is shifted on the rod: the tip moves by the opposite, in the rod's axes.  The
-    second order is 1e-14 m for these widths."""
+def test_tip_displacement_due_to_a_bore_shift_equals_finite_motion(after, frame):
+    """A shift of the bore in the crank moves the tip in the same direction.
+
+    A shift of the bore in the rod moves the tip in the opposite direction.
+    """
     datum = Datum("shoulder") if not after else Datum("tip")
     callout = Callout(
         "bore", "elbow", (datum,), after, extent=(0.02,), widths={"position": 2e-8}
@@ -145,7 +149,7 @@ def test_shift_of_a_bore_moves_the_tip_as_in_finite_geometry(after, frame):
     u = np.array([0.3, -0.4, 0.5, 0.2])
     errors = one.errors @ u
     assert np.flatnonzero(errors.any(axis=1)).tolist() == [SERIAL.index(frame)]
-    # the screw at the bore, in the elbow's axes before or after the joint
+    # screw at the bore, in the elbow axes before or after the joint motion
     screw = one.zone.columns @ u
     angle = 0.5 + 0.7 * after
     R = np.array([[np.cos(angle), -np.sin(angle), 0],
@@ -158,7 +162,7 @@ def test_shift_of_a_bore_moves_the_tip_as_in_finite_geometry(after, frame):
 
 
 def _platform(home, errors):
-    """Platform pose with the errors as finite displacements of the frames."""
+    """Return the platform pose for finite displacements of the frames."""
     frames = []
     for frame, e in zip(home.robot.frames, errors, strict=True):
         R = rotation_matrix(frame.rotation)
@@ -186,15 +190,13 @@ def _platform(home, errors):
          "no frame carried by its joint"),
     ],
 )  # fmt: skip
-def test_callout_that_does_not_apply_to_its_feature_is_rejected_in_one_line(
-    callouts, message
-):
+def test_callout_that_contradicts_its_feature_is_rejected(callouts, message):
     with pytest.raises(BadInput, match=message) as error:
         placed(PLATE, *callouts)
     assert "\n" not in str(error.value)
 
 
-def test_length_and_general_tolerance_are_intervals_along_the_distance():
+def test_length_tolerance_is_an_interval_along_the_distance():
     callout = replace(hole(B), widths={}, length=(0.08, 1e-4))
     (one,) = placed(PLATE, callout)
     assert one.zone.support(np.eye(6)[3]) == pytest.approx(1e-4)

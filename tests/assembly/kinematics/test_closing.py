@@ -1,4 +1,4 @@
-"""Closures that do not hold: rounded files, an error of one frame, preloaded drives."""
+"""Open loops due to rounded files, errors and preloaded drives."""
 
 import math
 from dataclasses import replace
@@ -11,11 +11,11 @@ from forcefit.assembly.kinematics.closing import preloaded, rest_in
 from forcefit.assembly.kinematics.posture import home_posture, place_robot
 from forcefit.assembly.robots import load_robot
 
-OFF = 1e-4  # [m] out of the plane of a four-bar: no motion takes it up
+OFF = 1e-4  # [m] out-of-plane error of a four-bar, which no joint motion can compensate
 
 
 def bent_four_bar():
-    """A four-bar with the end of one link out of its plane."""
+    """Return a four-bar in which the end of one link is out of plane."""
     robot = load_robot("four_bar")
     frames = tuple(
         replace(f, translation=f.translation + [0, 0, OFF]) if f.name == "rocker" else f
@@ -24,13 +24,13 @@ def bent_four_bar():
     return replace(robot, frames=frames)
 
 
-def test_open_closure_message_offers_the_rest_option():
-    with pytest.raises(BadInput, match=r"off by 0.0001 m with .*--rest NAME makes it"):
+def test_message_about_an_open_loop_contains_the_rest_option():
+    with pytest.raises(BadInput, match=r"a gap of 0.0001 m with .*with --rest NAME, "):
         home_posture(bent_four_bar())
 
 
-def test_closure_residual_becomes_the_error_of_the_named_frame():
-    """An out-of-plane shift and its energy are the same for every frame."""
+def test_closure_gap_becomes_the_error_of_the_given_frame():
+    """The error and the energy are the same for both frames."""
     energies = []
     for name in ("end_coupler", "rocker"):
         robot = rest_in(bent_four_bar(), name)
@@ -46,16 +46,14 @@ def test_closure_residual_becomes_the_error_of_the_named_frame():
     ("name", "message"),
     [("ankle", 'no frame "ankle"'), ("crank", "found no open loop through it")],
 )
-def test_assigning_the_closure_residual_to_an_unsuitable_frame_is_rejected(
-    name, message
-):
+def test_closure_gap_at_an_unsuitable_frame_is_rejected(name, message):
     robot = bent_four_bar() if name == "ankle" else load_robot("four_bar")
     with pytest.raises(BadInput, match=message):
         rest_in(robot, name)
 
 
 def two_slides(first=2e6, second=3e6):
-    """A platform on two driven slides along x, one behind the other."""
+    """Return a platform on two driven collinear slides along x."""
     turn = [0, np.pi / 2, 0]
 
     def drive(name, stiffness):
@@ -72,8 +70,8 @@ def two_slides(first=2e6, second=3e6):
 
 
 @pytest.mark.parametrize("apart", [1e-5, -3e-3])
-def test_redundant_drives_are_preloaded_by_their_mismatch(apart):
-    """Springs in series settle at the weighted mean: E = d^2 / 2 k1 k2 / (k1 + k2)."""
+def test_energy_of_preloaded_drives_equals_springs_in_series(apart):
+    """The energy of springs in series is k1 k2 / (k1 + k2) d^2 / 2."""
     k = 2e6, 3e6
     robot = preloaded(two_slides(*k), {"one": 0.35, "two": 0.35 + apart})
     assembly = solve_assembly(home_posture(robot))
@@ -83,12 +81,12 @@ def test_redundant_drives_are_preloaded_by_their_mismatch(apart):
     assert robot.remarks[-1].startswith("1 of 2 drives redundant")
 
 
-def test_mismatched_redundant_drives_are_rejected_with_a_hint_at_the_option():
+def test_message_about_redundant_drives_contains_the_option():
     with pytest.raises(BadInput, match="1 of 2 drives are redundant: with --mismatch"):
         place_robot(two_slides(), joints={"one": 0.3, "two": 0.32})
 
 
-def test_mismatched_rigid_drive_is_rejected_by_name():
+def test_rigid_redundant_drive_is_rejected():
     robot = two_slides()
     frames = tuple(
         replace(f, joint_stiffness=None) if f.name == "two" else f for f in robot.frames
@@ -98,13 +96,13 @@ def test_mismatched_rigid_drive_is_rejected_by_name():
 
 
 @pytest.mark.parametrize("scale", [1e-6, 1e-3, 0.05, 1.0])
-def test_closure_tolerance_is_proportional_to_the_size_of_a_small_robot(scale):
-    """A gap of 1e-4 of the robot's size exceeds the tolerance at any size."""
+def test_closure_tolerance_is_proportional_to_robot_size(scale):
+    """A gap of 1e-4 times the robot's size exceeds the tolerance."""
     frames = (
         Frame("tip", translation=[scale, 0, 0]),
         Frame("post", translation=[scale, 1e-4 * scale, 0]),
     )
-    with pytest.raises(BadInput, match="does not hold in the home pose"):
+    with pytest.raises(BadInput, match="is open in the home pose"):
         home_posture(Robot("gap", "tip", frames, (("tip", "post"),)))
     frames = (frames[0], replace(frames[1], translation=[scale, 1e-7 * scale, 0]))
     assert home_posture(Robot("gap", "tip", frames, (("tip", "post"),))).mismatch > 0
@@ -115,7 +113,7 @@ def frame(name, parent="base", at=(0, 0, 0), **more):
 
 
 def parallelograms(digits, error=0.0):
-    """Three equal cranks on one coupler: overconstrained, with rounded numbers."""
+    """Return an overconstrained linkage of three equal cranks with rounded numbers."""
     q = 0.7
     height = round(math.sqrt(0.05), digits) + error
     shifts = [(0.0, 0.0), (0.5, 0.0), (round(1 / 3, digits), height)]
@@ -133,8 +131,8 @@ def parallelograms(digits, error=0.0):
     return Robot("cranks", "tip0", tuple(frames), tuple(closures))
 
 
-def test_closure_gap_from_six_digit_rounding_is_accepted_and_reported():
-    """Rounded numbers are off by up to 5e-7 m; gaps below 1e-6 m are accepted."""
+def test_closure_gap_due_to_rounding_is_accepted():
+    """Rounding errors are at most 5e-7 m, and gaps below 1e-6 m are accepted."""
     posture = home_posture(parallelograms(digits=6))
     assert 1e-9 < posture.mismatch < 1e-6
     assert home_posture(parallelograms(digits=15)).mismatch < 1e-12
@@ -142,7 +140,7 @@ def test_closure_gap_from_six_digit_rounding_is_accepted_and_reported():
     assert moved.mismatch < 1e-6
 
 
-def test_closure_gap_above_one_micrometre_is_rejected_by_name():
+def test_closure_gap_above_one_micrometre_is_rejected():
     with pytest.raises(BadInput, match=r'closure\[2\] \("tip2", "tip0"\)') as caught:
         home_posture(parallelograms(digits=15, error=1e-4))
     assert "expected < 1e-06" in str(caught.value)

@@ -1,4 +1,4 @@
-"""Robots placed by pose and by joint coordinates, compared with closed forms."""
+"""Postures for given poses and joint coordinates, compared with closed forms."""
 
 import math
 import re
@@ -20,13 +20,14 @@ from tests.linkages_for_tests import (
     free,
 )
 
-EXACT = 1e-9  # closures are solved to 1e-10 of the longest body, all near 1 m here
+# [rad, m] closure tolerance, 1e-10 of the longest body, with a margin of 10
+EXACT = 1e-9
 
 
 @pytest.mark.parametrize("mode", [1.0, -1.0])
 @pytest.mark.parametrize("q", [-2.0, 0.1, 1.5, 3.0, 5.0])
-def test_four_bar_follows_the_law_of_cosines_in_its_assembly_mode(q, mode):
-    """The crank makes a full turn without leaving either assembly mode."""
+def test_four_bar_angles_satisfy_the_law_of_cosines(q, mode):
+    """The crank makes a full turn in each assembly mode."""
     posture = place_robot(four_bar(mode=mode), joints={"crank": q})
     coupler, _, end = four_bar_angles(q, mode)
     np.testing.assert_allclose(posture.platform[:2, 3], end, rtol=0, atol=EXACT)
@@ -35,8 +36,8 @@ def test_four_bar_follows_the_law_of_cosines_in_its_assembly_mode(q, mode):
     assert posture.mismatch < EXACT
 
 
-def test_rough_home_coordinates_are_corrected_to_close():
-    """Passive coordinates off by 0.05 rad are corrected, the driven one is not."""
+def test_inaccurate_home_coordinates_are_corrected():
+    """Errors of 0.05 rad of the passive coordinates are corrected."""
     posture = home_posture(four_bar(0.5))
     assert posture.coordinates[0] == 0.5
     np.testing.assert_allclose(
@@ -44,8 +45,8 @@ def test_rough_home_coordinates_are_corrected_to_close():
     )
 
 
-def test_message_states_the_angle_at_which_a_limited_crank_stops():
-    """Coupler and rocker of 0.3 m are collinear when the crank end is 0.6 m away."""
+def test_message_contains_the_angle_at_which_a_crank_stops():
+    """The crank stops where coupler and rocker of 0.3 m are collinear."""
     short = 0.3
     robot = Robot(
         "short", "end",
@@ -70,7 +71,7 @@ def test_message_states_the_angle_at_which_a_limited_crank_stops():
 
 
 def arm(lengths=(0.5, 0.4), angles=(0.3, 0.9)):
-    """Planar serial arm with two driven joints."""
+    """Return a planar serial arm with two driven joints."""
     first, second = lengths
     return Robot("arm", "hand", (
         frame("a", **driven(angles[0])),
@@ -80,7 +81,7 @@ def arm(lengths=(0.5, 0.4), angles=(0.3, 0.9)):
 
 
 @pytest.mark.parametrize("x", [0.2, 0.5, 0.85])
-def test_arm_reaches_a_pose_with_the_elbow_on_the_same_side_as_at_home(x):
+def test_arm_reaches_a_pose_in_its_home_assembly_mode(x):
     y = 0.2
     posture = place_robot(arm(), pose={"tx": x, "ty": y})
     far = (x**2 + y**2 - 0.5**2 - 0.4**2) / (2 * 0.5 * 0.4)
@@ -88,8 +89,8 @@ def test_arm_reaches_a_pose_with_the_elbow_on_the_same_side_as_at_home(x):
     np.testing.assert_allclose(posture.platform[:2, 3], [x, y], rtol=0, atol=EXACT)
 
 
-def test_missing_rotation_in_the_message_equals_the_angle_between_the_two_rotations():
-    """A hinge about z cannot tilt: SciPy's angle from its last pose to the target."""
+def test_message_contains_the_remaining_rotation_angle():
+    """The platform on a hinge about z cannot tilt."""
     robot = Robot("hinge", "hand", (
         frame("a", **driven(0.3)), frame("hand", "a", (0.4, 0, 0), (0.2, -0.1, 0.3)),
     ))  # fmt: skip
@@ -106,8 +107,8 @@ def test_missing_rotation_in_the_message_equals_the_angle_between_the_two_rotati
     assert float(short) == pytest.approx(between.magnitude(), rel=1e-5)
 
 
-def test_unspecified_pose_components_are_chosen_nearest_to_home():
-    """Of all elbow angles with the hand at x, the one nearest to home is found."""
+def test_unspecified_pose_components_are_nearest_to_home():
+    """Of all joint angles with the hand at x, the nearest to home are selected."""
     robot = arm()
     home = home_posture(robot)
     x = home.platform[0, 3]
@@ -115,7 +116,7 @@ def test_unspecified_pose_components_are_chosen_nearest_to_home():
     np.testing.assert_allclose(here.coordinates, home.coordinates, atol=EXACT)
     near = place_robot(robot, pose={"tx": x + 1e-4})
     step = near.coordinates - home.coordinates
-    # least norm: along the gradient of x over both joints, to first order
+    # The motion of minimum norm is along the gradient of x, to first order.
     c = home.coordinates
     gradient = -np.array([
         0.5 * math.sin(c[0]) + 0.4 * math.sin(c[0] + c[1]),

@@ -1,4 +1,4 @@
-"""One or many postures: text, screw maps, and cached arrays."""
+"""One or many postures, screw maps and cached arrays."""
 
 from dataclasses import replace
 
@@ -17,7 +17,7 @@ def turned(*angles):
 
 
 def test_paths_transform_screws_from_each_frame_to_the_platform():
-    """The map is [R 0; [p_j - p]x R, R] for one posture and for each of many."""
+    """The map is [R 0; [p_j - p]x R, R]."""
     postures = turned(0.4, 0.9)
     many = together(postures)
     last = postures[0].robot.index(postures[0].robot.platform)
@@ -51,8 +51,8 @@ def test_posture_reports_its_largest_closure_gap():
     assert home_posture(robot).mismatch == pytest.approx(5e-7, rel=1e-6)
 
 
-def test_joints_beyond_a_closure_or_the_platform_stay_in_position():
-    """Their motion affects neither the closing frame nor the platform."""
+def test_joints_outside_loops_remain_at_their_home_position():
+    """Their motion affects neither the closures nor the platform."""
     robot = four_bar()
     closed = {"end", "seat"}
     frames = tuple(
@@ -78,10 +78,8 @@ def test_joints_beyond_a_closure_or_the_platform_stay_in_position():
         ({"ry": 0.3, "rz": 0.4}, "0.5 rad"),
     ],
 )  # fmt: skip
-def test_missing_distance_in_the_message_has_the_unit_of_the_requested_component(
-    asked, missing
-):
-    """A slide along x neither rises nor tilts at any position."""
+def test_message_about_an_unreachable_pose_contains_units(asked, missing):
+    """A slide along x cannot move along z or rotate."""
     robot = Robot("slide", "car", (
         Frame("rail", rotation=[0, np.pi / 2, 0], joint="prismatic", actuated=True),
         Frame("car", "rail", rotation=[0, -np.pi / 2, 0]),
@@ -96,7 +94,7 @@ def test_missing_distance_in_the_message_has_the_unit_of_the_requested_component
 
 
 @pytest.mark.parametrize("function", [solve_assembly, zone_margin, platform_stiffness])
-def test_passing_a_robot_instead_of_a_posture_is_rejected_with_a_hint(function):
+def test_robot_in_place_of_a_posture_is_rejected(function):
     with pytest.raises(TypeError, match=r'robot "bars".*forcefit.place_robot\(robot\)'):
         function(four_bar())
 
@@ -105,7 +103,7 @@ BEAM = BeamLink({"radius": 0.01}, 7e10, 0.3)
 
 
 def arm(pieces):
-    """A hinge, an oblique beam with a hinge at its end, a second beam, and a tip."""
+    """Return a serial arm of two beams with hinges at their bases."""
     beam = replace(BEAM, pieces=pieces)
     return Robot("arm", "tip", (
         Frame("hinge", joint="revolute", actuated=True, position=0.4),
@@ -117,8 +115,8 @@ def arm(pieces):
     ))  # fmt: skip
 
 
-def test_cutting_a_posture_equals_placing_the_cut_robot():
-    """Both agree for any drive positions, and for several postures together."""
+def test_posture_of_divided_beams_equals_posture_of_divided_robot():
+    """The postures agree for any drive coordinates."""
     robot = arm(3)
     cut = cut_beams(robot)
     joints = {"hinge": 1.1, "elbow": 0.3}

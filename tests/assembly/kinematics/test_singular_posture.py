@@ -1,4 +1,4 @@
-"""Singular postures, intersecting operation modes, and poses beyond a singularity."""
+"""Singular postures, operation modes, and poses beyond a singularity."""
 
 import math
 from dataclasses import replace
@@ -23,13 +23,13 @@ def singular(posture):
 
 
 def flat(x=0.0, y=0.0, z=HEIGHT):
-    """A pose reached by pure translation."""
+    """Return a pose of pure translation."""
     return {"tx": x, "ty": y, "tz": z, "rx": 0.0, "ry": 0.0, "rz": 0.0}
 
 
 @pytest.mark.parametrize("z", [0.3, HEIGHT, 0.6])
-def test_three_upu_is_singular_above_its_centre_and_regular_2_mm_away(z):
-    """Its three constraint couples are parallel at the centre, but not 2 mm away."""
+def test_three_upu_is_singular_above_its_centre(z):
+    """The three constraint couples are parallel at the centre only."""
     robot = three_upu()
     assert singular(place_robot(robot, pose=flat(z=z)))
     assert not singular(place_robot(robot, pose=flat(x=0.002, z=z)))
@@ -47,7 +47,7 @@ def test_robot_without_drives_is_regular():
 
 
 def test_slider_driven_at_its_dead_centre_is_singular():
-    """With crank and rod collinear, the locked slide does not hold the crank."""
+    """With crank and rod collinear, the locked slide does not lock the crank."""
     assert singular(home_posture(slider_crank(0.0)))
     assert not singular(home_posture(slider_crank(0.4)))
 
@@ -56,15 +56,15 @@ GIVEN = [{"tz": HEIGHT}, {"tx": 0.0, "ty": 0.0, "tz": HEIGHT}, flat()]
 
 
 @pytest.mark.parametrize("pose", GIVEN)
-def test_singularity_distances_vanish_however_the_singular_pose_is_specified(pose):
+def test_singularity_distances_vanish_at_a_singular_pose(pose):
     robot = three_upu()
     found = find_singularities(robot, place_robot(robot, pose=pose).transforms[None])
     assert found.parallel[0] == 0.0
     assert found.closure[0] == 0.0
 
 
-def test_pose_from_a_singular_home_is_reached_by_pure_translation():
-    """Pure translations exist everywhere; unspecified components stay at home."""
+def test_motion_from_a_singular_home_is_a_pure_translation():
+    """Pure translations are possible at every position."""
     robot = three_upu()
     pose = {"tx": 0.002, "ty": 0.001, "tz": HEIGHT}
     posture = place_robot(robot, pose=pose)
@@ -74,8 +74,8 @@ def test_pose_from_a_singular_home_is_reached_by_pure_translation():
     assert posture.pose() == pytest.approx(flat(0.002, 0.001), abs=1e-9)
 
 
-def test_drive_coordinates_from_a_singular_home_stay_in_the_translational_mode():
-    """Three spheres meet at x = (L^2 - l^2) / (3 (b - p)), y = 0."""
+def test_drives_move_a_singular_home_in_the_translational_mode():
+    """The intersection of three spheres is x = (L^2 - l^2) / (3 (b - p)), y = 0."""
     robot = three_upu()
     posture = place_robot(robot, joints={"leg1.slide": 0.5})
     gap = BASE - PLATFORM
@@ -87,13 +87,13 @@ def test_drive_coordinates_from_a_singular_home_stay_in_the_translational_mode()
     assert "pure translation" in remark
 
 
-def test_pose_reached_only_by_rotating_the_platform_is_reported_as_another_mode():
+def test_pose_in_another_operation_mode_is_reported():
     posture = place_robot(three_upu(), pose={"rx": 0.05})
     assert posture.pose()["rx"] == pytest.approx(0.05, abs=1e-9)
-    assert "turns" in posture_remarks(posture)[0]
+    assert "rotates" in posture_remarks(posture)[0]
 
 
-def test_unreachable_pose_message_states_that_home_is_singular():
+def test_message_about_an_unreachable_pose_reports_a_singular_home():
     with pytest.raises(BadInput, match=r"home is a singular posture: specify all six"):
         place_robot(three_upu(), pose={"tz": HEIGHT, "rz": 3.0})
 
@@ -112,8 +112,8 @@ def test_hexapod_rotated_beyond_90_degrees_is_beyond_its_singularity(side):
     assert "without passing a singularity" in posture_remarks(postures[2])[0]
 
 
-def test_five_bar_below_the_line_of_its_elbows_is_beyond_its_singularity():
-    """At tx = 0 the far arms are one line at ty = sqrt(90^2 - 30^2) mm."""
+def test_five_bar_below_its_elbows_is_beyond_its_singularity():
+    """At tx = 0, the distal arms are collinear for ty = sqrt(90^2 - 30^2) mm."""
     robot, line = load_robot("five_bar"), math.sqrt(0.09**2 - 0.03**2)
     poses = np.full((4, 6), np.nan)
     poses[:, 0], poses[:, 1] = 0.0, line + np.array([0.03, 0.002, -0.002, -0.02])
@@ -123,7 +123,7 @@ def test_five_bar_below_the_line_of_its_elbows_is_beyond_its_singularity():
     assert far.tolist() == [False, False, True, True]
 
 
-def test_joint_beyond_its_limits_is_reported_with_its_limits():
+def test_joint_beyond_its_limits_is_reported():
     robot = load_robot("four_bar")
     frames = tuple(
         replace(f, limits=(-0.5, 1.5)) if f.actuated else f for f in robot.frames

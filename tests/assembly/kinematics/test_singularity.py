@@ -21,14 +21,15 @@ from tests.linkages_for_tests import five_bar, four_bar
 
 
 def at(robot, **options):
-    """Singularity distances at one posture."""
+    """Return the singularity distances at one posture."""
     return find_singularities(robot, place_robot(robot, **options).transforms[None])
 
 
 def five_bar_jacobian(T, robot):
-    """(2, 2) [m/rad] drives to tip: A v = B q', Gosselin and Angeles' two matrices.
+    """Return the Jacobian from drives to tip, (2, 2) [m/rad].
 
-    The length of the second arm d is constant: d.v = d.(k x a) q' for the first arm a.
+    The length of the second arm d is constant, so d.v = d.(k x a) q' for the first arm
+    a.
     """
     A, B = np.zeros((2, 2)), np.zeros((2, 2))
     tip = T[robot.index("left.tip"), :2, 3]
@@ -42,7 +43,7 @@ def five_bar_jacobian(T, robot):
 
 @pytest.fixture(scope="module")
 def five_bars():
-    """The built-in robot and its transforms at random poses."""
+    """Return the built-in five-bar and its transforms at random poses."""
     robot = load_robot("five_bar")
     rng = np.random.default_rng(1)
     poses = np.full((40, 6), np.nan)
@@ -52,8 +53,8 @@ def five_bars():
     return robot, np.array([p.transforms for p in postures if p is not None])
 
 
-def test_singularity_distances_of_a_five_bar_equal_its_closed_form_jacobian(five_bars):
-    """J = A^-1 B of tip rotation and translation gives the tangents of the angles."""
+def test_five_bar_singularity_distances_equal_the_closed_form(five_bars):
+    """The singular values of the Jacobian are the tangents of the angles a_i."""
     robot, T = five_bars
     found = find_singularities(robot, T)
     assert len(T) >= 30
@@ -61,7 +62,7 @@ def test_singularity_distances_of_a_five_bar_equal_its_closed_form_jacobian(five
     for i in range(len(T)):
         A, B = five_bar_jacobian(T[i], robot)
         J = np.linalg.solve(A, B)
-        # past the pin, the platform is the right second arm: it turns as well
+        # The platform is part of the right distal arm, so it also rotates.
         tip, elbow, foot = (
             T[i, robot.index(name), :2, 3]
             for name in ("left.tip", "right.elbow", "right.drive")
@@ -75,10 +76,10 @@ def test_singularity_distances_of_a_five_bar_equal_its_closed_form_jacobian(five
         assert found.condition[i] == pytest.approx(tangents[0] / tangents[-1])
 
 
-def test_serial_singularity_of_aligned_arms_is_reported_with_the_name_of_the_drive():
-    """B_11 = d.(k x a) = 0 where the left arms are collinear, 180 mm long.
+def test_serial_singularity_of_aligned_arms_is_reported():
+    """The left arms are collinear at the singularity.
 
-    If they are shorter by e, they are bent by an angle proportional to sqrt(e).
+    If their total length is shorter by e, their angle is proportional to sqrt(e).
     """
     robot = load_robot("five_bar")
     found = []
@@ -92,8 +93,8 @@ def test_serial_singularity_of_aligned_arms_is_reported_with_the_name_of_the_dri
 
 
 @pytest.mark.parametrize("angle", [0.3, 1.1, 2.5, 4.0])
-def test_singularity_distances_of_a_four_bar_follow_from_its_closed_form_speed(angle):
-    """Velocity of Hoeken's coupler, by differences of its closed form."""
+def test_four_bar_singularity_distances_equal_the_closed_form(angle):
+    """The coupler velocity is computed by differences of Hoeken's closed form."""
     robot = load_robot("four_bar")
     found = at(robot, joints={"crank": angle})
 
@@ -102,7 +103,7 @@ def test_singularity_distances_of_a_four_bar_follow_from_its_closed_form_speed(a
         x, y = 2 + 2 * root * math.sin(t), 2 * root * (2 - math.cos(t))
         return 0.1 * np.array([x, y])
 
-    def coupler(t):  # from the crank's pin to the point: the coupler, twice
+    def coupler(t):  # from the crank pin along twice the coupler length
         x, y = point(t) - 0.1 * np.array([math.cos(t), math.sin(t)])
         return math.atan2(y, x)
 
@@ -115,7 +116,7 @@ def test_singularity_distances_of_a_four_bar_follow_from_its_closed_form_speed(a
 
 
 def test_orthoglide_is_isotropic_at_home():
-    """Chablat, Wenger (2003): the Jacobian is the identity at home, so tan = 1."""
+    """The Jacobian at home is the identity matrix (Chablat, Wenger 2003)."""
     robot = load_robot("orthoglide")
     found = find_singularities(robot, home_posture(robot).transforms[None])
     assert found.condition[0] == pytest.approx(1.0, abs=1e-9)
@@ -140,8 +141,8 @@ def test_arm_with_aligned_wrist_axes_is_serially_singular():
     assert found.names(robot, 0.02)[1].startswith("serial: ")
 
 
-def test_singularity_distances_do_not_depend_on_the_unit_of_length(five_bars):
-    """Lengths are relative to a body length, so a factor of 1000 changes no angle."""
+def test_singularity_distances_do_not_depend_on_robot_size(five_bars):
+    """All lengths are multiplied by 1000."""
     robot, T = five_bars
     frames = [replace(f, translation=1000 * f.translation) for f in robot.frames]
     large = T.copy()
@@ -153,7 +154,7 @@ def test_singularity_distances_do_not_depend_on_the_unit_of_length(five_bars):
 
 
 def parallelogram(angle):
-    """Cranks of 0.1 m, ground and coupler of 0.3 m, at an angle to each other."""
+    """Return a parallelogram linkage at a given crank angle."""
 
     def bar(name, parent, length, turn, **options):
         return Frame(name, parent, [length, 0, 0], [0, 0, turn], **options)
@@ -170,8 +171,8 @@ def parallelogram(angle):
     return Robot("parallelogram", "coupler", frames, (("coupler", "rocker_end"),))
 
 
-def test_closure_singularity_of_a_flat_parallelogram_is_reported_with_its_joint():
-    """All four axes meet one line; the distance is proportional to the angle."""
+def test_closure_singularity_of_a_flat_parallelogram_is_reported():
+    """All four axes intersect one line at the singularity."""
     found = []
     for angle in (0.1, 0.01):
         robot = parallelogram(angle)
@@ -184,8 +185,7 @@ def test_closure_singularity_of_a_flat_parallelogram_is_reported_with_its_joint(
 
 
 def screws_by_hand(robot, T):
-    """(n, 6) platform motion per unit of each joint on the path to the platform, with
-    lengths and slides in units of the robot's size."""
+    """Return the platform motion per unit rate of each joint, (n, 6)."""
     size, screws = size_of(robot), np.zeros((len(robot.frames), 6))
     last = robot.index(robot.platform)
     for k, frame in enumerate(robot.frames):
@@ -199,7 +199,7 @@ def screws_by_hand(robot, T):
 
 
 def way_to(robot, name):
-    """Indices of the frames from the base to a given frame."""
+    """Return the indices of the frames between the base and a frame."""
     way = []
     while name != "base":
         way.append(robot.index(name))
@@ -208,9 +208,8 @@ def way_to(robot, name):
 
 
 @pytest.mark.parametrize("name", ["five_bar", "3rrr", "orthoglide", "arm6", "delta"])
-def test_singular_motions_satisfy_the_closures_and_have_unit_size(name):
-    """The motions have unit size with the smallest possible platform or drive part.
-    Passive joints follow, and the closures hold."""
+def test_singular_motions_satisfy_the_closures(name):
+    """The motions have unit norm with the smallest possible platform or drive rates."""
     robot = load_robot(name)
     driven = [k for k, f in enumerate(robot.frames) if f.actuated]
     home = home_posture(robot)
@@ -243,7 +242,6 @@ def test_singular_motions_satisfy_the_closures_and_have_unit_size(name):
 
 
 def test_platform_that_no_joint_moves_has_no_serial_singularity():
-    """The drive moves, but the platform does not."""
     turning = {"joint": "revolute", "actuated": True}
     robot = Robot("still", "tip", (
         Frame("tip"), Frame("one", **turning),
@@ -260,7 +258,7 @@ TURNING = {"joint": "revolute", "actuated": True}
 
 
 def side_by_side(*joints):
-    """Coincident joints about or along z, the first of which is driven."""
+    """Return parallel chains of one joint about or along z, the first driven."""
     frames, closures = [], []
     for k, joint in enumerate(joints):
         frames += [Frame(f"j{k}", joint=joint, actuated=k == 0),
@@ -270,20 +268,20 @@ def side_by_side(*joints):
 
 
 @pytest.mark.parametrize(("robot", "counts"), [
-    # an open arm has as many degrees of freedom as joints
+    # An open arm has as many degrees of freedom as joints.
     (Robot("arm", "tip", (Frame("a", **TURNING), Frame("b", "a", [1, 0, 0], **TURNING),
                           Frame("tip", "b"))), (2, 0, 0)),
-    # planar loop: three of the six closure equations are independent
+    # Three of the six closure equations of a planar loop are independent.
     (four_bar(), (1, 0, 3)), (four_bar(mode=-1.0), (1, 0, 3)),
-    # the tip can rotate by itself about its two pins
+    # The tip can rotate about its two pins.
     (five_bar(), (3, 1, 3)),
-    # one motion in common, of twelve equations two
+    # The joints have a common motion, and two of twelve equations are independent.
     (side_by_side("prismatic", "prismatic", "prismatic"), (1, 0, 10)),
-    # nothing in common
+    # The joints have no common motion.
     (side_by_side("revolute", "prismatic"), (0, 0, 4)),
     (side_by_side("revolute", "fixed"), (0, 0, 5)),
 ])  # fmt: skip
-def test_degrees_of_freedom_and_overconstraint_equal_hand_counts(robot, counts):
-    """Degrees of freedom with free and locked drives, and redundant equations."""
+def test_mobility_of_simple_linkages_equals_known_counts(robot, counts):
+    """The counts are for free drives, locked drives and redundant equations."""
     found = mobility(home_posture(robot))
     assert (found.freedoms, found.locked_freedoms, found.overconstraint) == counts

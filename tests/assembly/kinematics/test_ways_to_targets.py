@@ -1,4 +1,4 @@
-"""Tracks to one or many targets: end points and assembly modes."""
+"""End points and assembly modes of motions to one or many targets."""
 
 import math
 
@@ -18,10 +18,11 @@ from forcefit.assembly.model.robot import Frame, Robot
 from forcefit.assembly.robots import BUILT_IN, load_robot
 from tests.linkages_for_tests import five_bar
 
-EXACT = 1e-9  # closures are solved to 1e-10 of the longest body, all near 1 m here
+# [rad, m] closure tolerance, 1e-10 of the longest body, with a margin of 10
+EXACT = 1e-9
 
 
-def test_poses_of_many_targets_equal_those_placed_one_by_one():
+def test_postures_of_many_targets_equal_single_postures():
     robot = five_bar()
     goals = np.full((3, 6), np.nan)
     goals[:, :2] = [[0.1, 0.5], [0.0, 2.0], [-0.1, 0.6]]
@@ -38,8 +39,8 @@ def test_poses_of_many_targets_equal_those_placed_one_by_one():
 
 
 @pytest.mark.parametrize("name", ["irsbot2", "orthoglide"])
-def test_direct_track_ends_in_the_same_posture_as_many_short_steps(name):
-    """The assembly mode is that of home, as for 40 successive targets on the line."""
+def test_direct_motion_ends_at_the_same_posture_as_short_motions(name):
+    """A direct motion has the same end as 40 successive short motions."""
     robot = load_robot(name)
     home = home_posture(robot)
     given = (0, 2) if name == "irsbot2" else (0, 1, 2)
@@ -60,8 +61,8 @@ def test_direct_track_ends_in_the_same_posture_as_many_short_steps(name):
         np.testing.assert_allclose(posture.coordinates, at, rtol=0, atol=EXACT)
 
 
-def test_ball_joint_near_gimbal_lock_stays_on_the_same_branch_of_angles():
-    """Near gimbal lock, a long step could end half a turn away about two axes."""
+def test_ball_joint_angles_near_gimbal_lock_are_continuous():
+    """Near gimbal lock, a large step could change two angles by half a turn."""
     robot = load_robot("hexapod")
     home = home_posture(robot)
     goal = np.array([[0.475133, 0.004732, 0.078543, 0.384865, -0.20706, -0.37498]])
@@ -74,9 +75,12 @@ def test_ball_joint_near_gimbal_lock_stays_on_the_same_branch_of_angles():
     np.testing.assert_allclose(track.coordinates[0], at, rtol=0, atol=EXACT)
 
 
-def test_many_joint_targets_reach_the_poses_of_the_inverse_kinematics():
-    """Law of cosines against the closure; with both arms outward the elbows are
-    0.9 m apart and two bars of 0.4 m cannot meet."""
+def test_poses_for_joint_targets_agree_with_inverse_kinematics():
+    """The poses follow from the law of cosines.
+
+    With both arms outward, the elbows are 0.9 m apart, and two bars of 0.4 m are too
+    short.
+    """
     robot = five_bar()
     goals = np.full((3, 8), np.nan)
     tips = np.array([[0.1, 0.45], [-0.05, 0.55]])
@@ -96,8 +100,8 @@ def test_many_joint_targets_reach_the_poses_of_the_inverse_kinematics():
 
 
 @pytest.mark.parametrize("name", ["arm6", "five_bar", "3rrr", "irsbot2"])
-def test_unspecified_pose_components_do_not_depend_on_rounding(name):
-    """The target differs in the last digit, as it might on another processor."""
+def test_unspecified_pose_components_do_not_depend_on_round_off(name):
+    """The targets differ by round-off."""
     robot = load_robot(name)
     tx = place_robot(robot).pose()["tx"] + 0.06
     first, *others = (
@@ -124,7 +128,7 @@ BALL = Robot("ball", "body", (
 
 @pytest.mark.parametrize("given", ["all", "turns", "place"])
 def test_free_body_reaches_the_requested_pose(given, rng):
-    """Rotation vectors from SciPy, up to nearly half a turn about any axis."""
+    """Rotations are up to nearly half a turn about any axis."""
     robot = BALL
     axes = rng.normal(size=(60, 3))
     axes /= np.linalg.norm(axes, axis=1)[:, None]
@@ -135,7 +139,7 @@ def test_free_body_reaches_the_requested_pose(given, rng):
     if given != "place":
         wanted[:, 3:] = axes * angles[:, None]
     track = follow(robot, np.zeros(7), Target(pose=wanted))
-    # its own joints may be locked on the way; most are not
+    # Some targets cannot be reached because of gimbal lock.
     assert track.reached.sum() > 40
     T = track.transforms[track.reached, robot.index("body")]
     wanted = wanted[track.reached]
@@ -147,7 +151,7 @@ def test_free_body_reaches_the_requested_pose(given, rng):
 
 
 def targets_of(home, rng, count=40):
-    """Drive coordinates, the resulting poses, partial poses, and arbitrary poses."""
+    """Return drive coordinates, the resulting poses, partial and arbitrary poses."""
     robot, n = home.robot, len(home.robot.frames)
     moving = [j for j, frame in enumerate(robot.frames) if frame.joint != "fixed"]
     driven = [j for j in moving if robot.frames[j].actuated] or moving[:2]
@@ -167,8 +171,8 @@ def targets_of(home, rng, count=40):
 
 
 @pytest.mark.parametrize("name", BUILT_IN)
-def test_reached_targets_have_the_requested_pose_and_closed_loops(name, rng):
-    """A new track that starts at the reached posture requires a single step."""
+def test_reached_targets_satisfy_the_request_and_the_closures(name, rng):
+    """A second motion from the reached posture requires a single step."""
     home = home_posture(BUILT_IN[name]())
     reached = 0
     for target in targets_of(home, rng):
@@ -186,7 +190,7 @@ def test_reached_targets_have_the_requested_pose_and_closed_loops(name, rng):
 
 
 def assert_sent_there(robot, target, track):
-    """Check that all prescribed coordinates and pose components are attained."""
+    """Assert that all prescribed coordinates and pose components are reached."""
     platform = track.transforms[:, robot.index(robot.platform), :3, 3]
     held = [] if target.pose is None else [target.pose[:, :3] - platform]
     if target.coordinates is not None:
@@ -195,10 +199,10 @@ def assert_sent_there(robot, target, track):
         assert np.nanmax(np.abs(off[track.reached]), initial=0.0) < 1e-6
 
 
-def test_track_does_not_depend_on_other_targets(rng):
-    """Bit-identical alone, in another order, and among longer tracks."""
+def test_end_point_does_not_depend_on_other_targets(rng):
+    """End points are bit-identical for single targets and in another order."""
     home = home_posture(BUILT_IN["irsbot2"]())
-    # which parts are free differs from row to row
+    # The free components differ between targets.
     poses = targets_of(home, rng)[2].pose
     together = follow(home.robot, home.coordinates, Target(pose=poses))
     order = rng.permutation(len(poses))
@@ -212,7 +216,7 @@ def test_track_does_not_depend_on_other_targets(rng):
 
 
 def test_joint_rotation_equals_scipy_for_any_angle(rng):
-    """SciPy's rotation about z, also beyond the range of the polynomials."""
+    """Angles outside the range of the polynomials are included."""
     robot = Robot("wheel", "rim", (Frame("rim", joint="revolute"), Frame("end", "rim")))
     angles = np.r_[
         rng.uniform(-10, 10, 200), rng.uniform(-9e4, 9e4, 200), 0.0, 1e-300,

@@ -112,5 +112,5 @@ def test_numbers_that_prevent_loop_closure_are_rejected(design):
     """A parallelogram does not close if a frame is displaced by 1 mm."""
     values = {"leg1.elbow_a.translation.y": 0.2}
     design.check(values)  # valid in a robot file
-    with pytest.raises(BadInput, match="does not hold in the home"):
+    with pytest.raises(BadInput, match="is open in the home pose"):
         design.robot(values)

@@ -135,7 +135,7 @@ def test_design_whose_loops_cannot_close_has_status_invalid_robot():
     data = sweep("irsbot2", grid="tx=0,tz=-0.5:-0.4:0.1", vary=[f"{path}={y!r},0.4"],
                  assumption="none").squeeze()  # fmt: skip
     assert data.status.values.tolist() == [["ok", "ok"], ["invalid robot"] * 2]
-    assert "does not hold in the home pose" in data.reason.values[1, 0]
+    assert "is open in the home pose" in data.reason.values[1, 0]
     assert np.isnan(data.energy.values[1]).all()
     assert summary_of(data)["status"] == {"invalid robot": 2, "ok": 2}
 
