@@ -1,4 +1,4 @@
-"""Solvers for second-order cone programs on plain arrays, independent of robots.
+"""Solvers for second-order cone programs.
 
 Start with ``conic.py``, which returns certified solutions.  ``one_problem.py`` calls
 the compiled methods of ``assembly/kernels/solvers``.

@@ -1,4 +1,4 @@
-"""Compiled billiard walk (random sampling) through the set of clearance positions.
+"""Compiled billiard walk, which samples clearance positions at random.
 
 Sources:
     Gryazina, Polyak (2014), Random sampling: billiard walk algorithm.
@@ -29,13 +29,13 @@ class Positions:
 
     @cached_property
     def gram(self) -> NDArray:
-        """(nu, nu) product M M^T."""
+        """Product M M^T, (nu, nu)."""
         return self.M @ self.M.T
 
     def start_chains(
         self, u: NDArray, rng: np.random.Generator, walks: NDArray
     ) -> None:
-        """Generate initial points near the boundary, in random directions.
+        """Generate initial points in random directions near the boundary.
 
         Args:
             u: (nu,) centre of the ellipsoid.
@@ -52,7 +52,7 @@ class Positions:
         """Advance a random chain and record its platform screw at regular intervals.
 
         Args:
-            u: (nu,) current point of the chain, overwritten.
+            u: (nu,) current point of the chain; overwritten.
             every: number of trajectories between two recorded screws.
             rng: generator of random numbers.
             trace: (kept, 6) [rad, m] array to fill with the recorded screws.

@@ -1,14 +1,13 @@
 """Second-order cone programs in the clearances, with certified solutions.
 
-The module solves two problems: the minimum energy of a reduced problem (22), and the
-smallest clearance factor of problem (21).  Both are scaled to size 1.  The second
-problem is solved by Clarabel.  With ``"reference"``, Clarabel also solves the first
-problem, and :mod:`forcefit.assembly.solvers.pressed_cones` refines each solution.  With
-``"compiled"``, the compiled interior-point method solves the first problem, and
-Clarabel is used if the compiled solution cannot be certified.  Newton's method on the
-dual (:mod:`forcefit.assembly.solvers.one_problem`) then refines each solution.  The
-solution with the smallest certified gap is returned.  The gap is evaluated
-independently of the solvers.
+The module solves a reduced problem (22) for the minimum energy, and problem (21) for
+the smallest factor on the clearances.  Clarabel solves problem (21).
+
+Problem (22) is solved by Clarabel (``"reference"``), or by a compiled interior-point
+method (``"compiled"``) with Clarabel as fallback.  The solution is refined by
+:mod:`forcefit.assembly.solvers.pressed_cones` or by Newton's method on the dual
+(:mod:`forcefit.assembly.solvers.one_problem`).  The solution with the smallest
+certified gap is returned.  The gap is evaluated independently of the solvers.
 
 Sources:
     Goulart, Chen (2024), Clarabel: an interior-point solver for conic programs with
@@ -30,20 +29,19 @@ from forcefit.assembly.solvers.method import Method
 from forcefit.assembly.solvers.pressed_cones import refine
 
 _TOLERANCE = 1e-13
-# Clarabel's default static regularisation, 1e-8, stops 3 of 12 points of the paper's
-# robot at a relative gap of 1e-6; without regularisation, the gap is 1e-13 at all of
-# them
+# Static regularisations of Clarabel. With its default, 1e-8, the relative gap is 1e-6
+# at some points of IRSBot-2, and without regularisation 1e-13.
 _REGULARISATIONS = (0.0, 1e-10, 1e-8)
-# largest gap at which a solution counts as proved: relative to the energy, and to the
-# energy without clearance
+# largest gap of a proved solution, relative to the energy and to the energy without
+# clearance
 GAP, GAP_WITHOUT_CLEARANCE = 1e-8, 1e-12
 _GAP_WITHIN = 1e-12  # required relative gap of the interior-point method
-# fraction of that gap that is required here, because the full problem increases the gap
+# fraction of GAP that is required here, because the full problem has a larger gap
 _SHARE = 0.1
 _STOP = 1e-2  # fraction of the required gap at which Newton's method stops
-# largest number of Newton steps, and first sigma of the method
+# largest number of Newton steps, and first sigma
 _STEPS, _FIRST_SIGMA = 150, 1e6
-_RESIDUAL = 1e-11  # accepted residual of equations without springs
+_RESIDUAL = 1e-11  # largest residual of equations without springs
 # largest factor on the clearances for which infeasibility is proved
 _LARGEST_FACTOR = 1e8
 _UNPROVED = "PrimalInfeasible, but its multipliers do not prove it"
@@ -68,12 +66,12 @@ class ConicSolution:
 
     Attributes:
         clearances: (nu,) clearances relative to their bounds.
-        springs: (r,) [sqrt(2 J)] multipliers of the springs; they equal G u + h within
-            the duality gap.
+        springs: (r,) [sqrt(2 J)] multipliers of the springs, equal to G u + h up to the
+            duality gap.
         rigid_multipliers: (p,) [J] multipliers of the rows without springs.
         value: [J] value of the objective.
         bound: [J] certified lower bound on the objective.
-        feasible: whether some clearances satisfy the rows without springs.
+        feasible: whether the rows without springs have a solution.
     """
 
     clearances: NDArray
@@ -85,12 +83,12 @@ class ConicSolution:
 
     @property
     def gap(self) -> float:
-        """[J] value minus bound."""
+        """Objective minus its lower bound [J]."""
         return self.value - self.bound
 
 
 class ConeProgramme(NamedTuple):
-    """Arguments of :func:`minimise_energy`, scaled to order 1."""
+    """Scaled arguments of :func:`minimise_energy`."""
 
     G: NDArray
     h: NDArray
@@ -104,7 +102,7 @@ def minimise_energy(
     G: NDArray, h: NDArray, d: NDArray, H: NDArray, k: NDArray, group: NDArray,
     method: Method = "compiled",
 ) -> ConicSolution:  # fmt: skip
-    """Minimise |G u + h|^2 / 2 - d.u subject to H u = k and every cone's |u_k| <= 1.
+    """Minimise |G u + h|^2 / 2 - d.u subject to H u = k and |u_k| <= 1 for each cone.
 
     Args:
         G: (r, nu) [sqrt(2 J)] matrix.
@@ -122,7 +120,7 @@ def minimise_energy(
     Raises:
         SolverFailed: Clarabel returned no usable solution.
     """
-    if not (h.any() or d.any() or k.any()):  # the closures hold and no load acts
+    if not (h.any() or d.any() or k.any()):  # closed loops without loads
         zeros = np.zeros(len(h)), np.zeros(len(k))
         return ConicSolution(np.zeros(len(d)), *zeros, 0.0, 0.0)
     if G.shape[1] == 0:
@@ -168,7 +166,7 @@ def minimise_energy(
 
 
 def _proved(least: ConicSolution, h: NDArray) -> bool:
-    """Return whether the certified gap of a scaled problem is small enough."""
+    """Return whether the gap of a solution is within the tolerance."""
     allowed = GAP * abs(least.value) + GAP_WITHOUT_CLEARANCE * float(h @ h) / 2
     return least.gap <= _SHARE * allowed
 
@@ -176,7 +174,7 @@ def _proved(least: ConicSolution, h: NDArray) -> bool:
 def _compiled(
     G: NDArray, h: NDArray, d: NDArray, H: NDArray, k: NDArray, group: NDArray
 ) -> tuple[NDArray | None, NDArray, str]:
-    """Solve by the compiled interior-point method; the solution must satisfy H."""
+    """Solve a problem by the compiled interior-point method."""
     u, n = one_problem.interior_point((G, h, d, H, k), cone_starts(group), _GAP_WITHIN)
     finite = np.isfinite(u).all() and np.isfinite(n).all()
     if not finite or np.abs(H @ u - k).max(initial=0.0) > _RESIDUAL:
@@ -188,12 +186,11 @@ def _by_clarabel(
     regularisation: float, G: NDArray, h: NDArray, d: NDArray, H: NDArray, k: NDArray,
     group: NDArray,
 ) -> tuple[NDArray | None, NDArray, str]:  # fmt: skip
-    """Solve by Clarabel, with v = -G u - h as additional variables."""
+    """Solve a problem by Clarabel, with v = -G u - h as additional variables."""
     r, nu = G.shape
     cones, radii = _unit_cones(group, np.ones(nu))
     rows = np.vstack([G, H, cones.toarray()])
-    # the matrix is dense, because assembling a small sparse matrix takes longer than
-    # solving
+    # A dense matrix is faster for small problems.
     A = csc_matrix(np.hstack([rows, np.eye(len(rows), r)]))
     b = np.concatenate([-h, k, radii])
     P = csc_matrix(np.diag(np.repeat([0.0, 1.0], [nu, r])))
@@ -219,14 +216,14 @@ _SOLVERS: dict[Method, tuple[_Solver, ...]] = {
 def _certified(
     problem: ConeProgramme, u: NDArray, rigid: NDArray, method: Method
 ) -> Iterator[ConicSolution]:
-    """Yield a certified solution, followed by solutions refined by Newton's method."""
+    """Yield certified solutions before and after refinement by Newton's method."""
     own = _certify(problem, u, problem.G @ u + problem.h, rigid)
-    if method == "reference":  # Clarabel's multipliers are rarely better
+    if method == "reference":  # The multipliers of Clarabel rarely improve the bound.
         for refined in refine(problem, u, rigid):
             yield from _checked(problem, *refined)
     yield own
     if method == "reference" or np.bincount(problem.group).max() > 2:
-        return  # the compiled Newton's method supports discs and intervals only
+        return  # The compiled Newton's method supports cones of at most two columns.
     G, h, d, H, k, group = problem
     u, y, starts = u.copy(), np.concatenate([h, -rigid]), cone_starts(group)
     relative = _STOP * GAP
@@ -239,7 +236,7 @@ def _certified(
 def _checked(
     problem: ConeProgramme, u: NDArray, springs: NDArray, rigid: NDArray
 ) -> Iterator[ConicSolution]:
-    """Yield the last iterate of Newton's method if it satisfies all constraints."""
+    """Yield the last Newton iterate if it satisfies all constraints."""
     u = into_cones(u, problem.group)
     if all(np.isfinite(part).all() for part in (u, springs, rigid)):
         if np.abs(problem.H @ u - problem.k).max(initial=0.0) <= _RESIDUAL:
@@ -249,12 +246,12 @@ def _checked(
 def _certify(
     problem: ConeProgramme, u: NDArray, springs: NDArray, rigid: NDArray
 ) -> ConicSolution:
-    """Return a solution with its objective and the bound from its multipliers."""
+    """Return a solution with its objective and its certified lower bound."""
     strain = problem.G @ u + problem.h
     value = float(strain @ strain) / 2 - float(problem.d @ u)
     bound = _energy_bound(problem, springs, rigid)
     if not problem.d.any():
-        # every multiple f of the multipliers proves a bound: f gain - f^2 cost / 2
+        # Every multiple f of the multipliers proves the bound f gain - f^2 cost / 2.
         cost = float(springs @ springs)
         factor = max(0.0, bound + cost / 2) / cost if cost > 0.0 else 0.0
         better = _energy_bound(problem, factor * springs, factor * rigid)
@@ -266,16 +263,16 @@ def _certify(
 def _energy_bound(problem: ConeProgramme, spring: NDArray, rigid: NDArray) -> float:
     """Compute a certified lower bound on problem (22) from estimated multipliers.
 
-    For every y and n:  |Gu + h|^2/2 - d.u  >=  y.(Gu + h) - y.y/2 - d.u + n.(k - Hu).
-    The minimum of the right side over the unit cones has a closed form.
+    For every y and n, |Gu + h|^2/2 - d.u >= y.(Gu + h) - y.y/2 - d.u + n.(k - Hu).  The
+    minimum of the right-hand side over the unit cones has a closed form.
 
     Args:
         problem: scaled problem.
-        spring: (r,) estimate of y; G u + h at the minimum is the best one.
+        spring: (r,) estimate of y; the best value is G u + h at the minimum.
         rigid: (p,) estimate of n.
 
     Returns:
-        The bound, which is close to the minimum if the estimates are close.
+        The certified lower bound.
     """
     G, h, d, H, k, group = problem
     gradient = G.T @ spring - d - H.T @ rigid
@@ -286,16 +283,16 @@ def _energy_bound(problem: ConeProgramme, spring: NDArray, rigid: NDArray) -> fl
 def least_factor(
     B: NDArray, right: NDArray, group: NDArray, scaled: NDArray
 ) -> tuple[float | None, NDArray, NDArray]:
-    """Return the smallest t with B u = right and |u_k| <= t (or <= 1 if not scaled).
+    """Return the smallest t with B u = right and |u_k| <= t (<= 1 for fixed cones).
 
     Args:
         B: (m, nu) matrix of full row rank, m >= 1.
         right: (m,) right side.
         group: (nu,) cone of each column.
-        scaled: (nu,) bool, whether t scales the column's cone.
+        scaled: (nu,) bool, True if t scales the cone of the column.
 
     Returns:
-        The factor t, or None if no factor suffices; the clearances u (nu,); and the
+        The factor t, or None if there is no solution; the clearances u (nu,); and the
         multipliers (m,) that prove t.
 
     Raises:
@@ -303,7 +300,7 @@ def least_factor(
     """
     m, nu = B.shape
     rows = np.linalg.norm(B, axis=1)
-    # if every cone is scaled, t is proportional to ``right``, which is normalised
+    # If all cones are scaled, t is proportional to ``right``, which is normalised.
     size = np.linalg.norm(right / rows) if scaled.all() else 1.0
     unit_cones, radii = _unit_cones(group, np.where(scaled, 0.0, 1.0))
     _, factors = _unit_cones(group, np.where(scaled, -1.0, 0.0))
@@ -333,9 +330,9 @@ def least_factor(
 
 
 def _unit_cones(group: NDArray, radius: NDArray) -> tuple[csc_matrix, NDArray]:
-    """Return rows s = b - A u in second-order cones [radius; -u_k], as (A, b)."""
+    """Return A and b of the conic constraints s = b - A u = [radius; -u_k]."""
     nu, cones = len(group), int(group.max()) + 1
-    # rows of each cone: one for the radius, then its columns, in order
+    # rows of each cone: the radius, then its columns
     at = np.arange(nu) + group + 1
     A = csc_matrix((np.ones(nu), (at, np.arange(nu))), shape=(nu + cones, nu))
     b = np.zeros(nu + cones)
@@ -356,7 +353,7 @@ def _clarabel(
     P: csc_matrix, q: NDArray, A: csc_matrix, b: NDArray, cones: _Cones,
     regularisation: float,
 ) -> tuple[NDArray | None, NDArray, str]:  # fmt: skip
-    """Minimise x.P.x/2 + q.x with A x + s = b; return primal, dual and status."""
+    """Minimise x.P.x/2 + q.x subject to A x + s = b by Clarabel."""
     import clarabel
 
     settings = clarabel.DefaultSettings()
@@ -371,7 +368,7 @@ def _clarabel(
     solution = clarabel.DefaultSolver(P, q, A, b, sets, settings).solve()
     status = str(solution.status)
     x, z = np.array(solution.x), np.array(solution.z)
-    # an inaccurate solution is accepted here, because its certificate is checked later
+    # An inaccurate solution is accepted, because its certificate is checked later.
     usable = {"Solved", "AlmostSolved", "InsufficientProgress", "MaxIterations"}
     if status not in usable or not (np.isfinite(x).all() and np.isfinite(z).all()):
         return None, z, status
@@ -381,9 +378,9 @@ def _clarabel(
 def _proves_no_point(
     n: NDArray, H: NDArray, k: NDArray, group: NDArray, radius: NDArray
 ) -> bool:
-    """Return whether n proves infeasibility of H u = k with |u_k| <= radius_k."""
-    # n.H u is at most the sum of radius_k |(H^T n)_k|, so n.k > that sum is a proof if
-    # the difference also exceeds the round-off errors of the terms
+    """Return whether n proves that H u = k with |u_k| <= radius_k is infeasible."""
+    # Since n.H u is at most the sum of radius_k |(H^T n)_k|, the equation H u = k is
+    # infeasible if n.k exceeds this sum by more than round-off.
     most = float(cone_sizes(H.T @ n, group) @ radius)
     rounding = 1e-13 * float(np.abs(n) @ (np.abs(k) + np.abs(H).sum(axis=1)))
     return bool(float(n @ k) > most + rounding)

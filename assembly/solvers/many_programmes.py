@@ -1,8 +1,8 @@
 """Compiled solution of cone programs that differ only in their right-hand sides.
 
 Each program has the form of :func:`forcefit.assembly.solvers.conic.minimise_energy` and
-is solved in one lane of the processor's vector registers.  Programs whose solution
-cannot be certified are solved again, one at a time.
+is solved in one lane of the processor's vector registers.  Programs without certified
+solution are solved again one by one.
 """
 
 from typing import NamedTuple
@@ -19,10 +19,10 @@ from forcefit.assembly.solvers.conic import (
     minimise_energy,
 )
 
-# fraction of the proved gap that is required here, because callers increase the gap
+# fraction of GAP that is required here, because the full problem has a larger gap
 _SHARE = 0.1
-_RESIDUAL = 1e-11  # accepted residual of a row without springs
-# a cone counts as loaded if its force exceeds this fraction of that without clearance
+_RESIDUAL = 1e-11  # largest residual of a row without springs
+# force of a loaded cone, relative to the energy without clearance
 _LOADED = 1e-9
 
 
@@ -32,7 +32,7 @@ class Minima(NamedTuple):
     Attributes:
         clearances: (n, nu) clearances relative to their bounds.
         rigid_multipliers: (n, p) [J] multipliers of the rows without springs.
-        feasible: (n,) bool, whether clearances satisfy the rows without springs.
+        feasible: (n,) bool, True if the rows without springs have a solution.
     """
 
     clearances: NDArray
@@ -43,7 +43,7 @@ class Minima(NamedTuple):
 def minimise_energies(
     G: NDArray, h: NDArray, d: NDArray, H: NDArray, k: NDArray, group: NDArray
 ) -> Minima:
-    """Minimise |G u + h|^2 / 2 - d.u subject to H u = k and every cone's |u_c| <= 1.
+    """Minimise |G u + h|^2 / 2 - d.u subject to H u = k and |u_c| <= 1 for each cone.
 
     Args:
         G: (r, nu) [sqrt(2 J)] matrix.
@@ -54,7 +54,7 @@ def minimise_energies(
         group: (nu,) cone of each column, counted from 0.
 
     Returns:
-        The minimisers, each with a certified gap.
+        The minimisers with certified gaps.
 
     Raises:
         SolverFailed: no usable solution was found for one of the programs.
@@ -75,16 +75,15 @@ def minimise_energies(
 
 
 def into_cones_of_each(u: NDArray, group: NDArray) -> NDArray:
-    """Project (n, nu) vectors onto the unit cones by shortening long components."""
+    """Project vectors (n, nu) onto the unit cones."""
     return u / np.maximum(1.0, cone_sizes(u, group))[:, group]
 
 
 def _proved(problem: tuple[NDArray, ...], u: NDArray, n: NDArray) -> NDArray:
-    """Return (n,) bool, True for solutions with a small gap that satisfy H u = k.
+    """Return a mask (n,) of solutions that satisfy H u = k and have a small gap.
 
-    For every y and n the energy is at least the bound of
-    :func:`forcefit.assembly.solvers.conic.minimise_energy`, here at y = G u + h, or at
-    the best multiple of y and n where no load acts.
+    The lower bound is that of :func:`forcefit.assembly.solvers.conic.minimise_energy`
+    for y = G u + h, or for the best multiple of y and n if no load acts.
     """
     G, h, d, H, k, group = problem
     y = u @ G.T + h
@@ -103,25 +102,24 @@ def _proved(problem: tuple[NDArray, ...], u: NDArray, n: NDArray) -> NDArray:
 def closest_of_same_energy(
     minima: Minima, last: NDArray, rows: NDArray, problem: tuple[NDArray, ...]
 ) -> NDArray:
-    """Return the minimisers that are closest to given points.
+    """Return the minimisers of equal energy that are closest to given points.
 
     Args:
         minima: n solutions of :func:`minimise_energies`.
         last: (n, nu) given points.
-        rows: (p, nu) orthonormal rows whose products with the points are preserved.
+        rows: (p, nu) orthonormal rows of equations that the minimisers satisfy.
         problem: G, h, d, H and group of :func:`minimise_energies`.
 
     Returns:
-        (n, nu) points.
+        (n, nu) clearances of the closest minimisers.
     """
     G, h, d, H, group = problem
     u = minima.clearances
     forces = (u @ G.T + h) @ G - d - minima.rigid_multipliers @ H
     size, slack = cone_sizes(forces, group), 1.0 - cone_sizes(u, group)
     scale = (np.abs(h) @ np.abs(G) + np.abs(d)).max(axis=1, initial=0.0)[:, None]
-    # a loaded clearance is at its bound, where the rows determine its position. Its
-    # force times its distance from the bound is about the gap, so one of the two is
-    # nearly zero
+    # A loaded clearance is at its bound. The product of its force and its distance from
+    # the bound is about the gap, so one of the two factors is nearly zero.
     kept = (size > scale * slack) & (size > _LOADED * scale) & (scale > 0.0)
     closest, solved = np.array(u, order="C"), np.zeros(len(u), dtype=np.int64)
     starts = cone_starts(group)
@@ -133,7 +131,7 @@ def closest_of_same_energy(
 
 
 def _closest(u: NDArray, last: NDArray, rows: NDArray, group: NDArray) -> NDArray:
-    """Find the closest point by solving a cone program."""
+    """Return the closest point by the solution of a cone program."""
     eye, zero = np.eye(len(u)), np.zeros(len(u))
     try:
         found = minimise_energy(eye, -last, zero, rows, rows @ u, group)

@@ -1,9 +1,9 @@
-"""Names of the two solution methods offered by every public solver."""
+"""Names of the two solution methods."""
 
 import logging
 from typing import Literal, get_args
 
-# the C++ code of assembly/kernels, or numpy and Clarabel only
+# compiled C++ code, or numpy and Clarabel only
 Method = Literal["compiled", "reference"]
 METHODS = get_args(Method)
 _LOG = logging.getLogger("forcefit.solve")
@@ -29,7 +29,7 @@ def log_reference(robot: str, what: str, left: int, count: int) -> None:
     Args:
         robot: name of the robot.
         what: name of the computed quantity.
-        left: number of points that the compiled method could not certify.
+        left: number of points without certified solution.
         count: total number of points.
     """
     _LOG.info(

@@ -1,7 +1,4 @@
-"""Compiled solvers for cones of any dimension, and for the farthest screw of a set.
-
-Each function solves one problem per call; :func:`farthest_points` solves many.
-"""
+"""Compiled solvers for cones of any dimension, and for the farthest screw of a set."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -12,8 +9,8 @@ from numpy.typing import NDArray
 from forcefit.assembly.kernels.choice import kernels
 
 Problem = tuple[NDArray, NDArray, NDArray, NDArray, NDArray]
-# function of a direction that returns the certified height, a (6,) screw that
-# approximately attains it, and the (nv,) gradient
+# Support function: it returns a certified height along a direction, a screw (6,) that
+# approximately attains the height, and the gradient (nv,).
 Support = Callable[[NDArray], tuple[float, NDArray, NDArray]]
 
 
@@ -23,7 +20,7 @@ class SolverLimits(NamedTuple):
     Attributes:
         relative: required gap relative to |G u + h|^2 / 2.
         absolute: required absolute gap, added to the relative one.
-        first_sigma: first sigma of Newton's method, relative to the mean |G_k^T h|.
+        first_sigma: initial sigma of Newton's method, relative to the mean |G_k^T h|.
         steps: largest number of Newton steps.
     """
 
@@ -62,8 +59,8 @@ def newton(
         starts: see :func:`interior_point`.
         limits: limits of the iteration.
         u: (nu,) initial guess within the cones; overwritten with the solution.
-        y: (r + p,) initial guess for the multipliers of the rows of G and H;
-            overwritten with the solution.
+        y: (r + p,) initial guess of the multipliers of G and H; overwritten with the
+            solution.
     """
     kernels.newton(*_contiguous(*problem), _integers(starts), *limits, u, y)
 
@@ -83,9 +80,9 @@ def farthest_points(
 
     Returns:
         u (k, nu) and the multipliers n (k, p) of the rows at the last iterate.  They
-        satisfy d.u <= n.right + sum |(d - rows^T n)_c|.  Also (k,) bool, True if the
-        gap between both sides is within the tolerance and the rows hold to machine
-        precision.
+        satisfy d.u <= n.right + sum |(d - rows^T n)_c|. Also a mask (k,) of points
+        where the two sides differ by less than the tolerance and the equations are
+        satisfied to machine precision.
     """
     count, (p, nu) = len(directions), rows.shape
     points, multipliers = np.zeros((count, nu)), np.zeros((count, p))
@@ -111,14 +108,14 @@ def farthest(
         starts: (cones + 1,) index of the first column of each cone, then nv.
         half: 0 for the rotation, 3 for the translation.
         tolerance: [rad or m] required gap between upper and lower bound.
-        support: function of a direction (3,) of that half, called if the compiled
-            method is not accurate enough.  Its gradient is X^T d minus the contribution
-            of the rows' multipliers.
+        support: support function of a direction (3,) of this half, called if the
+            compiled method is inaccurate.  Its gradient is X^T d minus the contribution
+            of the multipliers of H.
 
     Returns:
         (2,) lower and upper bound; (6,) the screw that attains the lower bound; and the
-        number of support functions evaluated.  The bounds can be wider than required if
-        400 support functions do not suffice.
+        number of support functions.  With more than 400 support functions, the bounds
+        can be wider than required.
     """
 
     def asked(direction: tuple[float, float, float]) -> tuple[float, NDArray, NDArray]:
@@ -135,10 +132,10 @@ def farthest(
 
 
 def _contiguous(*arrays: NDArray) -> tuple[NDArray, ...]:
-    """Convert the arrays to C-contiguous arrays of float, for C++."""
+    """Convert arrays to C-contiguous arrays of floats."""
     return tuple(np.ascontiguousarray(array, dtype=float) for array in arrays)
 
 
 def _integers(array: NDArray) -> NDArray:
-    """Convert an array to contiguous 64-bit integers, for C++."""
+    """Convert an array to contiguous 64-bit integers."""
     return np.ascontiguousarray(array, dtype=np.int64)

@@ -1,9 +1,9 @@
 """Bound the farthest screw of a convex set by cuts, in numpy (reference method).
 
-Each support function d.x <= h(d) cuts off a half space, and the cuts form a polytope
-around the set.  The farthest corner of the polytope gives an upper bound on the
-distance, and the farthest point that attains a support function gives a lower bound.
-The next cut is made in the direction of the farthest corner.
+Each support function d.x <= h(d) removes a half space, and the remaining polytope
+contains the set.  The farthest corner of the polytope gives an upper bound on the
+distance, and the farthest known point of the set gives a lower bound.  The next support
+function is in the direction of the farthest corner.
 
 Sources:
     Hoffman (1981), A method for globally minimizing concave functions over convex sets,
@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from forcefit.assembly.solvers.one_problem import Support
 
 _MOST = 400  # largest number of support functions
-# offset of every cut from the set, so that the polytope around a flat set has corners
-# as well: relative to the tolerance, but at least relative to the size of the set
+# Offset of every cut from the set, relative to the tolerance, but at least relative to
+# the size of the set. The polytope around a flat set then has corners.
 _SLACK, _LEAST_SLACK = 0.25, 1e-7
 
 
@@ -30,17 +30,17 @@ def farthest(
         centre: (6,) [rad, m] screw of the set.
         half: 0 for the rotation, 3 for the translation.
         tolerance: [rad or m] required gap between upper and lower bound.
-        support: support function of a direction (3,) of that half.
+        support: support function of a direction (3,) of this half.
 
     Returns:
         Lower and upper bound; (6,) the screw that attains the lower bound; and the
-        number of support functions evaluated.  The bounds can be wider than required if
-        400 support functions do not suffice.
+        number of support functions.  With more than 400 support functions, the bounds
+        can be wider than required.
     """
     part = slice(half, half + 3)
     best, low = centre, float(np.linalg.norm(centre[part]))
     cuts: list[NDArray] = []
-    room: list[float] = []  # distance [rad or m] from the centre of the set to each cut
+    room: list[float] = []  # [rad or m] distance of each cut from the centre
     directions = [*np.eye(3), *-np.eye(3)]
     while True:
         for direction in directions:
@@ -59,7 +59,7 @@ def farthest(
 
 
 def _farthest_corner(cuts: NDArray, room: NDArray, centre: NDArray) -> NDArray:
-    """Return the corner (3,) of {cuts (x - centre) <= room} with the largest norm."""
+    """Return the corner of {cuts (x - centre) <= room} with the largest norm, (3,)."""
     from scipy.spatial import HalfspaceIntersection
 
     unit = room.max()

@@ -1,8 +1,8 @@
 r"""Refine a minimum of :func:`.conic.minimise_energy` in numpy.
 
-A cone solver stops at a small duality gap.  Once the cones in contact, with contact
-forces f, are known, the minimum satisfies equations that Newton's method solves to
-machine precision.  Let y be the springs and n the multipliers of H:
+A cone solver stops at a small duality gap.  If the cones in contact are known, the
+minimum satisfies equations that Newton's method solves to machine precision.  With the
+springs y, the multipliers n of H and the contact forces f, these are
 
     G u + h - y = 0,  G' y - d - H' n + f_c u_c = 0,  H u = k,  (|u_c|^2 - 1) / 2 = 0.
 
@@ -17,12 +17,12 @@ from numpy.typing import NDArray
 
 from forcefit.assembly.solvers.cones import cone_sizes
 
-_STEPS = 4  # largest number of Newton steps; two are usual
-_SETTLED = 1e-12  # [-] size of the last clearance step at convergence
-_GUESSES = 6  # largest number of guesses of the cones in contact; usually one suffices
-# [-] distances from the bound below which a cone with a force counts as in contact
+_STEPS = 4  # largest number of Newton steps
+_SETTLED = 1e-12  # [-] size of the last step at convergence
+_GUESSES = 6  # largest number of guesses of the cones in contact
+# [-] distances from the bound below which a cone with a force is in contact
 _NEAR = 1e-2, 0.0
-_BEYOND = 1e-9  # [-] accepted excess over its bound for a cone that is not in contact
+_BEYOND = 1e-9  # [-] largest excess of a cone without contact over its bound
 
 _Problem = tuple[NDArray, NDArray, NDArray, NDArray, NDArray, NDArray]
 _Point = tuple[NDArray, NDArray, NDArray]
@@ -38,14 +38,13 @@ def refine(problem: _Problem, u: NDArray, n: NDArray) -> Iterator[_Point]:
         n: (p,) multipliers of H at this solution.
 
     Yields:
-        u (nu,), y (r,) and n (p,) for each guess of the cones in contact; less accurate
-        if these cones cannot be identified.
+        u (nu,), y (r,) and n (p,) for each guess of the cones in contact.
     """
     G, h, d, H, _, group = problem
     y = G @ u + h
     force, slack = cone_sizes(G.T @ y - d - H.T @ n, group), 1.0 - cone_sizes(u, group)
-    # the product of force and distance from the bound is about the solver's gap: one of
-    # them is nearly zero
+    # The product of force and distance from the bound is about the gap, so one of the
+    # two factors is nearly zero.
     scale = max(float(y @ y) / 2, float(force.max()), 1e-300)
     for near in _NEAR:
         pressed = (slack < near) | (force > scale * slack)
@@ -55,7 +54,7 @@ def refine(problem: _Problem, u: NDArray, n: NDArray) -> Iterator[_Point]:
 def _settled(
     problem: _Problem, start: _Point, pressed: NDArray, force: NDArray
 ) -> _Point:
-    """Update the set of cones in contact until it is consistent with the minimum."""
+    """Update the set of cones in contact until it agrees with the minimum."""
     for _ in range(_GUESSES):
         settled, forces = _with_pressed(problem, start, pressed, force)
         beyond = ~pressed & (cone_sizes(settled[0], problem[-1]) > 1.0 + _BEYOND)
@@ -69,7 +68,7 @@ def _settled(
 def _with_pressed(
     problem: _Problem, start: _Point, pressed: NDArray, force: NDArray
 ) -> tuple[_Point, NDArray]:
-    """Return the Newton solution for given cones in contact, and the contact forces."""
+    """Return the Newton solution and contact forces for given cones in contact."""
     G, h, d, H, k, group = problem
     u, y, n = start
     held = np.flatnonzero(pressed)
@@ -95,7 +94,7 @@ def _with_pressed(
 
 
 def _derivatives(G: NDArray, H: NDArray, N: NDArray, curvature: NDArray) -> NDArray:
-    """Return the Jacobian of the equations in u, y, n and f; N contains the normals."""
+    """Return the Jacobian of the equations with respect to u, y, n and f."""
     r, p, m = len(G), len(H), N.shape[1]
     return np.block([
         [G, -np.eye(r), np.zeros((r, p + m))],

@@ -1,17 +1,14 @@
 """Sample uniformly distributed clearance positions by the billiard walk.
 
 The set of positions is {u : rows (u - start) = 0, |u_k| <= 1 for each cone k}.  Near
-the edge of an assembly zone this set is thin in some directions, and a walk with
-isotropic steps would mix slowly.  Directions are therefore drawn from the Dikin
-ellipsoid at the analytic centre, which has the proportions of the set: it is contained
-in the set, and the set is contained in the ellipsoid scaled by the number of cones.
-The walk is affine invariant.
+the edge of an assembly zone, this set is thin in some directions.  Directions are
+therefore sampled from the Dikin ellipsoid at the analytic centre.  The ellipsoid is
+inside the set, and the set is inside the ellipsoid multiplied by the number of cones.
 
-A trajectory moves straight for a random time and is reflected at every bound.  It
-crosses the set several times, whereas a hit-and-run step ends at the first bound.
-Several chains from different initial points are compared.  Their length is doubled, and
-their first half discarded, until the split R-hat and the effective sample size of every
-component of the platform screw meet their criteria.
+A trajectory is straight for a random time and is reflected at every bound.  Chains from
+different initial points are compared.  Their length is doubled until the split R-hat
+and the effective sample size of the platform screw satisfy their criteria.  The first
+half of each chain is discarded.
 
 Sources:
     Gryazina, Polyak (2014), Random sampling: billiard walk algorithm; Nesterov,
@@ -22,13 +19,13 @@ Sources:
 import numpy as np
 from numpy.typing import NDArray
 
-# number of chains, and number of points compared in each chain
+# number of chains, and number of points of each chain
 CHAINS, KEPT = 4, 64
 # largest accepted split R-hat, and smallest accepted effective sample size
 R_HAT, EFFECTIVE = 1.05, 100.0
-# largest number of doublings of the chains: 4 x 65 472 trajectories per sample
+# largest number of doublings of the chain length
 DOUBLINGS = 10
-_CONSTANT = 1e-12  # [rad or m] standard deviation below which a component is constant
+_CONSTANT = 1e-12  # [rad or m] standard deviation of a constant component
 _NEWTON = 300  # largest number of Newton iterations
 
 
@@ -36,10 +33,10 @@ def sample_uniform_position(
     Z: NDArray, starts: NDArray, to_screw: NDArray, u: NDArray,
     rng: np.random.Generator, doublings: int = DOUBLINGS,
 ) -> bool:  # fmt: skip
-    """Overwrite u with a sample from the uniform distribution over the set.
+    """Replace u by a sample from the uniform distribution over the set.
 
     Args:
-        Z: (nu, n) orthonormal columns: directions in which u can move.
+        Z: (nu, n) orthonormal columns of the directions in which u can move.
         starts: (cones + 1,) index of the first clearance of each cone, then nu.
         to_screw: (6, nu) [rad, m] map from u to the platform screw.
         u: (nu,) a point of the set, overwritten with the sample.
@@ -47,7 +44,8 @@ def sample_uniform_position(
         doublings: largest number of doublings of the chains.
 
     Returns:
-        Whether the chains mixed; u is unchanged if the set has an empty interior.
+        Whether the chains have mixed.  If the set has an empty interior, u does not
+        change.
     """
     from forcefit.assembly.solvers.billiard_walk import Positions
 
@@ -75,13 +73,13 @@ def sample_uniform_position(
 def _ellipsoid(
     Z: NDArray, starts: NDArray, start: NDArray
 ) -> tuple[NDArray, NDArray] | None:
-    """Return the analytic centre, and the (nu, n) axes of Dikin's ellipsoid there.
+    """Return the analytic centre of the set, and the axes of Dikin's ellipsoid.
 
-    Damped Newton steps minimise -sum log(rho^2 - |u_k|^2) and stay inside.  Initially
-    rho is large enough for the start point to be inside; it then decreases to 1.
+    Damped Newton steps minimise -sum log(rho^2 - |u_k|^2).  The radius rho decreases to
+    1 from a value for which the start point is inside.
 
     Returns:
-        Centre and axes in columns; None if the set has an empty interior.
+        Centre (nu,) and axes (nu, n); None if the set has an empty interior.
     """
     u, heads = start.copy(), starts[:-1]
     cone = np.repeat(np.arange(len(heads)), np.diff(starts))
@@ -99,7 +97,7 @@ def _ellipsoid(
                 # M M^T = Z H^-1 Z^T
                 M = np.linalg.solve(np.linalg.cholesky(H), Z.T).T
                 return u, np.ascontiguousarray(M)
-        except np.linalg.LinAlgError:  # the interior of the set is numerically empty
+        except np.linalg.LinAlgError:  # The set has an empty interior.
             return None
         u += Z @ (step / (1.0 + decrement))
         if rho > 1.0 and decrement < 0.5:
@@ -114,15 +112,15 @@ def _ellipsoid(
 
 
 def _largest(heads: NDArray, u: NDArray) -> float:
-    """Return the largest norm of u over all cones, which is 1 on the boundary."""
+    """Return the largest norm of u over all cones."""
     return float(np.sqrt(np.add.reduceat(u * u, heads).max()))
 
 
 def is_mixed(trace: NDArray) -> bool:
-    """Return whether the chains of all varying components have mixed."""
+    """Return whether the chains have mixed in all components that vary."""
     moving = trace[:, :, trace.std(axis=(0, 1)) > _CONSTANT]
     return all(
-        # the condition is written so that NaN counts as not mixed
+        # With NaN, the comparison is False, so the chains are not mixed.
         r_hat <= R_HAT and effective >= EFFECTIVE
         for r_hat, effective in map(diagnose, np.moveaxis(moving, 2, 0))
     )
@@ -132,11 +130,11 @@ def diagnose(x: NDArray) -> tuple[float, float]:
     """Compute split R-hat and the effective sample size of one component.
 
     Args:
-        x: (chains, 2 k) values along each chain; each half counts as a chain.
+        x: (chains, 2 k) values along each chain; each half is treated as a chain.
 
     Returns:
-        R-hat and effective sample size.  R-hat tends to 1 as the chains become
-        independent of their initial points; it is infinite if no chain moves.
+        R-hat and effective sample size.  R-hat is 1 for chains that are independent of
+        their initial points, and infinite if no chain moves.
     """
     k = x.shape[1] // 2
     halves = x[:, : 2 * k].reshape(-1, k)
@@ -148,8 +146,8 @@ def diagnose(x: NDArray) -> tuple[float, float]:
         return np.inf, 0.0
     whole = within * (k - 1) / k + float(means.var()) * m / (m - 1)
     r_hat = np.sqrt(whole / within)
-    # Geyer's initial monotone sequence: sums of pairs of autocorrelations as long as
-    # they are positive and do not increase
+    # Geyer's initial monotone sequence is the sum of pairs of autocorrelations while
+    # they are positive and decrease.
     time, before = -1.0, np.inf
     for lag in range(0, k - 1, 2):
         pair = 0.0

@@ -1,4 +1,4 @@
-"""Minimum energies and factors: optimality conditions, proofs, and special cases."""
+"""Optimality conditions and proofs of minimum energies and factors."""
 
 import numpy as np
 import pytest
@@ -12,11 +12,11 @@ GROUP = np.array([0, 0, 1, 2, 2])
 
 @pytest.fixture
 def rng():
-    """Problems whose equations the interior-point method satisfies to 1e-11."""
+    """Return a generator of problems that the interior-point method solves to 1e-11."""
     return np.random.default_rng(3)
 
 
-def test_minimum_energy_is_zero_without_a_gap_and_largest_without_clearance(rng):
+def test_minimum_energy_is_between_zero_and_that_without_clearance(rng):
     G, H, h = rng.normal(size=(2, 5)), rng.normal(size=(1, 5)), np.array([3.0, 4.0])
     none = minimise_energy(G, 0 * h, np.zeros(5), H, np.zeros(1), GROUP)
     assert (none.value, none.bound, none.feasible) == (0.0, 0.0, True)
@@ -30,8 +30,8 @@ def test_minimum_energy_is_zero_without_a_gap_and_largest_without_clearance(rng)
 
 @pytest.mark.parametrize("unit", [1e-6, 1.0, 1e6])
 @pytest.mark.parametrize("scale", [1e-3, 1.0, 30.0])
-def test_solution_within_all_cones_solves_the_linear_equations(rng, unit, scale):
-    """G'(G u + h) - d = H'n and H u = k, for any energy unit and row scaling."""
+def test_solution_inside_all_cones_satisfies_linear_equations(rng, unit, scale):
+    """The equations are G'(G u + h) - d = H'n and H u = k."""
     G, H = rng.normal(size=(6, 5)), scale * np.array([[1.0], [7.0]]) * np.eye(2, 5)
     u, n = np.array([0.1, 0.2, -0.3, 0.1, 0.2]), np.array([0.4, -0.3]) / scale
     h = 0.2 * rng.normal(size=6)
@@ -50,8 +50,8 @@ def test_solution_within_all_cones_solves_the_linear_equations(rng, unit, scale)
 
 @pytest.mark.parametrize("row", [1e-5, 1.0, 1e4])
 @pytest.mark.parametrize("fixed", [False, True])
-def test_multipliers_prove_the_smallest_factor(rng, row, fixed):
-    """n.B u = n.right <= t sum_scaled |(B'n)_k| + sum_fixed |(B'n)_k|, equal at t."""
+def test_multipliers_give_a_tight_bound_on_the_factor(rng, row, fixed):
+    """The bound n.right <= t sum_scaled |(B'n)_k| + sum_fixed |(B'n)_k| is attained."""
     B, scaled = rng.normal(size=(2, 5)), ~(fixed & (GROUP == 1))
     right = B @ np.array([3.0, 4.0, 0.0, 1.0, 2.0]) + B[:, 2]
     lengths = np.array([row, 7.0 * row])
@@ -68,8 +68,8 @@ def test_multipliers_prove_the_smallest_factor(rng, row, fixed):
 
 
 @pytest.mark.parametrize("reach", [1.2, 1.9, 30.0])
-def test_unreachable_row_without_scaled_cones_has_no_finite_factor(reach):
-    """The first row contains only the interval that is not scaled."""
+def test_infeasible_row_without_scaled_cones_has_no_factor(reach):
+    """The first row contains only an interval that is not scaled."""
     B = np.array([[3.0, 0.0], [50.0, 0.02]])
     right = np.array([3.0 * reach, 0.01])
     t, u, n = least_factor(B, right, np.array([0, 1]), np.array([False, True]))
@@ -84,7 +84,7 @@ NONE = np.zeros((0, 2))
 
 
 @pytest.mark.parametrize("off", [0.0, 1e-3, 1e-2])
-def test_closed_disc_moves_to_the_point_nearest_to_the_target(off):
+def test_loaded_disc_is_at_the_point_nearest_to_the_target(off):
     """The minimum of |u - a| over |u| <= 1 is a / |a|, with the force |a| - 1 = 12."""
     a = np.array([5.0, 12.0])
     guess = (1.0 - off) * np.array([np.cos(1.17 + off), np.sin(1.17 + off)])
@@ -95,8 +95,8 @@ def test_closed_disc_moves_to_the_point_nearest_to_the_target(off):
     assert len(n) == 0
 
 
-def test_closed_interval_stays_at_its_bound_and_the_equation_moves_the_other():
-    """Work 3 u_1 + u_2 on u_1 + u_2 = 1 / 2 within +-1: the corner (1, -1 / 2)."""
+def test_loaded_interval_is_at_its_bound():
+    """The maximum of 3 u_1 + u_2 with u_1 + u_2 = 1 / 2 is at (1, -1 / 2)."""
     H, k = np.array([[1.0, 1.0]]), np.array([0.5])
     problem = (NONE, np.zeros(0), np.array([3.0, 1.0]), H, k, np.array([0, 1]))
     u, y, n = next(refine(problem, np.array([0.999, -0.498]), np.array([-1.01])))

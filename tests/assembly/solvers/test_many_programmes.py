@@ -1,4 +1,4 @@
-"""Many cone programs with equal matrices, compared with Clarabel and by hand."""
+"""Many cone programs with equal matrices, compared with Clarabel."""
 
 import numpy as np
 import pytest
@@ -22,10 +22,7 @@ GROUPS = {
 def test_energies_of_many_cone_programs_equal_those_of_clarabel(
     rng, group, loads, rigid
 ):
-    """Both certify a gap of 1e-9 of the energy.
-
-    Clarabel, which solves the few that are not certified, satisfies equations to 2e-10.
-    """
+    """The certified gap is 1e-9 of the energy."""
     n, nu = 23, len(group)
     G, H = rng.normal(size=(4, nu)), rng.normal(size=(rigid, nu))
     h = rng.normal(size=(n, 4)) * np.logspace(-1, 1, n)[:, None]
@@ -41,7 +38,7 @@ def test_energies_of_many_cone_programs_equal_those_of_clarabel(
     assert found.clearances @ H.T == pytest.approx(k, abs=1e-9)
 
 
-def test_equations_beyond_all_clearances_are_infeasible():
+def test_equations_outside_the_clearances_are_infeasible():
     """With |u| <= 1, u = 0.5 is feasible and u = 2 is not."""
     none = np.zeros((2, 0))
     H, k = np.ones((1, 1)), np.array([[0.5], [2.0]])
@@ -53,13 +50,13 @@ def test_equations_beyond_all_clearances_are_infeasible():
 
 
 def unloaded(u):
-    """Positions of equal energy."""
+    """Return the minima of a problem without energy."""
     u = np.array(u, dtype=float)
     return Minima(u, np.zeros((len(u), 0)), np.ones(len(u), dtype=bool))
 
 
-def test_closest_positions_equal_hand_calculation():
-    """A disc with x = 0.6 and y within +-0.8, and two intervals with a given sum."""
+def test_closest_positions_equal_projections():
+    """The problem contains a disc with x = 0.6 and two intervals with a given sum."""
     disc, start = np.zeros(2, dtype=int), [[0.6, 0.0]] * 3
     last = np.array([[0.0, 2.0], [0.0, 0.3], [5.0, -1.0]])
     none = np.zeros((0, 2)), np.zeros((3, 0)), np.zeros((3, 2)), np.zeros((0, 2))
@@ -70,12 +67,12 @@ def test_closest_positions_equal_hand_calculation():
     last = np.array([[0.0, 0.0], [1.0, -1.0], [3.0, 0.5]])
     start = [[0.2, 0.8]] * 3
     found = closest_of_same_energy(unloaded(start), last, rows, (*none, intervals))
-    # the foot of the perpendicular, then the corner of the square
+    # foot of the perpendicular, then corner of the square
     assert found == pytest.approx(np.array([[0.5, 0.5], [1.0, 0.0], [1.0, 0.0]]))
 
 
-def test_solving_for_a_loaded_disc_does_not_move_other_discs():
-    """The energy (u_x - 3)^2 / 2 moves the disc to (1, 0); the interval is free."""
+def test_load_on_a_disc_does_not_move_other_discs():
+    """The energy (u_x - 3)^2 / 2 is minimal at (1, 0) of the disc."""
     G, h = np.array([[1.0, 0.0, 0.0]]), np.array([[-3.0]])
     group, d, H = np.array([0, 0, 1]), np.zeros((1, 3)), np.zeros((0, 3))
     minima = minimise_energies(G, h, d, H, np.zeros((1, 0)), group)

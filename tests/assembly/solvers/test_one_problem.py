@@ -1,4 +1,4 @@
-"""Single cone programs and farthest screws: closed forms, Clarabel, and proofs."""
+"""Cone programs and farthest screws, compared with closed forms and Clarabel."""
 
 import cvxpy as cp
 import numpy as np
@@ -16,13 +16,13 @@ SPRINGS = 4
 
 
 def random_cones(rng, widest):
-    """(nu,) cone of each column, with one to ``widest`` columns per cone."""
+    """Return the cone of each column, with one to ``widest`` columns per cone."""
     sizes = rng.integers(1, widest + 1, size=rng.integers(2, 9))
     return np.repeat(np.arange(len(sizes)), sizes)
 
 
 def inside(rng, group):
-    """A point within all unit cones."""
+    """Return a point within all unit cones."""
     u = rng.normal(size=len(group))
     return u / cone_sizes(u, group)[group] * rng.uniform(0, 0.9, group.max() + 1)[group]
 
@@ -39,7 +39,7 @@ def programme(seed, rows=1, springs=SPRINGS, group=GROUP):
 
 
 def least(p):
-    """Solve by Clarabel."""
+    """Return the solution of Clarabel."""
     u = cp.Variable(len(p.d))
     cones = [cp.norm(u[p.group == c]) <= 1 for c in range(p.group.max() + 1)]
     if len(p.k):
@@ -56,10 +56,8 @@ def value(p, u):
 
 @pytest.mark.parametrize("widest", [1, 2, 3, 20])
 @pytest.mark.parametrize("springs", [0, 5])
-def test_minimum_energies_of_both_methods_exceed_both_lower_bounds(
-    rng, widest, springs
-):
-    """The certified bound of each method is at most the value of the other."""
+def test_minimum_energies_of_both_methods_agree_with_both_bounds(rng, widest, springs):
+    """The bound of each method is at most the value of the other method."""
     for _ in range(6):
         group = random_cones(rng, widest)
         p = rng.integers(0, max(1, min(4, len(group) - 2)))
@@ -71,7 +69,7 @@ def test_minimum_energies_of_both_methods_exceed_both_lower_bounds(
         one = conic.minimise_energy(*given)
         other = conic.minimise_energy(*given, method="reference")
         answers = one, other
-        # the residual of the equations does work on their multipliers
+        # The multipliers do work on the residual of the equations.
         open_ = max(
             np.abs(H @ a.clearances - given[4]).max(initial=0.0) for a in answers
         )
@@ -94,7 +92,7 @@ def body_of(rng, group, rows=0, size=1.0):
 
 
 def test_farthest_point_of_a_ball_or_interval_equals_its_closed_form():
-    """The maximum of |c + r v| over |v| <= 1 is |c| + r, for a ball and an interval."""
+    """The maximum of |c + r v| over |v| <= 1 is |c| + r."""
     centre = np.array([0.0, 0.0, 0.0, 3e-3, 0.0, 4e-3])
     X = np.zeros((6, 4))
     X[3:, :3], X[0, 3] = 2e-3 * np.eye(3), 5e-3
@@ -111,8 +109,8 @@ def test_farthest_point_of_a_ball_or_interval_equals_its_closed_form():
 
 
 @pytest.mark.parametrize("widest", [2, 12])
-def test_farthest_distance_bounds_the_support_in_every_direction(rng, widest):
-    """Support functions by Clarabel in many directions, for cones of many columns."""
+def test_farthest_distance_bounds_all_support_functions(rng, widest):
+    """The support functions in many directions are computed by Clarabel."""
     for _ in range(4):
         group = random_cones(rng, widest)
         rows = int(rng.integers(0, max(1, min(4, len(group) - 2))))
@@ -129,7 +127,7 @@ def test_farthest_distance_bounds_the_support_in_every_direction(rng, widest):
 
 
 def height(body, part, direction):
-    """Support function of a set, evaluated by Clarabel."""
+    """Return the support function of a set, evaluated by Clarabel."""
     v = cp.Variable(len(body.start))
     step = body.map[part : part + 3].T @ direction
     size = np.linalg.norm(step)
@@ -160,12 +158,12 @@ def found(rows, group, d, right, tolerance=1e-9):
 
 
 @pytest.mark.parametrize("rows", [1, 2, 3])
-def test_multipliers_prove_that_no_point_is_farther(rng, rows):
-    """d.u is at most n.e + sum |(d - H^T n)_k| for every u of the set and any n."""
+def test_multipliers_give_a_tight_bound_on_the_distance(rng, rows):
+    """For every u of the set and any n, d.u <= n.e + sum |(d - H^T n)_k|."""
     H, d = rows_of(rng, rows), directions_of(rng, 20)
     start = rng.uniform(-0.4, 0.4, size=(20, 6))
     points, multipliers, solved = found(H, CONES, d, start @ H.T)
-    # round-off in several equations may stop some slightly earlier
+    # With several equations, round-off can prevent full convergence.
     assert solved.all() if rows == 1 else solved.sum() > 12
     assert np.abs((points - start)[solved] @ H.T).max() < 1e-12
     for i in np.flatnonzero(solved).tolist():

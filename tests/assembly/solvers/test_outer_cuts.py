@@ -1,4 +1,4 @@
-"""Farthest points by outer cuts: boxes, ellipsoids, and flat bodies."""
+"""Farthest points of boxes, ellipsoids and flat sets by outer cuts."""
 
 import numpy as np
 import pytest
@@ -7,12 +7,12 @@ from forcefit.assembly.solvers.outer_cuts import farthest
 
 
 def screw(point, half):
-    """(6,) screw with the point in one half and arbitrary numbers in the other."""
+    """Return a screw with the point in one half and arbitrary numbers in the other."""
     return np.concatenate([point, [9.0] * 3] if half == 0 else [[9.0] * 3, point])
 
 
 def ellipsoid(axes, centre, half):
-    """Support of {centre + axes v, |v| <= 1}."""
+    """Return the support function of {centre + axes v, |v| <= 1}."""
 
     def support(direction):
         along = axes.T @ direction
@@ -25,7 +25,7 @@ def ellipsoid(axes, centre, half):
 
 
 def box(sides, half):
-    """Support of a box about the origin."""
+    """Return the support function of a box about the origin."""
 
     def support(direction):
         point = np.sign(direction + 1e-300) * sides
@@ -39,7 +39,7 @@ def box(sides, half):
     "sides", [[1e-3, 2e-3, 3e-3], [1e-3, 0.0, 2e-3], [0.0, 0.0, 3e-3], [0.0] * 3]
 )
 def test_farthest_point_of_a_box_is_its_corner(half, sides):
-    """Includes flat boxes, a segment and a point."""
+    """The boxes include flat boxes, a segment and a point."""
     sides = np.array(sides)
     (low, high), best, _ = farthest(np.zeros(6), half, 1e-7, box(sides, half))
     corner = np.linalg.norm(sides)
@@ -62,7 +62,7 @@ def test_farthest_point_of_an_ellipsoid_is_on_its_longest_axis(size, rng):
     assert np.linalg.norm(best[:3]) == low
 
 
-def test_farthest_point_of_a_ball_is_its_distance_plus_radius():
+def test_farthest_point_of_a_ball_is_at_distance_plus_radius():
     """The centre is 5 mm from the origin, the radius is 1 mm."""
     centre = np.array([3e-3, 0.0, 4e-3])
     support = ellipsoid(1e-3 * np.eye(3), centre, 3)

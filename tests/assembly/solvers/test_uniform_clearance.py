@@ -1,4 +1,4 @@
-"""Random walks: textbook convergence diagnostics, and reflections by hand."""
+"""Reflections and convergence diagnostics of random walks."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ from forcefit.assembly.solvers.uniform_clearance import (
 
 
 def by_the_textbook(x):
-    """Split R-hat and effective sample size (Gelman et al. 2013, 11.4-11.5)."""
+    """Return split R-hat and effective sample size (Gelman et al. 2013, 11.4-11.5)."""
     n = x.shape[1] // 2
     chains = [row[i * n : (i + 1) * n] for row in x for i in (0, 1)]
     m = len(chains)
@@ -38,16 +38,16 @@ def by_the_textbook(x):
 
 @pytest.mark.parametrize("length", [8, 9, 12, 64])
 @pytest.mark.parametrize("correlation", [-0.5, 0.0, 0.7, 0.95])
-def test_chain_diagnosis_equals_the_textbook_formulas(length, correlation, rng):
+def test_chain_diagnostics_equal_textbook_formulas(length, correlation, rng):
     x = rng.normal(size=(4, length)) + rng.normal(size=(4, 1))
     for t in range(1, length):
         x[:, t] += correlation * x[:, t - 1]
     np.testing.assert_allclose(diagnose(x), by_the_textbook(x), rtol=1e-9)
-    # in any unit, about any value
+    # The diagnosis does not depend on unit and offset.
     np.testing.assert_allclose(diagnose(1e-6 * x + 1e-3), diagnose(x), rtol=1e-6)
 
 
-def test_chains_are_reported_as_mixed_only_if_every_varying_component_is_mixed(rng):
+def test_chains_with_one_unmixed_component_are_not_mixed(rng):
     """Chains of correlated points and chains about different means are not mixed."""
     apart = np.array([-1.5, -0.5, 0.5, 1.5])[:, None]
     slow = rng.normal(size=(4, 64))
@@ -65,15 +65,15 @@ def test_chains_are_reported_as_mixed_only_if_every_varying_component_is_mixed(r
     assert not is_mixed(np.where(np.arange(6) == 2, np.nan, trace))
 
 
-def test_chains_stuck_at_different_points_are_not_mixed():
-    """Each chain is constant, as in corners of the set, so R-hat is infinite."""
+def test_constant_chains_at_different_points_are_not_mixed():
+    """Each chain is constant, so R-hat is infinite."""
     trace = np.zeros((4, 64, 6))
     trace[:, :, 1] = np.arange(4)[:, None]
     assert not is_mixed(trace)
     assert diagnose(trace[:, :, 1])[0] == np.inf
 
 
-def test_point_without_degrees_of_freedom_does_not_move_and_counts_as_mixed():
+def test_walk_without_degrees_of_freedom_does_not_move():
     u, to_screw = np.array([0.3, 0.4]), np.eye(6)[:, :2].copy()
     rng = draw_generator(1, 0, 9)
     assert sample_uniform_position(np.zeros((2, 0)), np.array([0, 2]), to_screw, u, rng)
@@ -84,14 +84,14 @@ FLIGHT = 2.0  # mean time of a trajectory
 
 
 def sizes(starts, u):
-    """Size of each cone."""
+    """Return the size of each cone."""
     return [
         np.linalg.norm(u[a:b]) for a, b in zip(starts[:-1], starts[1:], strict=True)
     ]
 
 
 def walked(starts, M, u, every=1, kept=1, seed=1, to_screw=None):
-    """Final point of a walk, its screws, and a copy of the initial generator."""
+    """Return the end of a walk, its screws, and a copy of the initial generator."""
     M, starts = np.ascontiguousarray(M, dtype=float), np.array(starts)
     to_screw = np.zeros((6, len(M))) if to_screw is None else to_screw
     u, trace = np.array(u, dtype=float), np.empty((kept, 6))
@@ -101,7 +101,7 @@ def walked(starts, M, u, every=1, kept=1, seed=1, to_screw=None):
 
 
 def reflected(starts, M, u, speed, left):
-    """The same walk in coordinates y with u = M y, with specular reflections."""
+    """Return the same walk in coordinates y with u = M y, by specular reflections."""
     for _ in range(1000):
         w, reach, wall = M @ speed, left, None
         for k, (a, b) in enumerate(zip(starts[:-1], starts[1:], strict=True)):
@@ -121,8 +121,8 @@ def reflected(starts, M, u, speed, left):
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_billiard_trajectory_equals_reflections_computed_by_hand(seed, rng):
-    """Evaluated in the coordinates of the Dikin ellipsoid, including a thin one."""
+def test_billiard_trajectory_equals_specular_reflections(seed, rng):
+    """The reflections are computed in the coordinates of the Dikin ellipsoid."""
     starts = [0, 2, 3, 5]
     for M in (np.eye(5), rng.normal(size=(5, 5)), rng.normal(size=(5, 3))):
         start = np.array([0.6, -0.5, 0.2, 0.0, 0.1])
@@ -134,8 +134,8 @@ def test_billiard_trajectory_equals_reflections_computed_by_hand(seed, rng):
         assert max(sizes(starts, u)) <= 1 + 1e-9
 
 
-def test_cone_of_fixed_coordinates_does_not_bound_the_random_walk(rng):
-    """Even at its bound: the range of the initial points depends on the other cones."""
+def test_cone_of_fixed_coordinates_does_not_stop_the_walk(rng):
+    """A cone of fixed coordinates can be at its bound."""
     starts, centre = np.array([0, 2, 3]), np.array([0.6, 0.8, 0.5])
     M, walks = np.array([[0.0], [0.0], [0.3]]), np.empty((8, 3))
     positions = Positions(M, starts, np.zeros((6, 3)))
@@ -143,12 +143,12 @@ def test_cone_of_fixed_coordinates_does_not_bound_the_random_walk(rng):
     ends = centre[2] + (walks[:, 2] - centre[2]) / 0.9
     np.testing.assert_allclose(np.abs(ends), 1.0, rtol=1e-12)
     np.testing.assert_array_equal(walks[:, :2], np.tile(centre[:2], (8, 1)))
-    # fixed coordinates end a trajectory where they began
+    # Fixed coordinates do not change along a trajectory.
     still, _, _ = walked(starts, np.zeros((3, 1)), centre)
     np.testing.assert_array_equal(still, centre)
 
 
-def test_random_walk_from_a_point_outside_by_round_off_returns_inside():
+def test_walk_from_a_point_slightly_outside_returns_inside():
     starts, outside = [0, 1], [1 + 1e-15]
     for seed in range(6):
         u, _, _ = walked(starts, [[0.5]], outside, seed=seed)
