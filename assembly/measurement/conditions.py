@@ -1,9 +1,9 @@
 """Operating conditions of past or planned measurements of a robot.
 
-An *effect* (:mod:`forcefit.assembly.effects`) is a property that the declared model of
-a robot lacks, such as friction or thermal expansion.  An effect changes one or more of
-the fields below and nothing else.  Any number of effects can therefore be combined, and
-:func:`forcefit.assembly.measurement.predict.predict` is independent of the effects.
+An *effect* (:mod:`forcefit.assembly.effects`) is a property that the robot file does
+not contain, such as friction or thermal expansion.  An effect changes only the fields
+of :class:`Conditions`.  Effects can therefore be combined, and
+:func:`forcefit.assembly.measurement.predict.predict` is independent of them.
 
 ======  ====================  =========  =============================================
 symbol  code                  shape      meaning
@@ -31,14 +31,14 @@ COVARIATES = ("temperature", "time", "approach")
 
 @dataclass(frozen=True)
 class ContactLaw:
-    """Contact spring in series with a joint: load = coefficient |deflection|^n.
+    """Contact spring in series with a joint, with load = coefficient |deflection|^n.
 
-    The spring acts along or about the joint's z axis, equally in both directions.
+    The spring acts along or about the joint's z axis in both directions.
 
     Attributes:
         frame: name of the joint.
         coefficient: [N/m^n or N m/rad^n] coefficient, > 0.
-        exponent: [-] exponent n > 1; 1.5 is Hertz's exponent for two spheres.
+        exponent: [-] exponent n > 1; 1.5 for Hertz contact of two spheres.
     """
 
     frame: str
@@ -48,17 +48,17 @@ class ContactLaw:
 
 @dataclass(frozen=True, eq=False)
 class Yield:
-    """Compliant location of a robot, whose deflection follows from wrenches by a law.
+    """Compliance at a frame, whose deflection is a function (law) of wrenches.
 
     Attributes:
         frame: name of the frame.
-        component: index of the screw component that changes, in the frame's axes; 6 for
-            the motion along the thread of a helical joint.
+        component: index of the screw component of the deflection, frame axes; 6 for the
+            motion along the thread of a helical joint.
         through: frames and components of the wrenches on which the law depends.
         inputs: (R, k) additional inputs of the law, one row per measurement.
         law: smooth function [rad or m] of the inputs (R, k) and wrenches (R, s).
-        linear: whether the law is that of a linear spring: a compliance times one
-            wrench component at this location.
+        linear: whether the law is a compliance times one wrench component at the same
+            frame.
     """
 
     frame: str
@@ -87,26 +87,25 @@ class Conditions:
         gravity: (R, 3) [m/s^2] gravity vectors in base axes.
         temperature: (R,) [K] temperature above calibration; NaN if unknown.
         time: (R,) [s] time since the first measurement; NaN if unknown.
-        approach: (R,) side from which the position was approached, -1 or 1; NaN if
+        approach: (R,) direction from which the position was approached, -1 or 1; NaN if
             unknown.
         covariates: (R,) values of additional covariates by name.
         session: (R,) names of the sessions; None if unknown.
-        history: readings of a campaign in the order of measurement, including those of
-            these conditions; None without a history.
+        history: all measurements of the campaign in order of time, or None.
         row: (R,) indices of these measurements in the history.
         target: (R, 3) [m] measured point, platform axes; None for the reference point.
         laws: contact springs in series with joints.
-        yields: compliant locations with laws.
+        yields: compliances at frames with laws.
         exact: whether to use the model with finite motions instead of the linear one.
         second_order: (R, 6) [rad, m] exact minus linear platform screw without load;
             see :func:`forcefit.assembly.measurement.predict.with_second_order`.
         rest: (R, n, 6) rest positions of the clearances relative to their bounds; None
             if they follow from the minimum-energy assembly.
-        base: (6,) or (R, 6) [rad, m] rotation and translation of the measuring frame,
-            by which the measured pose is multiplied from the left.
+        base: (6,) or (R, 6) [rad, m] rotation and translation of the measuring frame.
+            The measured pose is multiplied by this transform from the left.
         tool: (3,) or (R, 3) [m] vector from the reference point to the measured point,
             platform axes.
-        reading: (R, 6) [rad, m] offsets added to the reading.
+        reading: (R, 6) [rad, m] offsets of the reading.
     """
 
     robot: Robot
@@ -141,12 +140,12 @@ class Conditions:
 
     @property
     def reads_otherwise(self) -> bool:
-        """Whether readings can differ from the pose error of the reference point."""
+        """Whether readings differ from the pose error of the reference point."""
         return bool(self.base.any() or self.tool.any() or np.any(self.reading))
 
     @property
     def postures(self) -> Posture:
-        """All nominal postures as one object, with a leading axis of length R."""
+        """Nominal postures as one object with a leading axis of length R."""
         return Posture(self.robot, self.coordinates, self.transforms, self.mismatch)
 
     def posture(self, row: int) -> Posture:
@@ -158,20 +157,20 @@ class Conditions:
 
     @property
     def measured_points(self) -> NDArray:
-        """(R, 3) [m] nominal positions of the measured point, base axes."""
+        """Nominal positions of the measured point in base axes, (R, 3) [m]."""
         T = self.postures.platform
         return T[:, :3, 3] + self.measured_arms
 
     @property
     def measured_arms(self) -> NDArray:
-        """(R, 3) [m] vectors from the platform's origin to the measured points."""
+        """Vectors from the platform origin to the measured points, (R, 3) [m]."""
         at = self.point if self.target is None else self.target
         if not at.any():
             return np.zeros((len(self), 3))
         return (self.postures.platform[:, :3, :3] @ at[..., None])[..., 0]
 
     def load_at_origin(self) -> NDArray:
-        """Return the (R, 6) [N m, N] load at the platform's origin, base axes."""
+        """Return the load at the platform's origin in base axes, (R, 6) [N m, N]."""
         moved = self.load.copy()
         if self.point.any():
             arm = self.postures.platform[:, :3, :3] @ self.point
@@ -217,13 +216,13 @@ def as_declared(
     covariates: Mapping[str, ArrayLike] | None = None,
     target: ArrayLike | None = None,
 ) -> Conditions:
-    """Create the conditions of a robot as declared in its file.
+    """Create the conditions of a robot without additional effects.
 
     Args:
         postures: one posture, or R postures in one object.
         load: (6,) or (R, 6) [N m, N] wrench at the reference point, base axes; None for
             no load.
-        mismatch: (R,) [rad, m] remaining nominal closure error.
+        mismatch: (R,) [rad, m] nominal closure error.
         point: (3,) [m] reference point, platform axes.
         gravity: (3,) or (R, 3) [m/s^2] gravity vector in base axes.
         covariates: (R,) values, or a common value, by name: ``temperature`` [K],

@@ -1,4 +1,4 @@
-"""Contact springs in series with joints: load = coefficient |deflection|^exponent."""
+"""Contact springs in series with joints, load = coefficient |deflection|^exponent."""
 
 from dataclasses import replace
 
@@ -12,13 +12,13 @@ from forcefit.assembly.measurement.conditions import Conditions, ContactLaw
 from forcefit.assembly.model.links import in_series, own_screw
 
 ITERATIONS = 100  # largest number of iterations
-CONVERGED = 1e-11  # largest relative change of a contact's deflection at convergence
+CONVERGED = 1e-11  # largest relative change of a deflection at convergence
 
 
 def softened(
     posture: Posture, laws: tuple[ContactLaw, ...], compliances: NDArray
 ) -> Posture:
-    """Replace each contact by a spring in series with its secant stiffness."""
+    """Replace each contact by a spring of its secant stiffness."""
     if not compliances.any():
         return posture
     frames = list(posture.robot.frames)
@@ -49,12 +49,12 @@ def _deflection(law: ContactLaw, load: float) -> float:
 
 
 def wrenches_through(assembly: Assembly | ExactAssembly) -> NDArray:
-    """Return the (n, 6) [N m, N] wrenches through all joints, in the frames' axes."""
+    """Return the wrenches through all joints in frame axes, (n, 6) [N m, N]."""
     return assembly.joint_wrenches
 
 
 def contact_columns(conditions: Conditions) -> NDArray:
-    """Return the (6n, s) unit screws of the motions at s contact springs."""
+    """Return the unit screws of the motions at s contact springs, (6n, s)."""
     columns = np.zeros((6 * len(conditions.robot.frames), len(conditions.laws)))
     for k, law in enumerate(conditions.laws):
         i = conditions.robot.index(law.frame)
@@ -67,12 +67,11 @@ def contact_deflections(
 ) -> tuple[NDArray, NDArray]:
     """Solve for the contact deflections d with c |d|^n sign(d) = w + A d.
 
-    The solution minimises a strictly convex function, because A is negative
-    semidefinite.  Newton's method is used, in which each step is halved until the
-    gradient decreases.
+    The matrix A is negative semidefinite, so the solution is unique.  Steps of Newton's
+    method are halved until the gradient decreases.
 
     Returns:
-        (R, s) deflections, and (R,) bool, True where the iteration converged.
+        (R, s) deflections; and (R,) bool, True where the iteration converged.
     """
     c = np.array([law.coefficient for law in laws])
     n = np.array([law.exponent for law in laws])

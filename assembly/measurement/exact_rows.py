@@ -1,12 +1,9 @@
-r"""Exact equilibrium of a robot without clearances, for many measurements at once.
+r"""Exact equilibrium of a robot without clearances in many measurements.
 
-The equations are those of :mod:`forcefit.assembly.exact.exact`: loop closure is imposed
-on SE(3), every body and spring deforms by its compliance times its wrench, and free
-motions carry no load.  All measurements are iterated together with the inverse of the
-linear model at the nominal posture
-(:mod:`forcefit.assembly.measurement.without_clearance`).  The first iterate is the
-linear solution, and each following iteration of this chord method reduces the error by
-a factor of the order of the motions.  Measurements that do not converge are solved by
+The equations are those of :mod:`forcefit.assembly.exact.exact`.  They are solved by a
+chord method for all measurements together, with the inverse of the linear model at the
+nominal posture (:mod:`forcefit.assembly.measurement.without_clearance`).  The first
+iterate is the linear solution.  Measurements that do not converge are solved by
 :func:`forcefit.assembly.exact.exact.solve_exact`.
 
 The iterate is defined in :mod:`forcefit.assembly.measurement.row_state`.
@@ -28,18 +25,18 @@ from forcefit.assembly.measurement.without_clearance import flexibility
 from forcefit.assembly.model.links import own_screws
 from forcefit.assembly.model.robot import Robot
 
-_MOST_ITERATIONS = 60  # largest number of iterations; usually 5 to 12
+_MOST_ITERATIONS = 60  # largest number of iterations
 # [rad, reference lengths] largest screw change in the last iteration
 _CONVERGED = 1e-12
 _CLOSURE_TOLERANCE = 1e-11  # [rad, reference lengths] largest closure residual
-# largest accepted force along a free motion, relative to the largest wrench
+# largest force along a free motion, relative to the largest wrench
 _FREE_FORCE = 1e-5
-# [rad, reference lengths] deformation below which a wrench counts as zero
+# [rad, reference lengths] deformation below which a wrench is treated as zero
 _ZERO_LOAD = 1e-9
 # largest accepted ratio of two successive changes, after the initial iterations
 _CONTRACTION = 0.8
-_TRANSIENT = 3  # number of initial iterations in which the changes can increase
-_BATCH = 100  # number of measurements solved together, to limit memory
+_TRANSIENT = 3  # number of initial iterations in which changes can increase
+_BATCH = 100  # number of measurements that are solved together
 
 
 def solve_rows(
@@ -55,8 +52,7 @@ def solve_rows(
 
     Returns:
         (R, 6) [rad, m] rotation vector of R R_nominal^T and translation of the origin,
-        base axes; and (R,) bool, True where the iteration converged; other rows are
-        invalid.
+        base axes; and (R,) bool, True where the iteration converged.
     """
     conditions = _in_pieces(conditions)
     screws, converged = (
@@ -76,7 +72,7 @@ def solve_rows(
 
 
 def _of_passive_joints(free: NDArray, robot: Robot) -> bool:
-    """Return True if all q free motions (6n, q) are motions of passive joints."""
+    """Return whether all free motions (6n, q) are motions of passive joints."""
     passive = np.array([frame.passive for frame in robot.frames])
     own = own_screws(robot) * passive[:, None]
     for column in free.T.reshape(-1, len(robot.frames), 6):
@@ -87,7 +83,7 @@ def _of_passive_joints(free: NDArray, robot: Robot) -> bool:
 
 
 def _solve(rows: Rows) -> tuple[NDArray, NDArray]:
-    """Return (R, 6) platform screws, and (R,) bool, True where converged."""
+    """Return the platform screws (R, 6), and a mask of converged measurements."""
     flexible, count = rows.flexible, len(rows.conditions)
     n, K = len(rows.conditions.robot.frames), 6 * len(rows.conditions.robot.closures)
     q = flexible.free.shape[1]
@@ -118,7 +114,7 @@ def _solve(rows: Rows) -> tuple[NDArray, NDArray]:
     converged &= np.abs(state.residual).max(axis=1, initial=0.0) <= _CLOSURE_TOLERANCE
     converged &= np.all(np.abs(state.motions) <= flexible.limit, axis=1)
     _, free_forces, _ = state.imbalance()
-    # without loads, wrenches are only round-off
+    # Without loads, wrenches are only round-off.
     zero_load = _ZERO_LOAD / flexible.softness
     largest = np.abs(state.total_wrenches / rows.scale).max(
         axis=(0, 2, 3), initial=zero_load
@@ -131,13 +127,13 @@ def _solve(rows: Rows) -> tuple[NDArray, NDArray]:
 
 
 def _lever_arms(rows: Rows) -> NDArray:
-    """Return the (q,) [1 or m] factors from forces along free motions to moments."""
+    """Return the factors that convert forces along free motions to moments, (q,)."""
     free = rows.flexible.free
     return np.abs(free).T @ np.tile(1 / rows.scale, len(free) // 6)
 
 
 def _correction(state: RowState, first: bool) -> tuple[NDArray, NDArray, NDArray]:
-    """Compute the changes of the unknowns by the inverse of the linear model."""
+    """Return the changes of the unknowns, computed with the linear model."""
     rows, flexible = state.rows, state.rows.flexible
     screw_residual, free, w = state.imbalance()
     count, shape = len(rows.conditions), (len(rows.conditions), -1, 6)
@@ -165,7 +161,7 @@ def _correction(state: RowState, first: bool) -> tuple[NDArray, NDArray, NDArray
 
 
 def _in_pieces(conditions: Conditions) -> Conditions:
-    """Return the conditions of the robot with its beams cut into pieces."""
+    """Return the conditions of a robot whose beams are divided into elements."""
     cut = cut_beams(conditions.robot)
     if cut.robot is conditions.robot:
         return conditions

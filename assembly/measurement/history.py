@@ -1,9 +1,8 @@
-"""Measurement history of a robot: the readings of a campaign in order of time.
+"""Measurements of a campaign in order of time.
 
-Some effects have memory.  For example, the temperature of a body lags behind that of
-the air, and the side on which a clearance is closed depends on the direction of the
-last motion.  Such effects depend on earlier readings, including those that a fit omits.
-Each value is assumed to apply since the previous reading, or since time 0.
+Some effects depend on earlier measurements.  For example, the temperature of a body
+lags behind that of the air.  Each value is assumed to be constant since the previous
+measurement, or since time 0.
 
 Sources:
     Ljung, System Identification, section 2 (sampling of a first-order lag).
@@ -16,7 +15,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-STILL = 1e-9  # [rad, m] smaller command changes count as no motion
+STILL = 1e-9  # [rad, m] smaller changes of a command are ignored
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,15 +31,15 @@ class History:
     first: NDArray
 
     def direction(self, name: str) -> NDArray:
-        """Return the direction in which a variable last changed: -1, 1 or 0 (unknown).
+        """Return the direction of the last change of a variable: -1, 1 or 0 (unknown).
 
         Args:
-            name: name of the variable; ``"approach"`` is the column of this name.
+            name: name of the variable.
 
         Returns:
-            (H,) signs, 0 if unknown.  A variable that does not change retains its last
-            direction.  Before the first change, the column ``approach`` is used if it
-            exists.
+            (H,) signs, 0 if unknown.  A variable that does not change has its last
+            direction.  Before the first change, the column ``approach`` is used if
+            available.
         """
         given = np.nan_to_num(self.values["approach"])
         if name == "approach":
@@ -54,18 +53,18 @@ class History:
         return np.where(known, np.sign(step[last]), given)
 
     def slip(self, name: str, depth: float) -> NDArray:
-        """Return the position of a friction element that is dragged by a variable.
+        """Return the position of a friction element that a variable drives.
 
         Args:
             name: name of the variable.
-            depth: change of the variable that moves the element from the middle to one
+            depth: change of the variable that moves the element from its centre to one
                 end, > 0.
 
         Returns:
-            (H,) positions from -1 to 1.  The element follows the variable until it
+            (H,) positions from -1 to 1.  The element moves with the variable until it
             reaches an end, and stays there until the variable reverses.  At the
-            beginning of a session it is at the end given by ``approach``, or in the
-            middle.
+            beginning of a session, it is at the end given by ``approach``, or at its
+            centre.
 
         Sources:
             Krasnosel'skii, Pokrovskii, Systems with Hysteresis, section 2 (stop).
@@ -85,8 +84,8 @@ class History:
         Args:
             name: name of the variable.
             time_constant: [s] time constant, > 0.
-            held: whether each value applies since the previous reading, as for a load.
-                If False, the variable varies linearly between readings, as for a
+            held: whether the variable is constant between readings, for example a load.
+                If False, it varies linearly between readings, for example a
                 temperature.
 
         Returns:
@@ -95,7 +94,7 @@ class History:
         u, state = self.values[name], 0.0
         past = self._elapsed / time_constant
         decay = np.exp(-past)
-        # lagging fraction of the change: (1 - e^-r) / r, or 1 if no time has passed
+        # The lagging fraction of the change is (1 - e^-r) / r, or 1 for r = 0.
         share = np.where(
             past > 0, -np.expm1(-past) / np.where(past > 0, past, 1.0), 1.0
         )
@@ -105,19 +104,19 @@ class History:
             if self.first[i]:
                 state = 0.0
             before = float(u[i - 1]) if even[i] else value
-            # this step is exact if u changes linearly from ``before`` to ``value``
+            # This step is exact if the variable changes linearly.
             late = (value - before) * share[i]
             state = value - late + (state - before) * decay[i]
             response[i] = state
         return response
 
     def fading(self, time_constant: float) -> NDArray:
-        """Return (H,) exp(-time / time constant): the decay of a state at time 0."""
+        """Return exp(-time / time constant), (H,)."""
         return np.exp(-self.values["time"] / time_constant)
 
     @cached_property
     def _elapsed(self) -> NDArray:
-        """(H,) [s] time since the previous reading, or since time 0."""
+        """Time since the previous reading, or since time 0, (H,) [s]."""
         time = self.values["time"]
         return np.where(self.first, time, np.diff(time, prepend=0.0))
 
@@ -133,7 +132,7 @@ def in_order(
         session: (H,) session name of each reading; None if there is a single session.
 
     Returns:
-        The history, and the (H,) indices of the given readings in it.
+        The history, and the indices of the given readings in it, (H,).
     """
     time = np.nan_to_num(values["time"])
     names = np.zeros(len(time)) if session is None else session

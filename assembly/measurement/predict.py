@@ -1,14 +1,14 @@
-"""Predict readings: the deviation of the platform in each measurement.
+"""Predict the deviation of the platform in each measurement.
 
-Measurements of robots without clearances are solved together, with small motions by
-:mod:`forcefit.assembly.measurement.without_clearance` and with finite motions by
-:mod:`forcefit.assembly.measurement.exact_rows`.  Measurements with clearances, or with
-closures of ambiguous numerical rank, are solved one by one by
+Measurements of robots without clearances are solved together by
+:mod:`forcefit.assembly.measurement.without_clearance` for small motions, or
+:mod:`forcefit.assembly.measurement.exact_rows` for finite motions.  Measurements with
+clearances, or with closures of ambiguous rank, are solved one by one by
 :mod:`forcefit.assembly.linear.energy` and :mod:`forcefit.assembly.exact.exact`.
 
 Sources:
-    Public format, campaigns: rotation vector of R_actual R_nominal^T and difference of
-    the reference point's position, base axes.
+    Public format, campaigns: the deviation is the rotation vector of R_actual
+    R_nominal^T and the displacement of the reference point, base axes.
 """
 
 from dataclasses import dataclass, replace
@@ -48,10 +48,9 @@ from forcefit.assembly.measurement.yields import Yields, settle_yields, with_spr
 from forcefit.assembly.solvers.conic import SolverFailed
 from forcefit.stiffness.screws import rotation_matrix, rotation_vector
 
-# largest number of configurations for which second-order corrections are computed
+# largest number of configurations with second-order corrections
 _MOST_ONE_BY_ONE = 40
-# convergence criterion that replaces CONVERGED if the iteration starts from the linear
-# solution
+# convergence criterion of contacts for iterations that start at the linear solution
 _CONVERGED_FINITE = 1e-5
 
 
@@ -62,9 +61,9 @@ class Prediction:
     Attributes:
         deviation: (R, 6) [rad, m] rx ry rz tx ty tz, base axes; NaN without a solution.
         reason: (R,) reason why there is no solution; otherwise empty.
-        undetermined: (R,) bool, True if clearances leave the pose undetermined.  The
-            deviation of a closed chain then refers to the pose nearest to nominal, and
-            that of an open chain to centred clearances.
+        undetermined: (R,) bool, True if clearances make the pose non-unique.  The
+            deviation is then that of the pose nearest to nominal (closed chains) or of
+            centred joints (open chains).
     """
 
     deviation: NDArray
@@ -86,8 +85,7 @@ def predict(conditions: Conditions) -> Prediction:
     one_by_one = None
     if has_clearance and conditions.rest is not None:
         conditions = with_clearances_at_rest(conditions)
-        # if the exact model cannot close the robot with its clearances at rest, neither
-        # model has a solution
+        # If the exact model has no solution, the measurement has no prediction.
         one_by_one = 0 if conditions.exact else None
     elif has_clearance and not conditions.robot.closures and not conditions.exact:
         conditions, undetermined = with_clearances_taken_up(conditions)
@@ -107,11 +105,11 @@ def predict(conditions: Conditions) -> Prediction:
 def _platform_screws(
     conditions: Conditions, one_by_one: int | None = None
 ) -> tuple[NDArray, NDArray, NDArray]:
-    """Compute all platform screws, one measurement at a time where necessary.
+    """Compute the platform screws of all measurements.
 
     Returns:
-        (R, 6) screws, (R,) reasons why there is no solution, and (R,) bool, True if
-        clearances leave the screw undetermined.
+        (R, 6) screws; (R,) reasons why there is no solution; and (R,) bool, True if
+        clearances make the screw non-unique.
     """
     screws, undetermined = (
         np.full((len(conditions), 6), np.nan),
@@ -138,13 +136,12 @@ def _platform_screws(
 def _nearest_assembly(
     conditions: Conditions, row: int
 ) -> tuple[Assembly | ExactAssembly, bool]:
-    """Return the assembly at one measurement; among several, the closest to nominal.
+    """Return the assembly in one measurement with the pose closest to nominal.
 
-    With finite motions, closeness is judged on the linear solution from which the
-    iteration starts.
+    With finite motions, the pose of the linear solution is compared.
 
     Returns:
-        The assembly, and whether clearances leave its pose undetermined.
+        The assembly, and whether clearances make its pose non-unique.
     """
     assembly = assemble_row(conditions, row)
     offset = conditions.posture(row).platform[:3, :3] @ conditions.point
@@ -167,18 +164,18 @@ def with_second_order(conditions: Conditions) -> Conditions:
     """Add the second-order effect of the declared errors to the conditions.
 
     Near a singularity, geometric errors cause large motions, and the error of the
-    linear model exceeds the noise of a device whatever the load.  The difference
-    between the exact and the linear platform screw without load is therefore computed
-    once per configuration, while effects of the load remain linear.
+    linear model exceeds the noise of a device.  The difference between the exact and
+    the linear platform screw without load is therefore computed for each configuration.
+    The effects of loads remain linear.
 
     Args:
-        conditions: conditions of R measurements, as declared.
+        conditions: conditions of R measurements without additional effects.
 
     Returns:
-        The conditions, with ``second_order``.
+        The conditions with ``second_order``.
     """
     if virtual_joints(conditions.robot).cones.shape[1]:
-        # without a load, the rest position of clearances is undetermined
+        # Without a load, the rest position of clearances is undetermined.
         return conditions
     zero = np.zeros_like(conditions.load)
     _, which = conditions.postures.distinct
@@ -194,8 +191,7 @@ def with_finite_motions(conditions: Conditions) -> Conditions:
     """Add the effect of finite motions to the conditions.
 
     The correction is computed as in :func:`with_second_order`, but under the loads of
-    each measurement.  The declared model is then exact, and effects are added to first
-    order.
+    each measurement.
 
     Args:
         conditions: conditions of R measurements, as declared.
@@ -207,9 +203,9 @@ def with_finite_motions(conditions: Conditions) -> Conditions:
 
 
 def _finite_part(conditions: Conditions, one_by_one: int | None = None) -> NDArray:
-    """Return (R, 6) exact minus linear platform screws; zero if no solution exists.
+    """Return the exact minus the linear platform screws, (R, 6).
 
-    Compliant locations are treated by the linear model.
+    The difference is zero without a solution.
     """
     conditions = replace(conditions, yields=())
     exact, linear = (
@@ -222,14 +218,14 @@ def _finite_part(conditions: Conditions, one_by_one: int | None = None) -> NDArr
 def with_rest_positions(conditions: Conditions) -> Conditions:
     """Fix the clearances at their minimum-energy rest positions.
 
-    Effects can then be evaluated as fast as for a robot without clearances.  The result
-    is correct to first order as long as the contact points do not change.
+    The result is correct to first order if effects do not change the contact points.
 
     Args:
         conditions: conditions of R measurements.
 
     Returns:
-        The conditions, with ``rest``; clearances are centred where no solution exists.
+        The conditions with ``rest``.  Without a solution, joints are centred in their
+        clearances.
     """
     rest = np.zeros_like(conditions.errors)
     for row in range(len(conditions)):
@@ -250,7 +246,7 @@ def read(conditions: Conditions, screws: NDArray) -> NDArray:
             platform's origin, base axes.
 
     Returns:
-        (R, 6) [rad, m] deviations read by the device at the measured points.
+        (R, 6) [rad, m] deviations measured by the device.
     """
     platform = conditions.postures.platform
     R, p = platform[:, :3, :3], platform[:, :3, 3]
@@ -260,8 +256,8 @@ def read(conditions: Conditions, screws: NDArray) -> NDArray:
     lever = _turned(turn - np.eye(3), arm + tool)
     shift = screws[:, 3:] + lever + tool
     base = rotation_matrix(conditions.base[..., :3])
-    # the rotation of the device acts on the position itself; without it, no round-off
-    # is introduced
+    # The device rotation is applied to the position. Without rotation, this causes no
+    # round-off.
     translation = _turned(base - np.eye(3), p + arm) + _turned(base, shift)
     translation += conditions.base[..., 3:]
     turns = conditions.base[..., :3].any()
@@ -270,7 +266,7 @@ def read(conditions: Conditions, screws: NDArray) -> NDArray:
 
 
 def _turned(R: NDArray, vectors: NDArray) -> NDArray:
-    """Rotate (R, 3) vectors by a common matrix or by one matrix each."""
+    """Rotate vectors (R, 3) by a common matrix or by one matrix each."""
     if R.ndim == 2:
         return vectors @ R.T
     return np.einsum("rij,...j->ri" if vectors.ndim == 1 else "rij,rj->ri", R, vectors)
@@ -288,13 +284,13 @@ def assemble_row(
         bodies: (n, 6) [N m, N] additional loads on the bodies, as for
             :func:`forcefit.assembly.linear.energy.solve_assembly`; only for the linear
             model.
-        carried: (n, 6) [N m, N] additional loads on the parts that the joints carry.
+        carried: (n, 6) [N m, N] additional loads on the bodies that the joints carry.
 
     Returns:
         The linear or exact assembly, depending on the conditions.
 
     Raises:
-        CannotAssemble: a closure cannot be closed.
+        CannotAssemble: a loop cannot be closed.
         FreeMotion: a load acts along a motion without stiffness.
         SolverFailed: the solver failed, or contacts did not converge.
     """
@@ -304,7 +300,7 @@ def assemble_row(
     load = conditions.load_at_origin()[row]
     gravity = conditions.gravity[row] if conditions.gravity[row].any() else None
     compliances = np.zeros(len(conditions.laws))
-    # the contacts start from the linear model and are nearly converged
+    # The contact deflections of the linear model are nearly exact.
     if conditions.exact and conditions.laws:
         linear = assemble_row(replace(conditions, exact=False), row)
         compliances = secants(linear, conditions.laws)
@@ -327,7 +323,7 @@ def assemble_row(
 def _assemble_yielding(
     row: Conditions, bodies: NDArray | None, carried: NDArray | None
 ) -> Assembly | ExactAssembly:
-    """Solve one measurement of a robot with compliant locations."""
+    """Solve one measurement of a robot with laws of compliance."""
 
     def solve(held: Conditions) -> tuple[Assembly | ExactAssembly, NDArray]:
         assembly = assemble_row(held, 0, bodies, carried)
@@ -343,7 +339,7 @@ def _assemble_yielding(
 
 
 def _without_clearance(conditions: Conditions) -> tuple[NDArray, NDArray]:
-    """Return (R, 6) platform screws without clearances, and a mask of valid ones."""
+    """Return platform screws without clearances, and a mask of valid rows."""
     if not conditions.yields:
         screws, _, solved = _linear(conditions)
         return screws, solved
@@ -352,7 +348,7 @@ def _without_clearance(conditions: Conditions) -> tuple[NDArray, NDArray]:
         np.zeros(len(conditions), dtype=bool),
     )
     if conditions.exact:
-        # mark all as unsolved, so that they are solved one by one, with finite motions
+        # All measurements are then solved one by one.
         return unsolved
     distinct, which = conditions.postures.distinct
 
@@ -371,7 +367,7 @@ def _without_clearance(conditions: Conditions) -> tuple[NDArray, NDArray]:
 
 
 def _linear(conditions: Conditions) -> tuple[NDArray, NDArray, NDArray]:
-    """Solve measurements of robots without clearances and compliant locations.
+    """Solve measurements of robots without clearances by the linear model.
 
     Returns:
         (R, 6) platform screws, (R, 6n) joint wrenches of the linear model, and (R,)
@@ -395,7 +391,7 @@ def _linear(conditions: Conditions) -> tuple[NDArray, NDArray, NDArray]:
         )
         deflections, settled = contact_deflections(conditions.laws, w, own[which])
         screws = screws + times(platform, deflections)
-        # not for open chains, whose wrenches depend only on the loads
+        # The wrenches of open chains depend only on the loads.
         if flexible.system.size:
             wrenches = wrenches + times(everywhere, deflections)
         solved = solved & settled

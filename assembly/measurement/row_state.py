@@ -42,12 +42,12 @@ from forcefit.assembly.measurement.without_clearance import (
 from forcefit.assembly.model.links import own_screw
 from forcefit.stiffness.screws import rotation_matrix, rotation_vector, transform
 
-_LINEAR_BELOW = 1e-9  # [rad or m] deflection below which the law of a contact is linear
+_LINEAR_BELOW = 1e-9  # [rad or m] deflection below which a contact law is linear
 
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """Measurements to be solved, with quantities that are constant in the iteration.
+    """Measurements with the quantities that are constant in the iteration.
 
     Attributes:
         conditions: conditions of R measurements.
@@ -65,7 +65,7 @@ class Rows:
 
     @cached_property
     def loads(self) -> DeadLoads:
-        """All loads, including weights, as dead loads."""
+        """Loads of all measurements, including weights."""
         c = self.conditions
         return dead_loads_of_rows(c.postures, c.errors, c.load, c.gravity, c.point)
 
@@ -87,7 +87,7 @@ class Rows:
 
     @cached_property
     def contacts(self) -> NDArray:
-        """(6n, s) unit screws of the joints with a contact."""
+        """Unit screws of the joints with a contact, (6n, s)."""
         columns = np.zeros((
             6 * len(self.conditions.robot.frames),
             len(self.conditions.laws),
@@ -99,7 +99,7 @@ class Rows:
 
     @cached_property
     def law_constants(self) -> tuple[NDArray, NDArray]:
-        """(s,) coefficients, and (s,) exponents of the contacts."""
+        """Coefficients (s,) and exponents (s,) of the contacts."""
         laws = self.conditions.laws
         return (
             np.array([law.coefficient for law in laws]),
@@ -108,7 +108,7 @@ class Rows:
 
     @cached_property
     def contact_compliance(self) -> NDArray:
-        """(R, s) [rad/(N m), m/N] tangent compliances of the contacts."""
+        """Tangent compliances of the contacts, (R, s) [rad/(N m), m/N]."""
         c, n = self.law_constants
         size = np.abs(self.linear_deflections)
         return (
@@ -118,7 +118,7 @@ class Rows:
         )
 
     def tangent_deflection(self, w: NDArray) -> NDArray:
-        """Return (R, s) [rad or m] deflections under loads w, from a linearised law."""
+        """Return the deflections of the contacts under loads w by linearised laws."""
         c, n = self.law_constants
         load = (
             c
@@ -128,7 +128,7 @@ class Rows:
         return self.linear_deflections + self.contact_compliance * (w - load)
 
     def deflection(self, w: NDArray) -> NDArray:
-        """Return the (R, s) [rad or m] deflections of the contacts under loads w."""
+        """Return the deflections of the contacts under loads w, (R, s) [rad or m]."""
         c, n = self.law_constants
         least = c * _LINEAR_BELOW**n
         large = np.maximum(np.abs(w), least)
@@ -147,7 +147,7 @@ class Rows:
 
     @cached_property
     def _with_contacts(self) -> NDArray:
-        """(R, m, m) inverse of the scaled system, with contacts as tangent springs."""
+        """Inverse of the scaled system with contacts as tangent springs, (R, m, m)."""
         flexible = self.flexible
         contact_rows = np.einsum("cki,is->cks", flexible.rows, self.contacts)[
             self.posture_of_row
@@ -162,31 +162,31 @@ class Rows:
 
     @cached_property
     def bodies(self) -> NDArray:
-        """(R, n, 4, 4) bodies with their errors, in the parent's frame."""
+        """Poses of bodies with their errors in the parent frame, (R, n, 4, 4)."""
         errors = self.conditions.errors
         error_motion = transform(errors[..., 3:], rotation_matrix(errors[..., :3]))
         return self.conditions.robot.fixed_transforms @ error_motion
 
     @cached_property
     def commanded(self) -> NDArray:
-        """(R, n, 4, 4) motions of the joints by their commanded coordinates."""
+        """Joint motions for the commanded coordinates, (R, n, 4, 4)."""
         return along_own(self.conditions.robot, self.conditions.coordinates)
 
     @cached_property
     def scale(self) -> NDArray:
-        """(6,) factors on a screw; translations are divided by the reference length."""
+        """Factors on a screw that divide translations by the reference length, (6,)."""
         return np.array([1.0, 1.0, 1.0, *[1 / size_of(self.conditions.robot)] * 3])
 
     @cached_property
     def closure_frames(self) -> NDArray:
-        """(2, K) frames that the closures connect."""
+        """Indices of the frames that the closures connect, (2, K)."""
         robot = self.conditions.robot
         pairs = [[robot.index(a), robot.index(b)] for a, b in robot.closures]
         return np.array(pairs, dtype=int).reshape(-1, 2).T
 
     @cached_property
     def nominal_closures(self) -> NDArray:
-        """(R, K, 4, 4) nominal second frame of each closure relative to the first."""
+        """Nominal pose of each closure's second frame in its first, (R, K, 4, 4)."""
         first, second = self.closure_frames
         T = self.conditions.transforms
         return inverse(T[:, first]) @ T[:, second]
@@ -210,14 +210,14 @@ class RowState:
 
     @cached_property
     def passive_motion(self) -> NDArray:
-        """(R, n) [rad or m] additional motions of passive joints."""
+        """Additional motions of passive joints, (R, n) [rad or m]."""
         moved = self.motions @ self.rows.flexible.free.T
         own = [f.own_axis for f in self.rows.conditions.robot.frames]
         return moved.reshape(*self.screws.shape[1:])[..., np.arange(len(own)), own]
 
     @cached_property
     def poses(self) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-        """(R, n, 4, 4) poses before and after body deformation, after joints, final."""
+        """Poses before and after body deformation, after the joint, and final."""
         rows = self.rows
         partial = [rows.bodies]
         for frames, screws in zip(rows.elastic_frames, self.screws, strict=True):
@@ -238,13 +238,13 @@ class RowState:
 
     @property
     def platform(self) -> NDArray:
-        """(R, 4, 4) pose of the platform."""
+        """Pose of the platform, (R, 4, 4)."""
         robot = self.rows.conditions.robot
         return self.poses[3][:, robot.index(robot.platform)]
 
     @cached_property
     def platform_screw(self) -> NDArray:
-        """(R, 6) rotation vector of R R_nominal^T and translation of the origin."""
+        """Rotation vector of R R_nominal^T and translation of the origin, (R, 6)."""
         nominal = self.rows.conditions.postures.platform
         back = np.swapaxes(nominal[:, :3, :3], 1, 2)
         turn = rotation_vector(self.platform[:, :3, :3] @ back)
@@ -252,7 +252,7 @@ class RowState:
 
     @cached_property
     def residual(self) -> NDArray:
-        """(R, 6K) closure residuals: [rad], and translations per reference length."""
+        """Closure residuals [rad, reference lengths], (R, 6K)."""
         first, second = self.rows.closure_frames
         T, origin = (
             self.poses[3],
@@ -265,7 +265,7 @@ class RowState:
 
     @cached_property
     def total_wrenches(self) -> NDArray:
-        """(2, R, n, 6) wrenches through bodies and through joints, base axes.
+        """Wrenches through bodies and through joints, base axes, (2, R, n, 6).
 
         The wrenches act at the platform's nominal origin.
         """
@@ -280,7 +280,7 @@ class RowState:
         platform = np.concatenate([moment, loads.load[:, 3:]], axis=1)[:, None]
         on_body = robot.on_path[last][:, None] * platform
         on_joint = on_body.copy()
-        on_joint[:, last] = 0.0  # the load acts on the platform's body
+        on_joint[:, last] = 0.0  # The load acts on the body of the platform.
         total = np.stack([on_body, on_joint]) + closing
         if loads.beyond_platform:
             carried = self.poses[3] @ self.rows.commanded
@@ -291,7 +291,7 @@ class RowState:
         return total
 
     def wrenches(self, total: NDArray, poses: NDArray, frames: NDArray) -> NDArray:
-        """Transform (R, k, 6) wrenches from the platform's origin to frames."""
+        """Transform wrenches (R, k, 6) from the platform's origin to frames."""
         origin = self.rows.conditions.postures.platform[:, None, :3, 3]
         T, w = poses[:, frames], total[:, frames]
         moment = w[..., :3] - np.cross(T[..., :3, 3] - origin, w[..., 3:])

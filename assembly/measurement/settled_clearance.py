@@ -1,10 +1,8 @@
-"""Clearances that are closed by the loads: each joint is in contact, at its bound.
+"""Positions of loaded joints within their clearances.
 
 A joint that transmits the wrench w rests at the point of its clearance cones that is
-farthest along w.  In a robot without closures, the wrenches depend only on the loads,
-and this position is the exact minimum of (22).  With closures, it is the limit for
-small clearances, which follows from the envelope theorem: dE/d(bound) = -|w| in the
-directions of the cone.
+farthest along w.  In a robot without closures, this position is the exact minimum of
+(22).  With closures, it is the limit for small clearances (envelope theorem).
 """
 
 from dataclasses import replace
@@ -25,20 +23,20 @@ from forcefit.assembly.model.clearance import (
 from forcefit.assembly.model.contact_closures import loops
 from forcefit.assembly.model.robot import Clearance, Frame, Robot
 
-# relative to the largest moment or force: smaller moments or forces count as zero
+# moments and forces below this fraction of the largest are treated as zero
 _UNLOADED = 1e-9
 
 
 def with_clearances_taken_up(conditions: Conditions) -> tuple[Conditions, NDArray]:
-    """Replace clearances by their screws under the load.
+    """Replace clearances by the joint positions under the load.
 
     Args:
         conditions: conditions of R measurements of a robot with clearances.
 
     Returns:
-        The conditions of a robot without clearances, whose errors include these screws;
-        and (R,) bool, True if a joint with clearance transmits no load.  Its rest
-        position is then undetermined, and the joint is centred.
+        The conditions of a robot without clearances, whose errors include these
+        positions; and (R,) bool, True if a joint with clearance transmits no load.
+        This joint is centred.
     """
     tight = replace(conditions, robot=without_joint_clearances(conditions.robot))
     distinct, posture_of_row = tight.postures.distinct
@@ -58,7 +56,7 @@ def with_clearances_taken_up(conditions: Conditions) -> tuple[Conditions, NDArra
         size = np.linalg.norm(parts, axis=2)
         rests = size > _UNLOADED * size.max(initial=0.0)
         unit = parts / np.where(rests, size, 1.0)[:, :, None]
-        # a joint has either the clearance ``ball``, or ``radial`` and ``axial``
+        # A joint has either the clearance ``ball``, or ``radial`` and ``axial``.
         bound = np.where(np.isnan(bounds[:, cone]), 0.0, bounds[:, cone])
         clearance_screws[:, :, list(rows)] += unit * (rests * bound)[:, :, None]
         undetermined |= np.any(~rests & (bound > 0.0), axis=1)
@@ -66,14 +64,15 @@ def with_clearances_taken_up(conditions: Conditions) -> tuple[Conditions, NDArra
 
 
 def with_clearances_at_rest(conditions: Conditions) -> Conditions:
-    """Replace clearances by their rest positions.
+    """Replace clearances by the rest positions of the joints.
 
     Args:
         conditions: conditions of R measurements of a robot with clearances, and with
             ``rest``.
 
     Returns:
-        The conditions of a robot without clearances, whose errors include these screws.
+        The conditions of a robot without clearances, whose errors include the rest
+        positions.
 
     Raises:
         ValueError: ``rest`` is not given.
@@ -90,7 +89,7 @@ def with_clearances_at_rest(conditions: Conditions) -> Conditions:
 
 
 def _component_bounds(robot: Robot) -> NDArray:
-    """Return the (n, 6) bounds of clearance screw components; 0 without clearance."""
+    """Return the bounds of clearance screw components, (n, 6); 0 without clearance."""
     bounds = np.where(scales_with_margin(robot), clearance_bounds(robot), 0.0)
     bounds[np.isinf(bounds)] = 0.0
     return component_bounds(bounds)
@@ -113,13 +112,13 @@ def fractions(robot: Robot, clearance_screws: NDArray) -> NDArray:
 
 
 def without_joint_clearances(robot: Robot) -> Robot:
-    """Remove the clearances of a robot, but not the motion limits of passive joints.
+    """Return a robot without clearances, but with motion limits of passive joints.
 
     Args:
         robot: robot with or without clearances.
 
     Returns:
-        The robot without clearance cones, and without closures between contacts.
+        The robot without clearances and without closures between contacts.
     """
     tight = tuple(_tight(frame) for frame in robot.frames)
     return replace(robot, frames=tight, closures=loops(robot))

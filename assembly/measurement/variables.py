@@ -1,7 +1,7 @@
 """Evaluate the variables of effects, such as ``q.drive``, ``load.fz`` and ``time``.
 
-Wrenches (``wrench.drive.mz``) are excluded, because they are known only after the
-equilibrium has been computed.
+Wrenches such as ``wrench.drive.mz`` are excluded, because they depend on the
+equilibrium.
 """
 
 from collections.abc import Iterable
@@ -14,7 +14,7 @@ from forcefit.assembly.measurement.conditions import COVARIATES, Conditions
 from forcefit.assembly.measurement.history import History, in_order
 from forcefit.stiffness.screws import WRENCH
 
-FORCE = "load.force"  # magnitude of the force
+FORCE = "load.force"  # magnitude of the platform force
 LOADS = tuple(name.lower() for name in WRENCH)
 
 
@@ -52,8 +52,8 @@ def past(conditions: Conditions, names: Iterable[str]) -> tuple[History, NDArray
         names: names of the required variables.
 
     Returns:
-        The history, and the (R,) indices of the measurements in it.  Measurements
-        without a history each become the first reading of a separate session.
+        The history, and the indices of the measurements in it, (R,).  Without a
+        history, each measurement is the first of a separate session.
     """
     if conditions.history is not None and conditions.row is not None:
         return conditions.history, conditions.row
@@ -65,14 +65,13 @@ def past(conditions: Conditions, names: Iterable[str]) -> tuple[History, NDArray
 
 
 def with_history(conditions: Conditions) -> Conditions:
-    """Add a history, as if the measurements were taken in sequence in a campaign.
+    """Add a history in which the measurements are in sequence.
 
     Args:
-        conditions: conditions of R measurements, as declared.
+        conditions: conditions of R measurements.
 
     Returns:
-        The conditions; selections by :meth:`Conditions.take` retain the complete
-        history.
+        The conditions with ``history``.
     """
     names = [f"q.{frame.name}" for frame in conditions.robot.frames]
     names += [f"load.{name}" for name in LOADS]

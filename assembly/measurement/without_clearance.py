@@ -1,4 +1,4 @@
-"""Minimum energy (22) of a robot without clearances, at many postures and loads.
+"""Minimum energy (22) of a robot without clearances in many measurements.
 
 Without clearances, all unknowns of (22) are unbounded, and the optimality conditions
 are a linear system in the closure multipliers and the free motions,
@@ -7,8 +7,7 @@ are a linear system in the closure multipliers and the free motions,
     [ F' J'     0  ] [  q   ]  = - [    F' f      ].
 
 Here C contains the compliances of bodies and joints, f the loads on them, J the
-closures, and F the free motions.  One factorisation serves all measurements at a
-posture.
+closures, and F the free motions.  The matrix is factorised once for each posture.
 
 ======  ====================  ===========  ===========================================
 symbol  code                  shape        meaning
@@ -43,13 +42,13 @@ from forcefit.assembly.model.links import (
     own_screws,
 )
 
-# relative size below which an eigenvalue counts as round-off. If an eigenvalue lies
-# between this size and RANK, the numerical rank is ambiguous
+# Relative size below which an eigenvalue is round-off. The rank is ambiguous if an
+# eigenvalue is between this size and RANK.
 _ROUNDING = 1e-13
-# largest padding relative to the number of rows; beyond it, rows are solved singly
+# largest padding of a batch relative to its number of rows
 _PADDING = 4
 _CLOSED = 1e-9  # largest relative residual of a solved system
-_CLOSED_ABSOLUTE = 1e-12  # [rad, reference lengths] residual that counts as round-off
+_CLOSED_ABSOLUTE = 1e-12  # [rad, reference lengths] residual that is only round-off
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,8 +64,8 @@ class Flexibility:
         limit: (q,) [rad, m] bounds of the free motions, inf without a bound.
         inverse: (c, m, m) inverse of the scaled system, m = 6K + q.
         system: (c, m, m) the scaled system.
-        softness: number by which compliances are divided, so that the entries of the
-            scaled system are about 1.
+        softness: factor by which compliances are divided, so that the entries of the
+            scaled system are of order 1.
         ambiguous: (c,) bool, True if the numerical rank at the posture is ambiguous.
     """
 
@@ -83,7 +82,7 @@ class Flexibility:
 
     @cached_property
     def compliance(self) -> NDArray:
-        """(n, 6, 6) sums of the compliances of each body and its joint."""
+        """Sum of the compliances of each body and its joint, (n, 6, 6)."""
         return self.body_compliances + self.joint_compliances
 
     def solve(
@@ -103,7 +102,7 @@ class Flexibility:
         under_load = _under_load(self, loads)
         unclosed = errors if under_load is None else errors + under_load
         J, size, times = self.rows, self.softness, at_postures(posture)
-        if not self.system.size:  # an open chain
+        if not self.system.size:  # open chain
             return FlexibleAssembly(
                 platform_screw=times(self.platform, unclosed),
                 joint_wrenches=loads.joint,
@@ -134,7 +133,7 @@ class Flexibility:
 
         Args:
             columns: (6n, s) screws at the frames.
-            read: (6n, t) screws along which the forces are evaluated; by default
+            read: (6n, t) screws along which forces are evaluated; by default
                 ``columns``.
 
         Returns:
@@ -171,10 +170,10 @@ class Flexibility:
 def responses_to(
     flexible: Flexibility, columns: bytes, shape: tuple[int, int]
 ) -> tuple[NDArray, NDArray, NDArray]:
-    """Compute the responses to stress-free screws at the frames, with caching.
+    """Compute the responses to stress-free screws at the frames.
 
     Args:
-        flexible: the prepared robot at c postures.
+        flexible: factorised model at c postures.
         columns: bytes of the columns of (6n, s) screws.
         shape: the shape (6n, s).
 
@@ -207,8 +206,8 @@ class FlexibleAssembly:
 
 @lru_cache(maxsize=4)
 def _under_load(flexible: Flexibility, loads: FrameLoads) -> NDArray | None:
-    """Return the (R, 6n) deformations of an open chain under the loads."""
-    # cached, because the result is the same for conditions that differ only in errors
+    """Return the deformations of an open chain under the loads, (R, 6n)."""
+    # Cached for conditions that differ only in errors.
     if not loads:
         return None
     screws = _each(flexible.body_compliances, loads.body)
@@ -218,8 +217,6 @@ def _under_load(flexible: Flexibility, loads: FrameLoads) -> NDArray | None:
 
 def at_postures(posture: NDArray) -> Callable[[NDArray, NDArray], NDArray]:
     """Return a function that multiplies each vector by the matrix of its posture.
-
-    Vectors at the same posture are multiplied together, so matrices are not copied.
 
     Args:
         posture: (R,) index of the posture of each vector.
@@ -233,11 +230,11 @@ def at_postures(posture: NDArray) -> Callable[[NDArray, NDArray], NDArray]:
 
 @lru_cache(maxsize=8)
 def _at_postures(unchanged: Unchanged) -> Callable[[NDArray, NDArray], NDArray]:
-    """Return the function of :func:`at_postures`, cached."""
+    """Return the cached function of :func:`at_postures`."""
     posture = unchanged.numbers
     names, own, count = np.unique(posture, return_inverse=True, return_counts=True)
     order = np.argsort(own, kind="stable")
-    place = np.empty_like(order)  # index of a row among the rows of the same posture
+    place = np.empty_like(order)  # index among the rows of the same posture
     place[order] = np.arange(len(order)) - np.repeat(np.cumsum(count) - count, count)
     most = int(count.max(initial=0))
 
@@ -269,7 +266,7 @@ def flexibility(postures: Posture) -> Flexibility:
         ValueError: the robot has clearances.
     """
     robot = postures.robot
-    # the factorisation is shared by robots that differ only in errors and loads
+    # Robots that differ only in errors and loads share the factorisation.
     springs = link_compliances(robot), joint_compliances(robot)
     arrays = *springs, clearance_bounds(robot), own_screws(robot)
     return _factorise(content_of(postures, arrays, (robot.closures, robot.platform)))
@@ -316,12 +313,12 @@ def _factorise(content: Content) -> Flexibility:
 
 
 def pseudo_inverse(M: NDArray) -> tuple[NDArray, NDArray]:
-    """Return (c, m, m) pseudoinverses, and (c,) bool, True if the rank is ambiguous."""
+    """Return pseudoinverses (c, m, m), and a mask (c,) of ambiguous ranks."""
     if not M.size:
         return M, np.zeros(len(M), dtype=bool)
     values, vectors = np.linalg.eigh(M)
     size = np.abs(values)
-    # the largest value is zero if there are only free motions
+    # The largest value is zero if there are only free motions.
     largest = size.max(axis=1, keepdims=True)
     kept = size > RANK * largest
     ambiguous = np.any((size > _ROUNDING * largest) & ~kept, axis=1)
@@ -330,13 +327,13 @@ def pseudo_inverse(M: NDArray) -> tuple[NDArray, NDArray]:
 
 
 def _limits(postures: Posture, free: NDArray) -> NDArray:
-    """Return the (q,) bounds of the free motions."""
+    """Return the bounds of the free motions, (q,)."""
     bounds = component_bounds(clearance_bounds(postures.robot)).ravel()
     return bounds[np.abs(free).argmax(axis=0)]
 
 
 def _each(matrices: NDArray, screws: NDArray) -> NDArray:
-    """Multiply the (6, 6) matrix of each frame by its screw or wrench, (R, 6n)."""
+    """Multiply the matrix of each frame by its screw or wrench, (R, 6n)."""
     blocks = np.swapaxes(screws.reshape(len(screws), -1, 6), 0, 1)
     products = blocks @ matrices.mT
     return np.swapaxes(products, 0, 1).reshape(screws.shape)

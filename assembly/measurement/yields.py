@@ -1,9 +1,9 @@
-"""Solve for the deflections of compliant locations, which depend on wrenches.
+"""Solve for the deflections of compliances with laws.
 
-The deflections e are stress-free screws that depend on the wrenches w, which in turn
-depend on e: e = g(w), w = w0 + A e, where A is the self-stress.  Newton's method solves
-e - g(w) = 0 for all measurements together.  In a robot without closures, A is zero and
-the first iterate is exact.
+The deflections e are stress-free screws that depend on the wrenches w by a law e =
+g(w).  In a closed chain, the wrenches depend on the deflections, w = w0 + A e, with the
+self-stress A.  Newton's method solves e - g(w) = 0 for all measurements together.  In
+an open chain, A is zero and the first iterate is exact.
 
 ======  ===========  ===========  ====================================================
 symbol  code         shape        meaning
@@ -27,14 +27,14 @@ from forcefit.assembly.model.links import in_series, own_screw
 from forcefit.assembly.solvers.conic import SolverFailed
 
 T = TypeVar("T")
-_STEP = 1e-6  # finite-difference step of a law, relative to the wrench
-_SETTLED = 1e-10  # largest accepted residual, relative to the largest deflection
+_STEP = 1e-6  # finite-difference step relative to the wrench
+_SETTLED = 1e-10  # largest residual relative to the largest deflection
 _STEPS = 40
 
 
 @dataclass(frozen=True, eq=False)
 class Yields:
-    """Compliant places of a robot, described by columns of small screws.
+    """Compliances with laws at the frames of a robot.
 
     Attributes:
         conditions: conditions of R measurements of a robot of n frames.
@@ -44,12 +44,12 @@ class Yields:
 
     @cached_property
     def places(self) -> NDArray:
-        """(6n, m) unit screws along which the locations deflect."""
+        """Unit screws of the deflections, (6n, m)."""
         return self._units([(y.frame, y.component) for y in self.conditions.yields])
 
     @cached_property
     def read(self) -> NDArray:
-        """(6n, t) unit screws of the wrenches on which the laws depend."""
+        """Unit screws of the wrenches on which the laws depend, (6n, t)."""
         return self._units(self._pairs)
 
     @cached_property
@@ -66,7 +66,7 @@ class Yields:
         return columns
 
     def deflections(self, through: NDArray) -> NDArray:
-        """Return the (R, m) deflections of the locations under wrenches (R, t)."""
+        """Return the deflections (R, m) under wrenches (R, t)."""
         columns = []
         for one in self.conditions.yields:
             chosen = [self._pairs.index(pair) for pair in one.through]
@@ -74,7 +74,7 @@ class Yields:
         return np.column_stack(columns)
 
     def slope(self, through: NDArray) -> NDArray:
-        """Return (R, m, t) derivatives of the deflections, by central differences."""
+        """Return derivatives (R, m, t) of the deflections by central differences."""
         slopes = np.zeros((len(through), len(self.conditions.yields), through.shape[1]))
         for k in range(through.shape[1]):
             step = _STEP * max(float(np.abs(through[:, k]).max(initial=0.0)), 1e-9)
@@ -116,15 +116,15 @@ class Yields:
 def with_deflections(
     conditions: Conditions, places: NDArray, give: NDArray
 ) -> Conditions:
-    """Replace compliant locations by given deflections as stress-free screws.
+    """Replace compliances with laws by given deflections.
 
     Args:
         conditions: conditions of R measurements.
-        places: (6n, m) unit screws of the compliant locations.
+        places: (6n, m) unit screws of the deflections.
         give: (R, m) [rad or m] deflections.
 
     Returns:
-        The conditions without compliant locations.
+        The conditions without laws of compliance.
     """
     screws = (give @ places.T).reshape(conditions.errors.shape)
     return replace(conditions, errors=conditions.errors + screws, yields=())
@@ -135,7 +135,7 @@ def settle_yields(
     solve: Callable[[Conditions], tuple[T, NDArray]],
     A: Callable[[Yields], NDArray],
 ) -> T:
-    """Solve for the equilibrium of conditions with compliant locations.
+    """Solve for the equilibrium of a robot with laws of compliance.
 
     Args:
         conditions: conditions of R measurements.
@@ -162,15 +162,15 @@ def settle_yields(
 
 
 def with_springs(conditions: Conditions, row: int) -> Conditions:
-    """Replace linear compliant locations by springs in series with the joints.
+    """Replace linear laws of compliance by springs in series with the joints.
 
     Args:
         conditions: conditions of all measurements.
         row: index of the measurement.
 
     Returns:
-        Conditions of one measurement.  Compliant locations that have a nonlinear law or
-        no positive compliance are retained.
+        Conditions of one measurement.  Laws that are nonlinear or have no positive
+        compliance do not change.
     """
     one, left = conditions.take([row]), []
     frames = list(conditions.robot.frames)

@@ -1,4 +1,4 @@
-"""Contact laws in series with springs, whose forces balance."""
+"""Equilibrium of contact springs in series with joints."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ LAWS = (ContactLaw("a", 3e5, 1.5), ContactLaw("b", 2e3, 1.1))
 
 
 def in_unit(force):
-    """The contact laws with forces in another unit."""
+    """Return the contact laws with forces in another unit."""
     return tuple(ContactLaw(x.frame, x.coefficient * force, x.exponent) for x in LAWS)
 
 
@@ -19,8 +19,8 @@ def law(one, d):
 
 
 @pytest.mark.parametrize("force", [1e-9, 1.0])
-def test_coupled_contacts_are_in_balance(rng, force):
-    """The contacts are coupled by A, and Newton's method converges in a few steps."""
+def test_coupled_contacts_are_in_equilibrium(rng, force):
+    """Newton's method converges in a few steps."""
     B = rng.normal(size=(6, 2, 2)) * 300
     A = -force * B @ B.mT
     w = force * rng.normal(size=(6, 2)) * [50.0, 20.0]

@@ -1,4 +1,4 @@
-"""Exact equilibria of many measurements equal those of single measurements."""
+"""Exact equilibria of many measurements."""
 
 from dataclasses import replace
 
@@ -22,9 +22,9 @@ ROBOTS = {"five_bar": 0.3, "3rrr": 0.2, "hexapod": 0.02, "arm6": 0.4}
 
 
 def loaded_rows(name, rng, laws=()):
-    """A robot without clearance, with errors, loads and weight, at several postures.
+    """Return conditions of a robot with errors, loads and weight at several postures.
 
-    Errors of 0.2 mm and mrad, forces of some 100 N.
+    Errors are 0.2 mm and 0.2 mrad, and forces are about 100 N.
     """
     robot = without_joint_clearances(load_robot(name))
     home = np.array([f.position if f.actuated else np.nan for f in robot.frames])
@@ -45,10 +45,8 @@ def loaded_rows(name, rng, laws=()):
 
 @pytest.mark.parametrize(("name", "pieces"), [*((n, 1) for n in ROBOTS),
                                               ("five_bar", 3)])  # fmt: skip
-def test_exact_solutions_of_all_measurements_equal_single_exact_solutions(
-    name, pieces, rng
-):
-    """Both converge to 1e-12, and nominal closures hold to 1e-12."""
+def test_exact_solutions_together_equal_single_solutions(name, pieces, rng):
+    """Both solutions converge to 1e-12."""
     here = loaded_rows(name, rng)
     if pieces > 1:
         whole, _ = solve_rows(here, np.zeros((len(here), 0)))
@@ -61,7 +59,8 @@ def test_exact_solutions_of_all_measurements_equal_single_exact_solutions(
         alone = assemble_row(here, row).platform_screw
         np.testing.assert_allclose(screws[row], alone, rtol=0, atol=2e-11)
     linear = predict(replace(here, exact=False)).deviation
-    assert np.abs(predict(here).deviation - linear).max() > 1e-7  # it matters here
+    # The exact and linear results differ.
+    assert np.abs(predict(here).deviation - linear).max() > 1e-7
     assert pieces == 1 or np.abs(screws - whole).max() > 1e-8
 
 
@@ -75,8 +74,8 @@ BAR = Robot(
 
 
 @pytest.mark.parametrize("force", [5.0, 200.0, -200.0])
-def test_bar_on_a_contact_rests_where_its_moments_balance(force):
-    """c |a|^n sign(a) = F L cos a for the angle a: the arm shortens as it turns."""
+def test_moments_of_a_bar_on_a_contact_are_in_equilibrium(force):
+    """The angle a satisfies c |a|^n sign(a) = F L cos a."""
     c, n = 2e5, 1.5
     load = [0, 0, 0, 0, force, 0]
     here = as_declared(home_posture(BAR), load)
@@ -89,14 +88,14 @@ def test_bar_on_a_contact_rests_where_its_moments_balance(force):
 
 
 def test_contact_without_load_has_zero_deflection():
-    """The secant stiffness is infinite without load, but has no influence."""
+    """The secant stiffness is infinite without load."""
     here = as_declared(home_posture(BAR), np.zeros(6))
     here = replace(here, laws=(ContactLaw("drive", 2e5, 1.5),), exact=True)
     np.testing.assert_array_equal(predict(here).deviation, 0.0)
 
 
 def test_measurements_that_do_not_converge_are_solved_one_by_one():
-    """The spring is so soft that the bar rotates by radians."""
+    """The spring is soft, so the bar rotates by several radians."""
     K = np.diag([np.inf, np.inf, 1.0, np.inf, np.inf, np.inf])
     frames = (replace(BAR.frames[0], joint_stiffness=K), BAR.frames[1])
     robot = replace(BAR, frames=frames)

@@ -1,4 +1,4 @@
-"""States that lag behind a variable, compared with the differential equation."""
+"""Lagged variables, compared with the differential equation."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ VALUES = np.array([1.0, 4.0, -2.0, -2.0, 5.0, 5.0])
 
 
 def by_integration(times, values, time_constant, held):
-    """Integrate tau y' = u - y from y = 0 at time 0, for held or linearly varying u."""
+    """Return the solution of tau y' = u - y with y = 0 at time 0."""
     state, answers = 0.0, []
     before, last = values[0], 0.0
     for time, value in zip(times, values, strict=True):
@@ -31,10 +31,8 @@ def by_integration(times, values, time_constant, held):
 
 @pytest.mark.parametrize("held", [False, True])
 @pytest.mark.parametrize("time_constant", [0.5, 20.0, 1e4])
-def test_lag_of_an_effect_equals_the_integrated_differential_equation(
-    held, time_constant
-):
-    """Two of the readings are taken at the same time."""
+def test_lagged_variable_equals_the_solution_of_its_equation(held, time_constant):
+    """Two readings have the same time."""
     history, row = in_order({"time": TIMES, "u": VALUES}, None)
     assert row.tolist() == [*range(6)]
     found = history.lagged("u", time_constant, held=held)
@@ -45,7 +43,7 @@ def test_lag_of_an_effect_equals_the_integrated_differential_equation(
     )
 
 
-def test_history_of_effects_starts_at_rest_in_each_session_whatever_the_row_order(rng):
+def test_history_does_not_depend_on_other_sessions_and_row_order(rng):
     """The state at each reading depends only on readings of the same session."""
     mixed = rng.permutation(12)
     times, values = np.tile(TIMES, 2)[mixed], np.r_[VALUES, 2 * VALUES][mixed]
@@ -60,7 +58,7 @@ def test_history_of_effects_starts_at_rest_in_each_session_whatever_the_row_orde
 
 
 def directions_by_hand(values, session, approach):
-    """Sign of the last change within the session, otherwise the approach direction."""
+    """Return the sign of the last change, or the approach direction."""
     found = []
     for i, value in enumerate(values):
         if i == 0 or session[i] != session[i - 1]:
@@ -74,8 +72,8 @@ def directions_by_hand(values, session, approach):
     return found
 
 
-def test_approach_direction_is_that_of_the_last_motion_in_the_session(rng):
-    """Sessions start at arbitrary readings, and some variables barely change."""
+def test_approach_direction_equals_that_of_the_last_motion(rng):
+    """Sessions start at arbitrary readings, and some changes are negligible."""
     for _ in range(30):
         count = int(rng.integers(1, 9))
         values = np.cumsum(rng.choice([-1.0, 0.0, 0.0, 5e-10, 1.0], count))

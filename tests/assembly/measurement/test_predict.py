@@ -1,4 +1,4 @@
-"""Predictions with finite motions, contacts and laws: closed forms and bisection."""
+"""Predictions with finite motions and contacts, compared with closed forms."""
 
 from dataclasses import replace
 
@@ -24,11 +24,11 @@ from forcefit.assembly.model.robot import Clearance, Frame, Robot
 from tests.linkages_for_tests import four_bar
 
 LENGTH, STIFFNESS, FORCE = 0.8, 2e3, 150.0
-Q = np.array([0.2, 1.1, 0.2, -0.7])  # one command is repeated
+Q = np.array([0.2, 1.1, 0.2, -0.7])  # [rad] drive commands, one of them repeated
 
 
 def arm(stiffness=STIFFNESS):
-    """A rigid bar on an elastic drive about z."""
+    """Return a rigid bar on an elastic drive about z."""
     K = np.diag([np.inf, np.inf, stiffness, np.inf, np.inf, np.inf])
     return Robot("arm", "tip", (
         Frame("drive", joint="revolute", actuated=True, joint_stiffness=K),
@@ -37,7 +37,7 @@ def arm(stiffness=STIFFNESS):
 
 
 def rows(robot, force=FORCE, error=0.0):
-    """Four commands under a force along y, with an angular error of the drive."""
+    """Return conditions with a force along y and an angular error of the drive."""
     placed, _ = place_many_joints(robot, np.column_stack([Q, 0 * Q]))
     errors = np.zeros((2, 6))
     errors[0, 2] = error
@@ -46,7 +46,7 @@ def rows(robot, force=FORCE, error=0.0):
 
 
 def moved(turn):
-    """(4, 6) tip displacements for rotations (4,), exact and to first order."""
+    """Return exact and first-order tip displacements (4, 6) for rotations (4,)."""
     there = np.stack([np.cos(Q + turn), np.sin(Q + turn)], axis=1)
     slope = np.stack([-np.sin(Q), np.cos(Q)], axis=1) * np.reshape(turn, (-1, 1))
     nominal = np.stack([np.cos(Q), np.sin(Q)], axis=1)
@@ -58,8 +58,8 @@ def moved(turn):
     return found
 
 
-def test_second_order_part_equals_finite_errors_without_load():
-    """L (cos(q + e) - cos q + e sin q), likewise for y; load effects remain linear."""
+def test_second_order_part_equals_finite_motion_without_load():
+    """The second-order displacement along x is L (cos(q + e) - cos q + e sin q)."""
     e = 0.03
     here = rows(arm(), error=e)
     finite, linear = moved(np.full(4, e))
@@ -74,8 +74,8 @@ def test_second_order_part_equals_finite_errors_without_load():
 
 
 @pytest.mark.parametrize("exact", [False, True])
-def test_finite_motions_are_evaluated_at_the_load_of_each_measurement(exact):
-    """K a = F L cos(q + e + a) in each measurement, so the declared model is exact."""
+def test_finite_motions_include_the_load_of_each_measurement(exact):
+    """The rotation a of the drive satisfies K a = F L cos(q + e + a)."""
     e = 0.03
     here = replace(rows(arm(), error=e), exact=exact)
     turn = np.array([
@@ -91,8 +91,8 @@ def test_finite_motions_are_evaluated_at_the_load_of_each_measurement(exact):
 
 
 @pytest.mark.parametrize("exact", [False, True])
-def test_single_measurement_with_a_contact_matches_its_closed_form_and_the_batch(exact):
-    """a = F L cos(q + a) / K + (M / c)^(1/n), with or without finite motions."""
+def test_measurement_with_a_contact_equals_the_closed_form(exact):
+    """The rotation is a = F L cos(q + a) / K + (M / c)^(1/n)."""
     c, n, force = 5e4, 1.5, 20.0
     here = replace(rows(arm(), force), laws=(ContactLaw("drive", c, n),), exact=exact)
 
@@ -103,14 +103,14 @@ def test_single_measurement_with_a_contact_matches_its_closed_form_and_the_batch
     for k, q in enumerate(Q):
         turn = brentq(left, -1, 1, args=(q,), xtol=1e-14)
         one = assemble_row(here, k)
-        # with finite motions a contact converges to 1e-5
+        # With finite motions, contacts converge to 1e-5.
         rel = 2e-5 if exact else 1e-9
         assert one.platform_screw[2] == pytest.approx(turn, rel=rel)
         assert predict(here).deviation[k, 2] == pytest.approx(turn, rel=1e-6)
 
 
-def test_function_of_a_wrench_uses_the_moment_of_finite_motions():
-    """a = F L cos(q + a) / K + b M^2 in each measurement."""
+def test_function_of_a_wrench_depends_on_finite_motions():
+    """The rotation is a = F L cos(q + a) / K + b M^2."""
     b = 2e-6
     one = Yield("drive", 2, (("drive", 2),), np.zeros((4, 1)),
                 lambda x, w: b * w[:, 0] ** 2)  # fmt: skip
@@ -127,8 +127,8 @@ def test_function_of_a_wrench_uses_the_moment_of_finite_motions():
         assert seen.deviation[:, 2] == pytest.approx(turn, rel=1e-6)
 
 
-def test_measurement_that_cannot_close_has_no_prediction_and_centred_clearance():
-    """A four-bar with a loose pin, whose coupler is once out of the plane."""
+def test_measurement_with_an_open_loop_has_no_prediction():
+    """In one measurement, the coupler of a four-bar has an out-of-plane error."""
     robot = four_bar()
     frames = tuple(
         replace(f, clearance=Clearance(radial=2e-5) if f.name == "wrist" else None)
@@ -155,8 +155,8 @@ def test_measurement_that_cannot_close_has_no_prediction_and_centred_clearance()
 
 
 @pytest.mark.parametrize("exact", [False, True])
-def test_contact_in_parallel_with_a_spring_carries_part_of_the_force(exact):
-    """x = f / K + (f / c)^(2/3) = (F - f) / K for two sliders joined at their ends."""
+def test_contact_in_parallel_with_a_spring_equals_closed_form(exact):
+    """The displacement is x = f / K + (f / c)^(2/3) = (F - f) / K."""
     K, c, forces = 1e6, 3e8, [500.0, -2.0, 40.0]
     spring = np.diag([np.inf] * 5 + [K])
     slides = {"joint": "prismatic", "actuated": True, "joint_stiffness": spring}
@@ -175,7 +175,7 @@ def test_contact_in_parallel_with_a_spring_carries_part_of_the_force(exact):
                      0.0, abs(F), xtol=1e-13)  # fmt: skip
         assert shift == pytest.approx(np.sign(F) * (abs(F) - own) / K, rel=1e-6)
         give[k] = np.sign(F) * (own / c) ** (2 / 3)
-    # all measurements together, none individually
+    # All measurements converge together.
     screws, converged = solve_rows(replace(here, exact=True), give)
     assert converged.all()
     assert screws == pytest.approx(seen, abs=1e-12)

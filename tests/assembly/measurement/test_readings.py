@@ -1,4 +1,4 @@
-"""Readings of a device on a displaced platform, compared with SciPy transforms."""
+"""Device readings of a displaced platform, compared with SciPy transforms."""
 
 from dataclasses import replace
 
@@ -12,12 +12,12 @@ from forcefit.assembly.measurement.predict import predict, read
 from forcefit.assembly.model.robot import Frame, Robot
 
 ROWS = 5
-POINT = np.array([0.3, -0.4, 0.2])  # [m] platform axes
+POINT = np.array([0.3, -0.4, 0.2])  # [m] reference point in platform axes
 
 
 @pytest.fixture
 def rows():
-    """An arm without springs at five configurations, far from its base."""
+    """Return five configurations of a rigid arm far from its base."""
     turning = {"joint": "revolute", "actuated": True}
     robot = Robot("arm", "tool", (
         Frame("one", translation=[0.5, -0.3, 0.4], rotation=[0.2, 0.3, 0], **turning),
@@ -56,7 +56,7 @@ def test_reading_equals_the_rigid_body_transform(rows, own_targets, by_row, rng)
         assert seen[k] - here.reading[k] == pytest.approx(expected, abs=1e-12)
 
 
-def test_second_order_part_is_added_to_the_linear_model_only(rows, rng):
+def test_second_order_part_is_added_to_the_linear_model(rows, rng):
     added = 1e-3 * rng.normal(size=(ROWS, 6))
     here = as_declared(rows)
     linear = replace(here, second_order=added)
@@ -66,7 +66,7 @@ def test_second_order_part_is_added_to_the_linear_model_only(rows, rng):
 
 
 def test_work_of_a_load_does_not_depend_on_the_reference_point(rows, rng):
-    """M . theta + F . t is equal at the reference point and the platform origin."""
+    """The work M . theta + F . t is equal at both points."""
     load, screw = rng.normal(size=(ROWS, 6)), rng.normal(size=6)
     here = as_declared(rows, load, point=POINT)
     moved = here.load_at_origin()

@@ -1,4 +1,4 @@
-"""Clearances closed by loads, measured points, and rest positions."""
+"""Positions of loaded joints within their clearances."""
 
 from dataclasses import replace
 
@@ -18,13 +18,13 @@ RADIAL, AXIAL = 1e-5, 3e-5
 
 
 def at_home(robot, load, **given):
-    """Conditions of one measurement."""
+    """Return the conditions of one measurement."""
     postures = together([home_posture(robot)])
     return as_declared(postures, np.array([load], dtype=float), **given)
 
 
 def pin(**clearance):
-    """A passive pin about z, rotated about x, with an arm along its x axis."""
+    """Return a rotated passive pin with an arm along its x axis."""
     return Robot("pin", "tip", (
         Frame("pin", joint="revolute", rotation=[0.7, 0, 0],
               clearance=Clearance(**clearance)),
@@ -33,19 +33,19 @@ def pin(**clearance):
 
 
 @pytest.mark.parametrize("unit", [1e-12, 1.0, 1e6])
-def test_load_of_any_size_moves_a_joint_to_its_bound_along_the_load(unit):
-    """A pin along x moves radially by its clearance, but not axially."""
+def test_load_moves_a_joint_to_its_clearance_bound(unit):
+    """A pin moves radially by its clearance, but not axially."""
     conditions = at_home(pin(radial=RADIAL), unit * np.array([0, 0, 0, 2.0, 0, 0]))
     settled, undetermined = with_clearances_taken_up(conditions)
     expected = np.zeros((1, 2, 6))
     expected[0, 0, 3] = RADIAL
     assert settled.errors == pytest.approx(expected, abs=1e-18)
-    # the joint motion itself is not an undetermined clearance
+    # The joint motion is not an undetermined clearance.
     assert undetermined.tolist() == [False]
 
 
-def test_ball_clearance_rests_at_its_radius_along_the_load():
-    """The pin is rotated by 0.7 rad about x; a cylinder would rest at its corner."""
+def test_load_moves_a_ball_joint_by_its_clearance():
+    """The pin is rotated by 0.7 rad about x."""
     load = np.array([0, 0, 0, 2.0, 1.0, -2.0])
     settled, undetermined = with_clearances_taken_up(at_home(pin(ball=RADIAL), load))
     c, s = np.cos(0.7), np.sin(0.7)
@@ -55,7 +55,7 @@ def test_ball_clearance_rests_at_its_radius_along_the_load():
     assert undetermined.tolist() == [False]
 
 
-def test_clearance_without_load_is_undetermined_and_centred():
+def test_joint_without_load_is_centred_in_its_clearance():
     conditions = at_home(pin(radial=RADIAL, axial=AXIAL), [0, 0, 0, 2.0, 0, 0])
     settled, undetermined = with_clearances_taken_up(conditions)
     assert undetermined.tolist() == [True]
@@ -63,7 +63,7 @@ def test_clearance_without_load_is_undetermined_and_centred():
     assert settled.errors[0, 0, 3] == pytest.approx(RADIAL)
 
 
-def test_measured_point_is_transformed_with_the_platform():
+def test_measured_point_rotates_with_the_platform():
     """The platform axes are rotated by 0.7 rad about x."""
     point = np.array([0.1, 0.2, -0.3])
     conditions = at_home(pin(), np.zeros(6), point=point)
@@ -73,8 +73,8 @@ def test_measured_point_is_transformed_with_the_platform():
     assert conditions.measured_arms[0] == pytest.approx(np.array(expected) - [1, 0, 0])
 
 
-def test_clearance_at_rest_is_a_fraction_of_its_bounds():
-    """Tilt, spin, radial and axial bounds; the spin of a pin is not a clearance."""
+def test_rest_position_is_a_fraction_of_the_clearance():
+    """The spin of a pin is not a clearance."""
     robot = Robot("two", "tip", (
         Frame("fixed", clearance=Clearance(1e-5, 2e-5, 3e-4, 4e-4)),
         Frame("pin", "fixed", joint="revolute",

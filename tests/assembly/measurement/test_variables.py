@@ -1,4 +1,4 @@
-"""Variables of effects by public name, and the history of readings."""
+"""Values of the variables of effects."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ ROWS = 4
 
 @pytest.fixture
 def rows(rng):
-    """A revolute and a prismatic drive, under loads and with covariates."""
+    """Return conditions of two drives with loads and covariates."""
     robot = Robot("arm", "tip", (
         Frame("turn", joint="revolute", actuated=True),
         Frame("slide", "turn", [0.4, 0.1, 0.2], joint="prismatic", actuated=True),
@@ -30,9 +30,8 @@ def rows(rng):
     return here, commands, known
 
 
-def test_each_variable_name_has_the_value_of_its_measurement(rows):
-    """Positions refer to the platform; covariates have a prefix, except for three of
-    them; unspecified quantities are unknown."""
+def test_variables_have_the_values_of_the_measurements(rows):
+    """Unspecified quantities are NaN."""
     here, commands, known = rows
     expected = {"q.turn": commands[:, 0], "q.slide": commands[:, 1], "q.tip": [0.0] * 4}
     for k, name in enumerate(("mx", "my", "mz", "fx", "fy", "fz")):

@@ -1,4 +1,4 @@
-"""Linear solution of all measurements together: cone solver and reciprocity."""
+"""Linear solution of many measurements, compared with the cone solver."""
 
 from dataclasses import replace
 
@@ -21,12 +21,12 @@ STILL = np.zeros((1, 3))
 
 
 def at_home(robot):
-    """A single posture as a batch."""
+    """Return a single posture with a leading axis."""
     return together([home_posture(robot)])
 
 
 def solved(robot, load, errors=None):
-    """Conditions of a single measurement."""
+    """Solve a single measurement."""
     errors = robot.errors if errors is None else errors
     postures = at_home(robot)
     forces = loads_with_weight(postures, np.array(load, dtype=float)[None], STILL)
@@ -34,17 +34,17 @@ def solved(robot, load, errors=None):
 
 
 def farthest(found, expected):
-    """Largest difference relative to the largest rotation or translation."""
+    """Return the largest difference relative to the largest component."""
     parts = np.asarray(found).reshape(-1, 2, 3), np.asarray(expected).reshape(-1, 2, 3)
     scale = np.abs(parts[1]).max(axis=(0, 2), keepdims=True) + 1e-300
     return np.abs((parts[0] - parts[1]) / scale).max()
 
 
 def elastic_robot(seed, legs):
-    """A tight robot with elastic bodies has a unique equilibrium under any load."""
+    """Return a random robot with elastic bodies and without clearance."""
     rng = np.random.default_rng(seed)
     robot = random_robot(rng, legs, link_share=1.0)
-    # without motion limits of prismatic joints
+    # The motion limits of prismatic joints are removed.
     tight = tuple(replace(f, clearance=None) for f in robot.frames)
     return replace(robot, frames=tight), rng
 
@@ -63,18 +63,18 @@ def test_linear_solution_of_a_loaded_robot_equals_the_cone_solver(seed, legs):
 
 
 def rigid_four_bar(error):
-    """A four-bar of rigid bars with an error at the rocker end."""
+    """Return a four-bar of rigid bars with an error at the rocker end."""
     robot = planar_four_bar()
     frames = [replace(f, link=None) for f in robot.frames]
     frames[-1] = replace(frames[-1], geometric_error=error)
     return replace(robot, frames=tuple(frames))
 
 
-def test_rigid_four_bar_compensates_in_plane_errors_as_in_closed_form():
-    """The closure has rank 3 of 6, which is sufficient in the plane.
+def test_rigid_four_bar_with_in_plane_errors_equals_closed_form():
+    """The rocker is longer by a, and the crank is locked.
 
-    With the rocker longer by a and the crank locked, the coupler pin moves by h along
-    the coupler normal n, where h n . u = a along the rocker direction u.
+    The coupler pin moves by h along the coupler normal n, with h n . u = a for the
+    rocker direction u.
     """
     a = 1e-5
     robot = rigid_four_bar([0, 0, 0, 0, 0, 0])
@@ -98,7 +98,7 @@ def test_rigid_four_bar_compensates_in_plane_errors_as_in_closed_form():
 @pytest.mark.parametrize("size", [1e-4, 1e-6])
 @pytest.mark.parametrize("row", [0, 1, 5])
 def test_rigid_four_bar_with_out_of_plane_errors_is_not_solved(row, size):
-    """The measurement is passed to the solver that reports the reason."""
+    """The measurement remains unsolved."""
     robot = rigid_four_bar(size * np.eye(6)[row])
     assert not solved(robot, np.zeros(6)).solved.any()
     with pytest.raises(CannotAssemble):
@@ -116,8 +116,8 @@ def test_robot_with_clearance_is_rejected():
 
 @settings(max_examples=20, deadline=None)
 @given(seeds)
-def test_work_of_a_load_on_a_screw_is_reciprocal(seed):
-    """Betti and Maxwell: w . (platform per screw) = (wrench by w) . screw."""
+def test_responses_satisfy_betti_reciprocity(seed):
+    """By Betti's theorem, w . (platform screw) = (joint wrench due to w) . error."""
     robot, rng = elastic_robot(seed, 2)
     load = rng.normal(size=6)
     columns = rng.normal(size=(6 * len(robot.frames), 3))

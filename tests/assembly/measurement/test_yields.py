@@ -1,4 +1,4 @@
-"""Frames whose deformation depends on their wrench, compared with bisection."""
+"""Deflections by laws of wrenches, compared with bisection."""
 
 from dataclasses import replace
 
@@ -16,7 +16,7 @@ POST = Robot("post", "top", (Frame("foot"), Frame("top", "foot", [0, 0, 1.0])))
 
 
 def settled_by(law, unit=1.0):
-    """Deflection d of a location under the wrench 3 - 2 d, in a given unit."""
+    """Return the deflection d under the wrench 3 - 2 d."""
     one = Yield(
         "foot", 1, (("foot", 1),), np.zeros((1, 1)), lambda x, w: unit * law(w[:, 0])
     )
@@ -34,30 +34,30 @@ def settled_by(law, unit=1.0):
 
 @pytest.mark.parametrize("power", [1.0, 1.5, 3.0])
 @pytest.mark.parametrize("unit", [1e-9, 1e-6, 1.0, 1e3])
-def test_deformation_by_a_power_law_equals_bisection(power, unit):
-    """The equation d = (3 - 2 d)^p / 10, solved by bisection."""
+def test_deflection_by_a_power_law_equals_bisection(power, unit):
+    """The deflection d satisfies d = (3 - 2 d)^p / 10."""
     give = settled_by(lambda w: np.sign(w) * np.abs(w) ** power / 10, unit)
     expected = brentq(lambda d: d - (3.0 - 2.0 * d) ** power / 10, 0.0, 1.5, xtol=1e-15)
     assert give / unit == pytest.approx(expected, rel=1e-9)
 
 
-def test_springs_of_unbounded_deformation_are_rejected():
-    """d = w + d has no solution under a load."""
+def test_law_with_unbounded_deflection_is_rejected():
+    """The equation d = w + d has no solution."""
     one = Yield("foot", 1, (("foot", 1),), np.zeros((1, 1)), lambda x, w: w[:, 0])
     here = replace(as_declared(home_posture(POST), np.zeros(6)), yields=(one,))
     with pytest.raises(SolverFailed, match="has no finite equilibrium"):
         Yields(here).correction(np.ones((1, 1)), np.zeros((1, 1)), np.ones((1, 1, 1)))
 
 
-def test_law_without_convergence_is_rejected():
-    """The law deforms under any load until the load vanishes."""
+def test_law_without_equilibrium_is_rejected():
+    """The deflection grows until the load vanishes."""
     with pytest.raises(SolverFailed, match="do not converge in 40 steps"):
         settled_by(lambda w: np.where(w > 0, 2.0, 0.0))
 
 
 @pytest.mark.parametrize("compliance", [-1e-4, 0.0, 3e-4])
-def test_linear_compliances_become_joint_springs_and_other_laws_remain(compliance):
-    """Springs act in series with the declared one; others are not converted."""
+def test_linear_laws_become_joint_springs(compliance):
+    """The springs are in series with the joint spring of the robot."""
     K = np.diag([np.inf, 1e4] + [np.inf] * 4)
     robot = Robot("post", "top", (
         Frame("foot", joint_stiffness=K), Frame("top", "foot", [0, 0, 1.0]),
