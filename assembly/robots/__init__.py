@@ -1,7 +1,6 @@
 """Built-in robots; each module defines one robot and its parameters.
 
-Start with ``five_bar.py``, a short example.  ``placing.py`` creates frames from their
-home poses.
+Start with ``five_bar.py``.  ``placing.py`` creates frames from their home poses.
 """
 
 import os
@@ -37,11 +36,11 @@ def load_robot(name: str | Path, close: Closing | None = None) -> Robot:
 
     Args:
         name: name such as ``"irsbot2"``, or the path of a robot file.
-        close: function from :mod:`forcefit.assembly.kinematics.closing` that closes the
-            loops of the declared robot; by default they are unchanged.
+        close: function from :mod:`forcefit.assembly.kinematics.closing` that closes
+            open loops; None for no change.
 
     Returns:
-        The robot.  Meshes and libraries of its links are read only by
+        The robot.  For links with meshes or libraries, use
         :func:`forcefit.assembly.exchange.robot_files.load_robot`.
 
     Raises:

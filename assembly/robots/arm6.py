@@ -1,8 +1,8 @@
 """Six-axis serial arm: the PUMA 560.
 
-The arm has no closure and therefore no internal forces: errors and clearances add up
-along the arm.  Under a load on the flange, the drives deform, whose compliance at the
-flange is J K^-1 J^T, and the two long bodies bend.
+The arm has no closure and therefore no internal forces.  Errors and clearances add up
+along the arm.  A load on the flange deforms the drives, with the compliance J K^-1 J^T,
+and the two long bodies.
 
 Sources:
     Corke, Armstrong-Helouvry (1994), A search for consensus among model parameters
@@ -10,8 +10,8 @@ Sources:
     Denavit-Hartenberg.  Armstrong, Khatib, Burdick (1986), The explicit dynamic model
     and inertial parameters of the PUMA 560 arm, IEEE ICRA: the masses.  Corke (2011),
     Robotics, Vision and Control, chapter 7: the home angles, called the "nominal"
-        posture.
-    Drives, sections and clearances are round numbers.
+    posture.
+    Drives, sections and clearances are assumed values.
 """
 
 import math
@@ -25,7 +25,7 @@ from forcefit.assembly.model.robot import BeamLink, Clearance, Frame, Robot
 from forcefit.assembly.robots.placing import drive_stiffness
 from forcefit.stiffness.screws import rotation_matrix, rotation_vector, transform
 
-# d, a [m], alpha [rad], mass [kg], stiffness of the drive [N m/rad]
+# d, a [m], alpha [rad], mass [kg], drive stiffness [N m/rad]
 JOINTS = (
     (0.0, 0.0, math.pi / 2, 0.0, 6e4),
     (0.0, 0.4318, 0.0, 17.4, 6e4),
@@ -80,5 +80,5 @@ def arm6(parameters: Arm6Parameters | None = None) -> Robot:
 
 
 def after_joint(d: float, a: float, alpha: float) -> NDArray:
-    """Return the (4, 4) transform from one joint to the next at zero joint angle."""
+    """Return the transform from one joint to the next at zero joint angle, (4, 4)."""
     return transform([a, 0.0, d], rotation_matrix([alpha, 0.0, 0.0]))

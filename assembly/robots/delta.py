@@ -1,14 +1,14 @@
 """Clavel's Delta robot, R-(SS)2: three driven arms move the platform by pairs of rods.
 
-The rods between ball joints can spin about their own axes, so the robot has 9 degrees
-of freedom: 3 of the platform and 6 spins of the rods.  The six rods constrain the
-platform exactly, so geometric errors move it without elastic energy.
+The rods can rotate about their own axes, so the robot has 9 degrees of freedom, 3 of
+the platform and 6 of the rods.  The robot is not overconstrained, so geometric errors
+cause no elastic energy.
 
 Sources:
     Williams, The Delta parallel robot: kinematics solutions, Ohio University (2016):
     the dimensions of ABB's FlexPicker IRB 360-1/1600 and worked examples.  Sections,
-    clearances and drives are round numbers, typical of carbon fibre rods on balls.
-    Clavel (1990), US patent 4976582, for the architecture.
+    clearances and drives are assumed values.  Clavel (1990), US patent 4976582, for the
+    architecture.
 """
 
 import math
@@ -29,13 +29,13 @@ AZIMUTHS = (-math.pi / 2, math.pi / 6, 5 * math.pi / 6)  # [rad] directions of t
 class DeltaParameters:
     """Parameters of the Delta robot [m, N m/rad]; the rods are carbon fibre tubes."""
 
-    # side of the base triangle; the drives are in the middle of its sides
+    # side of the base triangle; the drives are at the midpoints of its sides
     base_side: float = 0.567
     # side of the platform triangle, with the rods at its corners
     platform_side: float = 0.076
     arm: float = 0.524
     rod: float = 1.244
-    rod_distance: float = 0.131  # distance of the two rods of a leg
+    rod_distance: float = 0.131  # distance between the two rods of a leg
     home: float = -0.9  # height of the platform
     drive: float = 2e4
     arm_link: BeamLink = BeamLink(
@@ -48,12 +48,12 @@ class DeltaParameters:
 
     @property
     def base_radius(self) -> float:
-        """[m] distance from the centre to the drives."""
+        """Distance from the centre to the drives [m]."""
         return self.base_side * math.sqrt(3) / 6
 
     @property
     def platform_radius(self) -> float:
-        """[m] distance from the platform's centre to the middle of a pair of rods."""
+        """Distance from the platform centre to the middle of a pair of rods [m]."""
         return self.platform_side * math.sqrt(3) / 3
 
 
@@ -85,7 +85,7 @@ def delta(parameters: DeltaParameters | None = None) -> Robot:
 def drive_angle(
     parameters: DeltaParameters, azimuth: float, position: NDArray
 ) -> float:
-    """Return the angle of one arm below the base plane, elbow outward.
+    """Return the angle of one arm below the base plane, with the elbow outward.
 
     Args:
         parameters: parameters of the robot.
@@ -100,7 +100,7 @@ def drive_angle(
     """
     P = parameters
     out, across = _radial(azimuth)
-    # vector in the plane of the leg, from the drive to the platform end of the rods
+    # vector in the leg plane from the drive to the platform end of the rods
     x = position @ out + P.platform_radius - P.base_radius
     z = -position[2]
     reach = math.hypot(x, z)
@@ -115,7 +115,7 @@ def drive_angle(
 
 
 def _radial(azimuth: float) -> tuple[NDArray, NDArray]:
-    """Return the unit vectors outward and tangential, in the plane of the base."""
+    """Return the radial and tangential unit vectors in the base plane."""
     c, s = math.cos(azimuth), math.sin(azimuth)
     return np.array([c, s, 0.0]), np.array([-s, c, 0.0])
 
@@ -123,7 +123,7 @@ def _radial(azimuth: float) -> tuple[NDArray, NDArray]:
 def _leg(
     name: str, azimuth: float, angle: float, P: DeltaParameters
 ) -> list[PlacedFrame]:
-    """Return a driven arm and its two rods."""
+    """Return the frames of a driven arm and its two rods."""
     out, across = _radial(azimuth)
     foot = P.base_radius * out
     arm = math.cos(angle) * out - math.sin(angle) * np.array([0.0, 0.0, 1.0])
@@ -152,7 +152,7 @@ def _rod(
     across: NDArray,
     P: DeltaParameters,
 ) -> list[PlacedFrame]:
-    """Return a rod between ball joints, which can spin about its own axis."""
+    """Return the frames of a rod between two ball joints."""
     along = (far - near) / np.linalg.norm(far - near)
     third = np.cross(along, across)
     high = ball_joint(f"{name}_high", parent, near, across, third, P.ball)

@@ -1,9 +1,9 @@
-"""Planar five-bar robot, 5R: two driven arms, and two arms joined by a pin.
+"""Planar five-bar robot, 5R, with two driven arms and two distal arms.
 
 Sources:
     Campos, Bourbonnais, Bonev, Bigras (2010), Development of a five-bar parallel robot
-    with large workspace, ASME IDETC: size of DexTAR, whose four arms are also of equal
-        length.  Dimensions are rounded; sections and clearances are typical values.
+    with large workspace, ASME IDETC: size of DexTAR, whose four arms have equal length.
+    Dimensions are rounded.  Sections and clearances are assumed values.
 """
 
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ from forcefit.assembly.robots.planar import PlanarLeg, arm_angle, in_plane, two_
 class FiveBarParameters:
     """Parameters of the robot [m]; aluminium arms and small ball bearings."""
 
-    base: float = 0.120  # distance between the drives, which are on the x axis
+    base: float = 0.120  # distance between the drives on the x axis
     home: tuple[float, float] = (0.0, 0.140)
     leg: PlanarLeg = PlanarLeg(
         near=0.090,
@@ -32,7 +32,7 @@ class FiveBarParameters:
 
 
 def five_bar(parameters: FiveBarParameters | None = None) -> Robot:
-    """Return the robot at its home pose, both elbows outward.
+    """Return the robot in its home pose, with both elbows outward.
 
     Args:
         parameters: parameters of the robot; by default those of
@@ -40,8 +40,8 @@ def five_bar(parameters: FiveBarParameters | None = None) -> Robot:
 
     Returns:
         The robot with 9 frames and 1 closure.  The platform ``left.tip`` is on the
-        second arm of the right leg, beyond the pin.  The coordinate of a drive is the
-        angle between its arm and the x axis.
+        right distal arm.  The coordinate of a drive is the angle between its arm and
+        the x axis.
 
     Raises:
         BadInput: the home pose is out of reach.

@@ -2,17 +2,17 @@
 
 In units of the crank length, ground link, coupler and rocker have the lengths 2, 2.5
 and 2.5.  The tracing point extends beyond the coupler pin by the length of the coupler.
-Crank pin, rocker foot and tracing point lie on a circle about the coupler pin (Thales),
-so the lines from the foot to the other two points are perpendicular, and
+Crank pin, rocker foot and tracing point are on a circle about the coupler pin.  The
+lines from the foot to the other two points are therefore perpendicular (Thales), and
 
     P = [2, 0] + 2 sqrt((5 + cos t) / (5 - 4 cos t)) [sin t, 2 - cos t],
 
-where t is the angle between crank and ground link.  The point is exactly at height 4
-for t = 90, 180 and 270 degrees.
+where t is the angle between crank and ground link.  The height of the point is exactly
+4 for t = 90, 180 and 270 degrees.
 
 Sources:
     Norton, Design of Machinery, chapter 3, Hoeken's linkage: the proportions.  Size,
-    sections and clearances are rounded values typical of a bench-top machine.
+    sections and clearances are assumed values.
 """
 
 import math
@@ -84,7 +84,8 @@ def corners(angle: float) -> tuple[NDArray, ...]:
     """
     foot, tip = np.array([2.0, 0.0]), direction(angle)
     to_pin = tip - foot
-    # Thales' theorem: perpendicular to that line, at a distance of 5 from the crank pin
+    # By Thales' theorem, the line from the foot to the point is perpendicular to this
+    # line, and the point has a distance of 5 from the crank pin.
     across = np.array([to_pin[1], -to_pin[0]]) / np.linalg.norm(to_pin)
     point = foot + np.sqrt(25.0 - to_pin @ to_pin) * across
     return foot, tip, (tip + point) / 2, point

@@ -1,14 +1,13 @@
-"""Gough-Stewart platform, 6-UPS: six driven struts between cardan and ball joints.
+"""Gough-Stewart platform, 6-UPS, with six driven struts.
 
-A strut between a cardan and a ball joint transmits only an axial force.  The platform
-stiffness is therefore the sum over struts of k w w^T, where w is the unit wrench along
-the strut.  Six struts constrain the platform exactly, so geometric errors move it
-without elastic energy.
+A strut between a cardan joint and a ball joint transmits only an axial force.  The
+platform stiffness is therefore the sum of k w w^T over the struts, where w is the unit
+wrench along a strut.  The robot is not overconstrained, so geometric errors cause no
+elastic energy.
 
 Sources:
-    Merlet, Parallel Robots (2nd edition, 2006), the prototype called left hand: the
-    joint centres, in two planes.  Working height, sections, clearances and drives are
-    rounded values typical of struts of this size.
+    Merlet, Parallel Robots (2nd edition, 2006), prototype "left hand": the joint
+    centres.  Working height, sections, clearances and drives are assumed values.
 """
 
 from dataclasses import dataclass
@@ -71,7 +70,7 @@ def hexapod(parameters: HexapodParameters | None = None) -> Robot:
 
 
 def points() -> tuple[NDArray, NDArray]:
-    """Return the (6, 3) [m] joint centres in base axes and in platform axes."""
+    """Return the joint centres in base axes and in platform axes, (6, 3) [m] each."""
     flat = np.zeros((6, 1))
     return np.hstack([BASE_POINTS, flat]), np.hstack([PLATFORM_POINTS, flat])
 

@@ -3,12 +3,11 @@
 The two legs extend along the x axis; leg 2 is leg 1 rotated by pi about z0.  In each
 leg, a parallelogram (proximal module) carries an elbow body of constant orientation.
 Two parallel links between universal joints (distal module) carry the platform.  The
-paper defines the axes of the universal joints in figures that are not public.  The axes
-used here reproduce the mobility stated in the paper throughout the workspace, unlike
-all other axes that were tested.
+axes of the universal joints are not public.  The axes used here reproduce the mobility
+in the paper throughout the workspace.
 
-The index of a frame in the paper is its position in :data:`NAMES`, counted from 1.  As
-in the paper, errors act at the frames :data:`ERROR_FRAMES`.
+The index of a frame in the paper is its position in :data:`NAMES`, counted from 1.
+Errors act at the frames :data:`ERROR_FRAMES`.
 
 ======  ===========================================================================
 symbol  meaning [m, rad]
@@ -109,7 +108,7 @@ def irsbot2(
         placed = _leg(parameters, sign * x, z)
         if sign < 0:
             placed = {name: turned @ T for name, T in placed.items()}
-            # rotated so that the tips of both legs are parallel to the base
+            # The tips of both legs are parallel to the base.
             placed["tip"] = placed["tip"] @ turned
         frames += _frames(leg, placed, parameters)
     loops = [
@@ -123,11 +122,11 @@ def irsbot2(
 
 
 def drive_angle(parameters: IRSBot2Parameters, x: float, z: float) -> float:
-    """Return the angle between the moving sides of leg 1 and the x axis, elbow outward.
+    """Return the angle between the moving sides of leg 1 and the x axis.
 
     Args:
         parameters: parameters of the robot.
-        x: [m] platform position; the negative position for leg 2.
+        x: [m] platform position; its negative for leg 2.
         z: [m] platform position.
 
     Returns:
@@ -155,14 +154,15 @@ def _planar_length(P: IRSBot2Parameters) -> float:
 
 
 def _leg(P: IRSBot2Parameters, x: float, z: float) -> dict[str, NDArray]:
-    """Return the frames of leg 1 seen from the base at a platform position."""
+    """Return the frames of leg 1 in base axes at a platform position."""
     q = drive_angle(P, x, z)
     arm = np.array([math.cos(q), 0.0, math.sin(q)])
     side = P.d * np.array([math.cos(P.alpha), 0.0, math.sin(P.alpha)])
     A = np.array([P.b, 0.0, 0.0])
     C = A + P.L1 * arm
     platform = np.array([x, 0.0, z])
-    # revolute axes perpendicular to the x-z plane; x axes along the moving side
+    # Revolute axes are perpendicular to the x-z plane, and x axes along the moving
+    # side.
     swing = _axes(arm, np.array([0.0, -1.0, 0.0]))
     placed = {
         "drive": transform(A, swing), "elbow": transform(C, swing),
@@ -187,7 +187,8 @@ def _link(
     along = (far - near) / np.linalg.norm(far - near)
     level, rise = math.cos(P.alpha_d), math.sin(P.alpha_d)
     fixed = np.array([level * math.cos(P.beta), y * level * math.sin(P.beta), -rise])
-    own = y * np.cross(fixed, along)  # link B is the mirror image of link A in y = 0
+    # link B is the reflection of link A in the plane y = 0
+    own = y * np.cross(fixed, along)
     own /= np.linalg.norm(own)
     up = np.array([0.0, 0.0, 1.0])
     end = "platform_a" if which == "a" else "link_b_tip"
@@ -202,7 +203,7 @@ def _link(
 
 
 def _axes(x: NDArray, z: NDArray) -> NDArray:
-    """Return the rotation matrix with given x axis (normalised) and z axis."""
+    """Return the rotation matrix with given x and z axes."""
     x = x / np.linalg.norm(x)
     return np.column_stack([x, np.cross(z, x), z])
 

@@ -1,23 +1,22 @@
 """Orthoglide: translational robot with three perpendicular linear drives.
 
 Each PRPaR leg consists of a slide, a hinge, a parallelogram and a second hinge parallel
-to the first.  It prevents rotation of the platform about two axes, so the three legs
-impose six constraints where three suffice.  Each planar parallelogram adds three
+to the first.  A leg prevents rotation of the platform about two axes, so three of the
+six constraints of the three legs are redundant.  Each planar parallelogram adds three
 redundant constraints.  The degree of overconstraint is therefore twelve, and errors
 cause internal forces.
 
-With the coordinates r of the slides and the position p of the platform, a leg of length
-L imposes (p_x - r_x)^2 + p_y^2 + p_z^2 = L^2, and so on.  At home, where p = 0 and r =
--L, the Jacobian is the identity: the platform moves like its slides.
+With the slide coordinates r, the platform position p and the leg length L, the leg
+along x imposes (p_x - r_x)^2 + p_y^2 + p_z^2 = L^2.  At home, where p = 0 and r = -L,
+the Jacobian is the identity matrix.
 
 Sources:
     Chablat, Wenger (2003), Architecture optimization of a 3-DOF translational parallel
     mechanism for machining applications, the Orthoglide, IEEE Trans. Robotics and
     Automation 19: the architecture and its isotropic point.  Pashkevich, Chablat,
     Wenger (2009), Stiffness analysis of overconstrained parallel manipulators,
-    Mechanism and Machine Theory 44: which parts deform.  Dimensions are rounded and
-        similar to those of the prototype; sections, clearances and drives are typical
-        values.
+    Mechanism and Machine Theory 44: elastic bodies and joints.  Dimensions are similar
+    to those of the prototype.  Sections, clearances and drives are assumed values.
 """
 
 from dataclasses import dataclass
@@ -54,7 +53,7 @@ def orthoglide(parameters: OrthoglideParameters | None = None) -> Robot:
 
     Returns:
         The robot with 30 frames and 5 closures; platform ``x.tip``.  The coordinate of
-        ``x.slide`` is r_x, see the module docstring.
+        ``x.slide`` is r_x.
     """
     P = parameters or OrthoglideParameters()
     axes = np.eye(3)
@@ -72,7 +71,7 @@ def orthoglide(parameters: OrthoglideParameters | None = None) -> Robot:
 def _leg(
     name: str, along: NDArray, hinge: NDArray, P: OrthoglideParameters
 ) -> list[PlacedFrame]:
-    """Return a leg along one axis of the base, with hinges along another."""
+    """Return the frames of a leg along one base axis, with hinges along another."""
     near, far = -(P.leg + P.platform) * along, -P.platform * along
     slide = Frame(
         f"{name}.slide", joint="prismatic", actuated=True, position=-P.leg,

@@ -1,9 +1,8 @@
 """Create the frames of built-in robots from their home poses in base axes.
 
-Robot data are easiest to check in base axes, but a tree of frames requires the pose of
-each frame relative to its parent, after the parent's joint.  Joints with
-several degrees of freedom are modelled as coincident revolute joints: two for a cardan
-joint, three for a ball joint.
+A tree of frames requires the pose of each frame relative to its parent.  Joints with
+several degrees of freedom are modelled as coincident revolute joints, two for a cardan
+joint and three for a ball joint.
 """
 
 import numpy as np
@@ -37,7 +36,7 @@ def at(
 def pin(
     name: str, parent: str, clearance: Clearance | None = None, link: Link | None = None
 ) -> Frame:
-    """Return a passive revolute joint together with the body that leads to it."""
+    """Return a passive revolute joint with its body."""
     return Frame(name, parent, joint="revolute", clearance=clearance, link=link)
 
 
@@ -45,7 +44,7 @@ def cardan_joint(
     name: str, parent: str, origin: NDArray, first: NDArray, second: NDArray,
     clearance: Clearance | None = None,
 ) -> list[PlacedFrame]:  # fmt: skip
-    """Return a cardan joint, modelled as two perpendicular revolute joints at a point.
+    """Return a cardan joint, modelled as two perpendicular revolute joints.
 
     Args:
         name: name of the joint; its frames are ``name_1`` and ``name_2``.
@@ -53,7 +52,7 @@ def cardan_joint(
         origin: (3,) [m] centre of the joint.
         first: (3,) axis fixed to the parent.
         second: (3,) axis fixed to the child, perpendicular to the first.
-        clearance: clearance of the whole joint, assigned to its second frame.
+        clearance: clearance of the joint, assigned to its second frame.
 
     Returns:
         The two frames.
@@ -71,8 +70,8 @@ def ball_joint(
 ) -> list[PlacedFrame]:  # fmt: skip
     """Return a ball joint, modelled as three revolute joints at one point.
 
-    The axes are perpendicular at home.  The joint is singular if the second revolute
-    joint is rotated by a right angle.
+    The axes are perpendicular at home.  The joint is singular at a right angle of the
+    second revolute joint.
 
     Args:
         name: name of the joint; its frames are ``name_1`` to ``name_3``.
@@ -80,7 +79,7 @@ def ball_joint(
         origin: (3,) [m] centre of the joint.
         first: (3,) axis fixed to the parent.
         second: (3,) middle axis; the third is perpendicular to both.
-        clearance: clearance of the whole joint, assigned to its last frame.
+        clearance: clearance of the joint, assigned to its last frame.
         link: elasticity of the body between the parent and this joint.
 
     Returns:
@@ -96,7 +95,7 @@ def ball_joint(
 
 
 def drive_stiffness(stiffness: float, joint: str = "revolute") -> NDArray:
-    """Return the joint stiffness of a drive that is elastic only along its motion.
+    """Return the joint stiffness of a drive that is elastic along its motion.
 
     Args:
         stiffness: [N m/rad or N/m] stiffness of the drive.

@@ -1,4 +1,4 @@
-"""Legs of planar robots in z = 0: a driven arm, an elbow and a second arm."""
+"""Legs of planar robots, each with a driven arm, an elbow and a second arm."""
 
 import math
 from dataclasses import dataclass
@@ -32,13 +32,13 @@ class PlanarLeg:
 
 
 def in_plane(point: ArrayLike, angle: float = 0.0) -> NDArray:
-    """Return the (4, 4) frame at (x, y) [m], rotated about z by an angle [rad]."""
+    """Return the transform at (x, y) [m], rotated about z by an angle [rad], (4, 4)."""
     x, y = np.asarray(point, dtype=float)
     return at([x, y, 0.0], x=[math.cos(angle), math.sin(angle), 0.0])
 
 
 def direction(angle: float) -> NDArray:
-    """Return the (2,) unit vector at an angle [rad] to the x axis."""
+    """Return the unit vector at an angle [rad] to the x axis, (2,)."""
     return np.array([math.cos(angle), math.sin(angle)])
 
 
@@ -53,7 +53,7 @@ def arm_angle(
         tip: (2,) [m] end of the second arm.
         near: [m] length of the first arm.
         far: [m] length of the second arm.
-        side: 1 for the elbow left of the line from foot to tip, -1 for right.
+        side: 1 if the elbow is to the left of the line from foot to tip, otherwise -1.
 
     Returns:
         [rad] angle to the x axis.

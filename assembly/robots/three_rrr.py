@@ -1,11 +1,10 @@
-"""Planar 3-RRR robot: three legs of two arms each and a triangular platform.
+"""Planar 3-RRR robot with three legs of two arms and a triangular platform.
 
 Sources:
     Gosselin, Angeles (1988), The optimum kinematic design of a planar
     three-degree-of-freedom parallel manipulator, J. Mechanisms, Transmissions and
-    Automation in Design 110: the architecture and its inverse kinematics, three
-    independent legs of two arms.  Dimensions are rounded and similar to those of
-    laboratory machines; sections and clearances are typical values.
+    Automation in Design 110: the architecture and its inverse kinematics.  Dimensions,
+    sections and clearances are assumed values.
 """
 
 import math
@@ -42,11 +41,11 @@ class ThreeRRRParameters:
     )
 
     def feet(self) -> NDArray:
-        """Return the (3, 2) [m] positions of the drives, which lie on a circle."""
+        """Return the positions of the drives on a circle, (3, 2) [m]."""
         return self.base_radius * _triangle()
 
     def corners(self) -> NDArray:
-        """Return the (3, 2) [m] positions of the platform pins, in platform axes."""
+        """Return the positions of the platform pins in platform axes, (3, 2) [m]."""
         return self.platform_radius * _triangle()
 
 
@@ -84,5 +83,5 @@ def three_rrr(parameters: ThreeRRRParameters | None = None) -> Robot:
 
 
 def _triangle() -> NDArray:
-    """Return (3, 2) corners of an equilateral triangle in the unit circle."""
+    """Return the corners of an equilateral triangle in the unit circle, (3, 2)."""
     return np.array([direction(math.pi * (1 / 2 + 2 * k / 3)) for k in range(3)])

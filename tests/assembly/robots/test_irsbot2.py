@@ -1,4 +1,4 @@
-"""The paper's robot compared with the reference reconstruction."""
+"""IRSBot-2, compared with a reference reconstruction."""
 
 import numpy as np
 import pytest
@@ -34,7 +34,7 @@ def robot():
 
 @pytest.mark.parametrize("point", POINTS, ids=lambda p: f"{p['x']}-{p['z']}")
 def test_frame_poses_equal_the_reference(robot, point):
-    """The home pose differs, so this also checks that the parallelograms close."""
+    """The reference has a different home pose."""
     posture = place_robot(robot, pose={"tx": point["x"], "tz": point["z"]})
     T = {f.name: posture.transforms[i] for i, f in enumerate(robot.frames)}
     link, elbow = T["leg1.link_a"], T["leg1.elbow_a"]
@@ -50,11 +50,11 @@ def test_frame_poses_equal_the_reference(robot, point):
     assert np.abs(column - point["M_1_8_column_RZ"]).max() < 1e-12
     turned = posture.coordinates[robot.index("leg1.drive")]
     home = drive_angle(IRSBot2Parameters(), 0.0, -0.5)
-    # the drive's z axis points along -y, so that its angle is the paper's q
+    # The z axis of the drive points along -y, so its angle is q of the paper.
     assert turned + home == pytest.approx(point["q_leg1"], abs=1e-12)
 
 
-def test_irsbot2_has_two_degrees_of_freedom_and_an_overconstraint_of_eight(robot):
+def test_mobility_and_overconstraint_of_irsbot2_equal_the_paper(robot):
     for x, z in [(0, -0.5), (0.4, -0.45), (-0.3, -0.2), (0.0, -0.7)]:
         found = mobility(place_robot(robot, pose={"tx": x, "tz": z}))
         assert (found.freedoms, found.locked_freedoms) == (2, 0)
@@ -62,8 +62,8 @@ def test_irsbot2_has_two_degrees_of_freedom_and_an_overconstraint_of_eight(robot
 
 
 @pytest.mark.parametrize(("case", "point"), CASES)
-def test_energy_pose_and_wrenches_equal_the_reference(case, point):
-    """The reference has a gap of about 1e-9 J, and the certificate is below that."""
+def test_energy_pose_and_wrenches_agree_with_the_reference(case, point):
+    """The gap of the reference is about 1e-9 J."""
     robot = irsbot2_with(case)
     answer = solve_assembly(
         place_robot(robot, pose={"tx": point["x"], "tz": point["z"]})
@@ -72,10 +72,10 @@ def test_energy_pose_and_wrenches_equal_the_reference(case, point):
     assert answer.closure_residual() < 1e-13
     assert answer.clearance_excess() < 1e-12
     assert answer.energy == pytest.approx(point["energy"], rel=1e-9, abs=1e-11)
-    # a gap of 1e-11 J shifts the minimiser by the square root, 1e-5 relative
+    # A duality gap of 1e-11 J corresponds to a relative error of 1e-5 of the screw.
     scale = np.abs(np.reshape(point["x_opt"], (2, 3))).max(axis=1).repeat(3)
     assert np.abs((answer.platform_screw - point["x_opt"]) / scale).max() < 1e-5
-    # a link that stores all of the energy would deform by sqrt(2 E C_ii)
+    # The scale is sqrt(2 E C_ii), the deformation if one link contains all energy.
     size = np.sqrt(2 * answer.energy * np.diag(np.linalg.inv(NUMBERS["K_E"])))
     link = answer.link_screws[robot.index("leg1.link_a")]
     assert np.abs((link - point["e_leg1_frame8"]) / size).max() < 1e-5
@@ -91,19 +91,19 @@ def test_energy_pose_and_wrenches_equal_the_reference(case, point):
 
 
 @pytest.mark.parametrize(("case", "point"), CASES)
-def test_zone_margin_equals_the_reference_for_rigid_and_free_joints(case, point):
+def test_zone_margin_agrees_with_the_reference(case, point):
     posture = place_robot(irsbot2_with(case), pose={"tx": point["x"], "tz": point["z"]})
     for compliant in ("rigid", "free"):
         zone = zone_margin(posture, compliant)
         expected = point[f"t_compliant_{compliant}"]
-        # most gaps are 1e-10; a few points in a thousand stop between 1e-9 and 1e-8
+        # Most relative gaps are 1e-10, some are between 1e-9 and 1e-8.
         assert zone.bound == pytest.approx(zone.margin, rel=1e-8)
         assert zone.bound * (1 - 1e-9) <= expected <= zone.margin * (1 + 1e-9)
         assert zone.assemblable == (expected <= 1)
 
 
-def test_equation_23_as_printed_counts_the_wrench_twice():
-    """The paper adds w_E and w_B, each of which equals the wrench."""
+def test_equation_23_as_printed_doubles_the_wrench():
+    """Eq. (23) adds w_E and w_B, each of which equals the wrench."""
     point = NUMBERS["cases"][0]["points"][0]
     answer = solve_assembly(
         place_robot(irsbot2_with(NUMBERS["cases"][0]), pose={"tx": 0, "tz": -0.5})
@@ -115,8 +115,8 @@ def test_equation_23_as_printed_counts_the_wrench_twice():
         assert np.allclose(point["seed_eq23_wrench"][leg], 2 * true, rtol=1e-8)
 
 
-def test_euler_and_timoshenko_links_store_the_same_energy():
-    """The distal links carry no shear, and the reference differs by 2e-11."""
+def test_energies_with_euler_and_timoshenko_links_are_equal():
+    """The distal links transmit no shear force."""
     case = NUMBERS["cases"][0]
     energies = []
     for theory in ("euler", "timoshenko"):
@@ -130,18 +130,18 @@ def test_euler_and_timoshenko_links_store_the_same_energy():
     assert energies[1] == pytest.approx(point["energy_timoshenko"], rel=1e-10)
 
 
-def test_errors_drawn_with_seed_1_equal_the_reference_errors(robot):
+def test_random_errors_with_seed_1_equal_the_reference(robot):
     frames = frames_named(robot, ERROR_FRAMES)
     draw = ErrorDraw(frames, ERROR_LEAST, ERROR_MOST, seed=1)
     expected = irsbot2_with(NUMBERS["cases"][0]).errors
     assert np.abs(draw_errors(robot, draw) - expected).max() == 0.0
     signed = draw_errors(robot, ErrorDraw(frames, ERROR_LEAST, ERROR_MOST, 1, "signed"))
     assert np.array_equal(np.abs(signed), expected)
-    assert 20 < np.sum(signed < 0) < 52  # of 72, all but surely
+    assert 20 < np.sum(signed < 0) < 52  # of 72 random signs
 
 
-def test_grid_points_are_reached_exactly_within_the_reach_of_the_links(robot):
-    """One row of the 1113 points of the half workspace, by the reach formula."""
+def test_reached_grid_points_agree_with_the_reach_of_the_links(robot):
+    """The points are one row of the half workspace."""
     x = np.arange(-0.7, 0.7001, 0.05)
     poses = np.full((len(x), 6), np.nan)
     poses[:, 0], poses[:, 2] = x, -0.4
@@ -153,6 +153,6 @@ def test_grid_points_are_reached_exactly_within_the_reach_of_the_links(robot):
         assert bool(reason) != within
 
 
-def test_home_pose_out_of_reach_is_rejected_with_the_reach():
+def test_home_pose_out_of_reach_is_rejected():
     with pytest.raises(BadInput, match=r"requires a reach of 0.9\d* m, the links"):
         irsbot2(z=-0.9)

@@ -1,7 +1,7 @@
-"""The paper's study on a 25 mm grid of the half workspace, against the reference.
+"""Study of the paper on a 25 mm grid of the half workspace.
 
-The table gives least, median and largest values to two or three digits; a digit more
-would be the reference's rounding, so the tolerance is one unit of its last digit.
+The reference gives smallest, median and largest values to two or three digits.  The
+tolerance is one unit of the last digit.
 """
 
 import numpy as np
@@ -16,7 +16,7 @@ from forcefit.assembly.sweeps.targets import parse_grid
 from tests.robots_for_tests import NUMBERS, irsbot2_with
 
 GRID = "tx=-0.8:0.8:0.025,tz=-0.8:0:0.025"
-TABLE = {  # margin free, share assemblable [%], margin rigid, energy [J]
+TABLE = {  # free margin, fraction assemblable [%], rigid margin, energy [J]
     "literal": (
         [(0.060, 1e-3), (2.76, 1e-2), (5.37, 1e-2)], 15.9,
         [(13.2, 0.1), (18.8, 0.1), (22.8, 0.1)],
@@ -48,9 +48,9 @@ def assert_as_printed(values, printed):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("case", NUMBERS["cases"], ids=lambda c: c["name"])
-def test_maps_have_the_smallest_median_and_largest_values_of_the_reference(case):
+def test_maps_agree_with_the_reference(case):
     data = sweep_poses(irsbot2_with(case), parse_grid(GRID))
-    # the paper also counts points reached through singularities
+    # The paper also includes points beyond singularities.
     reached = np.isin(data.status.values, ["ok", "beyond_singularity"])
     assert reached.sum() == 1113
     free, share, rigid, energy = TABLE[case["name"]]
@@ -59,7 +59,7 @@ def test_maps_have_the_smallest_median_and_largest_values_of_the_reference(case)
     assert_as_printed(data.energy.values, energy)
     inside = 100 * assemblable(data).sum() / reached.sum()
     assert inside == pytest.approx(share, abs=0.1)
-    # every point is certified
+    # All points are certified.
     floor = 1e-8 * data.energy.values[reached]
     assert np.all(data.duality_gap.values[reached] <= floor + 1e-10)
     assert data.closure_residual.max() < 1e-11
@@ -68,7 +68,7 @@ def test_maps_have_the_smallest_median_and_largest_values_of_the_reference(case)
 
 @pytest.mark.slow
 @pytest.mark.parametrize("case", NUMBERS["cases"], ids=lambda c: c["name"])
-def test_pose_errors_have_the_smallest_median_and_largest_values_of_the_reference(case):
+def test_pose_errors_agree_with_the_reference(case):
     x, z = np.meshgrid(*parse_grid(GRID).values(), indexing="ij")
     poses = np.full((x.size, 6), np.nan)
     poses[:, 0], poses[:, 2] = x.ravel(), z.ravel()
@@ -87,8 +87,8 @@ def test_pose_errors_have_the_smallest_median_and_largest_values_of_the_referenc
 
 
 @pytest.mark.slow
-def test_pose_errors_by_clearances_alone_are_within_the_reference_range():
-    """A 100 mm grid in x > 0, by symmetry, within the extremes of the table."""
+def test_pose_errors_due_to_clearances_are_within_reference_range():
+    """The grid has a spacing of 100 mm."""
     x, z = np.meshgrid(np.arange(0, 0.61, 0.1), np.arange(-0.7, -0.05, 0.1))
     poses = np.full((x.size, 6), np.nan)
     poses[:, 0], poses[:, 2] = x.ravel(), z.ravel()

@@ -1,4 +1,4 @@
-"""Planar robots, each compared with a published or closed-form result."""
+"""Planar robots, compared with published or closed-form results."""
 
 import math
 from dataclasses import replace
@@ -23,15 +23,15 @@ from tests.built_in_robots_for_tests import (
 )
 
 
-def test_hoekens_crank_rotates_fully_and_its_point_follows_the_closed_form():
-    """Grashof's criterion: 1 + 2.5 < 2 + 2.5, and the crank is the shortest link."""
+def test_point_of_hoekens_linkage_equals_the_closed_form():
+    """The crank rotates fully by Grashof's criterion, 1 + 2.5 < 2 + 2.5."""
     robot = BUILT_IN["four_bar"]()
     foot = np.array([0.2, 0.0])
     for angle in np.linspace(0.0, 2 * math.pi, 13):
         posture = place_robot(robot, joints={"crank": angle})
         pin = 0.1 * np.array([math.cos(angle), math.sin(angle)])
         ground = foot - pin
-        # between the line to the foot and the coupler, in the triangle of 2.5 and 2.5
+        # angle between the coupler and the line to the foot, by the law of cosines
         reach = np.hypot(*ground)
         beside = math.acos((reach**2 + 0.25**2 - 0.25**2) / (2 * reach * 0.25))
         coupler = math.atan2(ground[1], ground[0]) + beside
@@ -42,8 +42,8 @@ def test_hoekens_crank_rotates_fully_and_its_point_follows_the_closed_form():
 
 
 @pytest.mark.parametrize(("degrees", "x"), [(90, 0.4), (180, 0.2), (270, 0.0)])
-def test_hoekens_point_is_on_its_line_at_the_known_crank_angles(degrees, x):
-    """The point is four crank lengths from the ground link, by Thales' theorem."""
+def test_point_of_hoekens_linkage_is_on_the_line_at_known_angles(degrees, x):
+    """The distance from the ground link is four crank lengths."""
     robot = BUILT_IN["four_bar"]()
     posture = place_robot(robot, joints={"crank": math.radians(degrees)})
     assert posture.platform[:2, 3] == pytest.approx([x, 0.4], abs=1e-12)
@@ -67,15 +67,15 @@ def test_five_bar_tip_is_the_intersection_of_two_circles(rng):
 
 
 def half_angle_solutions(foot, tip, near, far):
-    """Drive angles from the half-angle tangent (Gosselin, Angeles 1988)."""
+    """Return drive angles by the half-angle tangent (Gosselin, Angeles 1988)."""
     x, y = tip - foot
-    # x^2 + y^2 + near^2 - far^2 = 2 near (x cos q + y sin q)
+    # The equation is x^2 + y^2 + near^2 - far^2 = 2 near (x cos q + y sin q).
     e = (x * x + y * y + near**2 - far**2) / (2 * near)
     root = math.sqrt(x * x + y * y - e * e)
     return [2 * math.atan2(y + s * root, x + e) for s in (1, -1)]
 
 
-def test_drive_angles_of_the_3rrr_robot_equal_those_of_gosselin_and_angeles(rng):
+def test_drive_angles_of_3rrr_equal_published_formula(rng):
     robot = BUILT_IN["3rrr"]()
     angles = np.radians([90, 210, 330])
     corners = np.column_stack([np.cos(angles), np.sin(angles)])
@@ -92,7 +92,7 @@ def test_drive_angles_of_the_3rrr_robot_equal_those_of_gosselin_and_angeles(rng)
 
 
 def only_radial(robot):
-    """The robot with radial clearance only, so that all motions are planar."""
+    """Return the robot with radial clearance only."""
     bare = (
         replace(f, clearance=f.clearance and Clearance(radial=f.clearance.radial))
         for f in robot.frames
@@ -100,8 +100,8 @@ def only_radial(robot):
     return replace(robot, frames=tuple(bare))
 
 
-def test_pose_error_of_the_3rrr_robot_is_the_farthest_corner_of_a_prism(rng):
-    """Closed form of (27): three lines with a clearance of 2c each, hence 8 corners."""
+def test_pose_error_of_3rrr_equals_the_farthest_prism_corner(rng):
+    """The reachable set of (27) is a prism, because each leg has a clearance of 2c."""
     robot = only_radial(BUILT_IN["3rrr"]())
     posture = place_robot(robot, pose=random_pose("3rrr", rng))
     play = robot.frame("leg1.pin").clearance.radial
@@ -120,7 +120,7 @@ def test_pose_error_of_the_3rrr_robot_is_the_farthest_corner_of_a_prism(rng):
 
 
 def arm_lines(posture):
-    """(3, 3) unit wrenches [MZ FX FY] of the second arms, at the platform's origin."""
+    """Return the unit wrenches [MZ FX FY] of the second arms, (3, 3)."""
     T, index = posture.transforms, posture.robot.index
     lines = []
     for leg in ("leg1", "leg2", "leg3"):
@@ -131,11 +131,10 @@ def arm_lines(posture):
     return np.array(lines)
 
 
-def test_displacement_of_the_3rrr_robot_under_load_equals_its_pin_clearances(rng):
-    """Support function of the reachable errors: w.x <= sum of |f| 2c over the legs.
+def test_displacement_of_loaded_3rrr_equals_pin_clearances(rng):
+    """The largest work w.x of the load is the sum of |f| 2c over the legs.
 
     The second arm of a leg transmits an axial force f, and its two pins move by c each.
-    The wrench on the platform is the sum of the arm forces, f = J^-T w.
     """
     posture = place_robot(only_play(BUILT_IN["3rrr"]()), pose=random_pose("3rrr", rng))
     play = posture.robot.frame("leg1.pin").clearance.radial
@@ -148,6 +147,6 @@ def test_displacement_of_the_3rrr_robot_under_load_equals_its_pin_clearances(rng
         assert answer.energy == 0.0
 
 
-def test_planar_legs_out_of_reach_are_rejected_with_the_reach():
+def test_planar_legs_out_of_reach_are_rejected():
     with pytest.raises(BadInput, match=r"5r: the home pose requires a reach of 3 m"):
         arm_angle("5r", [0, 0], [3, 0], 1.0, 1.0, 1)

@@ -1,4 +1,4 @@
-"""Properties that hold for all built-in robots."""
+"""Properties of all built-in robots."""
 
 from dataclasses import replace
 
@@ -29,13 +29,13 @@ from tests.built_in_robots_for_tests import (
 
 # published degrees of freedom with free and with locked drives, and overconstraint
 COUNTS = {
-    "irsbot2": (2, 0, 8),  # two loops of a parallelogram, 3 each, and 2 legs
+    "irsbot2": (2, 0, 8),  # 3 for each of two parallelograms, 2 for the legs
     "four_bar": (1, 0, 3),  # one planar loop
     "five_bar": (2, 0, 3),  # one planar loop
     "3rrr": (3, 0, 6),  # two planar loops
     "hexapod": (6, 0, 0),
-    "delta": (9, 6, 0),  # 3 translations, and 6 rods that spin
-    "orthoglide": (3, 0, 12),  # 3 parallelograms, 3 each, and 6 couples for 3 turns
+    "delta": (9, 6, 0),  # 3 translations, 6 rotations of the rods
+    "orthoglide": (3, 0, 12),  # 3 for each of three parallelograms, 3 for the legs
     "arm6": (6, 0, 0),
 }
 
@@ -50,16 +50,14 @@ def robot(name):
     return BUILT_IN[name]()
 
 
-ELASTIC_DRIVES = [
-    n for n in COUNTS if n != "irsbot2"
-]  # the drives of irsbot2 are rigid
+ELASTIC_DRIVES = [n for n in COUNTS if n != "irsbot2"]  # irsbot2 has rigid drives
 
 
 WITHOUT_SPRINGY_PASSIVE_JOINTS = sorted(set(COUNTS) - {"irsbot2"})
 
 
 def with_random_errors(robot, rng, rotation=1e-3, translation=2e-4):
-    """The robot with errors that can be closed; irsbot2 has them at selected frames."""
+    """Return the robot with random errors, at selected frames for irsbot2."""
     errors = np.zeros((len(robot.frames), 6))
     rows = np.arange(len(robot.frames))
     if robot.name == "irsbot2":
@@ -70,7 +68,7 @@ def with_random_errors(robot, rng, rotation=1e-3, translation=2e-4):
 
 
 def test_beams_extend_from_the_parent_origin_to_the_frame_origin(robot):
-    """Checked in the home pose, also for beams below a slide, whose length is given."""
+    """Beams after a slide have a given length."""
     origins = home_posture(robot).transforms[:, :3, 3]
     beams = [f for f in robot.frames if isinstance(f.link, BeamLink)]
     assert beams
@@ -83,8 +81,8 @@ def test_beams_extend_from_the_parent_origin_to_the_frame_origin(robot):
         assert np.abs(origins[row] - start - length * R @ axis).max() < 1e-12
 
 
-def test_degrees_of_freedom_and_overconstraint_equal_published_values(name, robot, rng):
-    """Checked at home and elsewhere, because the home pose could be special."""
+def test_mobility_and_overconstraint_equal_published_values(name, robot, rng):
+    """The counts are equal at home and at another pose."""
     postures = [home_posture(robot)]
     postures += [place_robot(robot, pose=random_pose(name, rng)) for _ in range(3)]
     for posture in postures:
@@ -94,7 +92,7 @@ def test_degrees_of_freedom_and_overconstraint_equal_published_values(name, robo
 
 
 def test_pose_is_recovered_from_its_joint_positions(name, robot, rng):
-    """Both postures are solved to 1e-10, and none is near a singularity."""
+    """The tolerance of both postures is 1e-10."""
     for _ in range(4):
         pose = random_pose(name, rng)
         there = place_robot(robot, pose=pose)
@@ -106,8 +104,8 @@ def test_pose_is_recovered_from_its_joint_positions(name, robot, rng):
 
 
 @pytest.mark.parametrize("load", [None, LOAD], ids=["free", "loaded"])
-def test_energies_of_built_in_robots_match_the_paper_in_cvxpy(name, robot, rng, load):
-    """Energies are at least 1e-6 J, except for unloaded, exactly constrained robots."""
+def test_energies_of_built_in_robots_agree_with_cvxpy(name, robot, rng, load):
+    """Robots without overconstraint have no energy without load."""
     faulty = with_random_errors(robot, rng)
     posture = place_robot(faulty, pose=random_pose(name, rng))
     answer = solve_assembly(posture, load)
@@ -119,7 +117,7 @@ def test_energies_of_built_in_robots_match_the_paper_in_cvxpy(name, robot, rng, 
 
 
 def test_energy_and_margin_do_not_depend_on_frame_or_closure_order(name, robot, rng):
-    """The same equations are solved in another order, with closures reversed."""
+    """The order of frames and closures is reversed."""
     pose = random_pose(name, rng)
     faulty = with_random_errors(robot, rng)
     order = rng.permutation(len(faulty.frames))
@@ -137,9 +135,9 @@ def test_energy_and_margin_do_not_depend_on_frame_or_closure_order(name, robot, 
 
 @pytest.mark.parametrize("name", ELASTIC_DRIVES)
 def test_platform_compliance_of_elastic_drives_equals_j_c_jt(name, rng):
-    """Salisbury (1980): C = J diag(1 / k) J^T, with J from differences of postures.
+    """The compliance is J diag(1 / k) J^T (Salisbury 1980).
 
-    Central differences have a relative error of about 1e-8.
+    The Jacobian J is computed by central differences with a relative error of 1e-8.
     """
     robot = only_drives_give(BUILT_IN[name]())
     posture = place_robot(robot, pose=random_pose(name, rng))
@@ -149,14 +147,14 @@ def test_platform_compliance_of_elastic_drives_equals_j_c_jt(name, rng):
     J = drive_jacobian(posture)
     expected = J @ gives @ J.T
     found = platform_compliance(posture)
-    for part in (slice(0, 3), slice(3, 6)):  # rad, then m
+    for part in (slice(0, 3), slice(3, 6)):  # rotation [rad], translation [m]
         size = max(np.abs(expected[part, part]).max(), 1e-12)
         assert np.abs((found - expected)[part, part]).max() < 1e-5 * size
 
 
 @pytest.mark.parametrize("name", WITHOUT_SPRINGY_PASSIVE_JOINTS)
-def test_error_along_a_drive_moves_the_platform_by_its_jacobian_column(name, rng):
-    """An encoder offset stores no energy; J comes from differences of postures."""
+def test_drive_error_moves_the_platform_by_a_jacobian_column(name, rng):
+    """The Jacobian is computed by differences of postures."""
     robot = BUILT_IN[name]()
     tight = replace(
         robot, frames=tuple(replace(f, clearance=None) for f in robot.frames)
@@ -176,13 +174,13 @@ def test_error_along_a_drive_moves_the_platform_by_its_jacobian_column(name, rng
 
 @pytest.mark.parametrize("name", sorted(set(BUILT_IN) - {"hexapod"}))
 def test_pose_out_of_reach_is_rejected(name):
-    """A pose ten metres away; the hexapod is omitted, as its stroke is unlimited."""
+    """The hexapod is omitted, because its stroke is unlimited."""
     robot = BUILT_IN[name]()
     with pytest.raises(BadInput, match="cannot be reached"):
         place_robot(robot, pose={next(iter(WORKSPACE[name])): 10.0})
 
 
-def test_misspelt_robot_name_is_rejected_with_the_nearest_name():
+def test_message_about_a_misspelt_robot_suggests_a_name():
     assert load_robot("3rrr").name == "3rrr"
     with pytest.raises(BadInput, match="hexapod"):
         load_robot("hexpod")

@@ -1,4 +1,4 @@
-"""Serial arm: poses and compliance from Denavit-Hartenberg parameters."""
+"""Poses and compliance of a serial arm, compared with Denavit-Hartenberg formulas."""
 
 import math
 
@@ -20,7 +20,7 @@ from tests.built_in_robots_for_tests import (
 
 
 def denavit_hartenberg(theta, d, a, alpha):
-    """(4, 4) transform written out as in textbooks."""
+    """Return the Denavit-Hartenberg transform, (4, 4)."""
     c, s, ca, sa = math.cos(theta), math.sin(theta), math.cos(alpha), math.sin(alpha)
     return np.array([
         [c, -s * ca, s * sa, a * c],
@@ -58,7 +58,7 @@ def test_arm_pose_equals_the_denavit_hartenberg_product(rng):
     ids=["nominal", "zero"],
 )  # fmt: skip
 def test_arm_poses_equal_corkes_printed_values(joints, position, approach):
-    """The published values have four or five digits."""
+    """The tolerance is that of values with four or five digits."""
     named = {f"joint{k + 1}": value for k, value in enumerate(joints)}
     T = place_robot(BUILT_IN["arm6"](), joints=named).platform
     assert np.abs(T[:3, 3] - position).max() < 6e-5
@@ -66,13 +66,13 @@ def test_arm_poses_equal_corkes_printed_values(joints, position, approach):
 
 
 def arm_jacobian(posture):
-    """(6, 6) Jacobian from the joint axes, at the flange in base axes."""
+    """Return the Jacobian at the flange in base axes, (6, 6)."""
     z, p = posture.transforms[:6, :3, 2], posture.transforms[:6, :3, 3]
     return np.hstack([z, np.cross(z, posture.platform[:3, 3] - p)]).T
 
 
-def test_arm_compliance_equals_that_of_its_drives(rng):
-    """C = J K^-1 J^T to machine precision, with the Jacobian of the joint axes."""
+def test_arm_compliance_equals_the_drive_compliances(rng):
+    """The compliance is J K^-1 J^T."""
     robot = only_drives_give(BUILT_IN["arm6"]())
     posture = place_robot(robot, pose=random_pose("arm6", rng))
     J = arm_jacobian(posture)
@@ -82,8 +82,8 @@ def test_arm_compliance_equals_that_of_its_drives(rng):
     assert np.abs((found - expected) / np.outer(size, size)).max() < 1e-12
 
 
-def test_arm_displacement_under_load_equals_its_joint_clearances(rng):
-    """A load moves every joint to the bound of its clearance independently."""
+def test_displacement_of_loaded_arm_equals_joint_clearances(rng):
+    """A load moves every joint to the bound of its clearance."""
     posture = place_robot(only_play(BUILT_IN["arm6"]()), pose=random_pose("arm6", rng))
     play = Clearance(radial=5e-6, axial=5e-6, tilt=5e-5, spin=1e-4)
     answer = solve_assembly(posture, LOAD)

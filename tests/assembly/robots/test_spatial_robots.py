@@ -21,7 +21,7 @@ from tests.built_in_robots_for_tests import (
     random_pose,
 )
 
-MERLET = np.array([  # [cm] joint centres on the base, then on the platform
+MERLET = np.array([  # joint centres on the base and on the platform [cm]
     [-9.7, 9.1], [9.7, 9.1], [12.76, 3.9], [3, -13], [-3, -13], [-12.76, 3.9],
     [-3, 7.3], [3, 7.3], [7.822, -1.052], [4.822, -6.248], [-4.822, -6.248],
     [-7.822, -1.052],
@@ -29,7 +29,7 @@ MERLET = np.array([  # [cm] joint centres on the base, then on the platform
 
 
 def strut_lines(posture):
-    """(6, 6) unit wrenches of the struts at the platform's origin, and lengths."""
+    """Return the unit wrenches of the struts at the platform's origin, and lengths."""
     a, b = np.pad(MERLET / 100, ((0, 0), (0, 0), (0, 1)))
     arms = b @ posture.platform[:3, :3].T
     along = posture.platform[:3, 3] + arms - a
@@ -47,8 +47,8 @@ def test_hexapod_strut_lengths_equal_the_inverse_kinematics(rng):
         assert np.abs(found - lengths).max() < 1e-12
 
 
-def test_hexapod_stiffness_is_the_sum_over_its_struts(rng):
-    """Gosselin (1990): K = sum k w w^T, with drive and tube in series."""
+def test_hexapod_stiffness_equals_the_sum_over_struts(rng):
+    """The stiffness is the sum of k w w^T (Gosselin 1990)."""
     P = HexapodParameters()
     robot = BUILT_IN["hexapod"]()
     tight = (replace(f, clearance=None) for f in robot.frames)
@@ -66,9 +66,10 @@ def test_hexapod_stiffness_is_the_sum_over_its_struts(rng):
 
 
 def assert_pose_error_is_of_64_corners(posture, lines, joints):
-    """Closed form of (27): six struts lengthen by their joint clearances.
+    """Assert that the bound of (27) equals the largest error at 64 corners.
 
-    The platform's errors are J^-1 of a box, the farthest at one of its corners.
+    The strut lengths vary by the joint clearances within a box, and the largest
+    platform error is at one of its corners.
     """
     robot, T = posture.robot, posture.transforms
     plays = np.zeros(6)
@@ -88,7 +89,7 @@ def assert_pose_error_is_of_64_corners(posture, lines, joints):
         assert high - low <= 1e-6
 
 
-def test_pose_error_of_the_hexapod_is_the_farthest_of_64_corners(rng):
+def test_pose_error_of_the_hexapod_equals_the_closed_form(rng):
     posture = place_robot(BUILT_IN["hexapod"](), pose=random_pose("hexapod", rng))
     lines, _ = strut_lines(posture)
     joints = [(f"leg{k}.cardan_2", f"leg{k}.ball_3") for k in range(1, 7)]
@@ -99,10 +100,8 @@ def test_pose_error_of_the_hexapod_is_the_farthest_of_64_corners(rng):
     ((0.0, 0.0, -0.9), (-20.5, -20.5, -20.5)),
     ((0.3, 0.5, -1.1), (47.5, -11.6, 21.4)),
 ])  # fmt: skip
-def test_drive_angles_of_the_delta_robot_equal_the_examples_of_williams(
-    position, degrees
-):
-    """The published angles are given to 0.1 degrees."""
+def test_drive_angles_of_the_delta_robot_equal_published_examples(position, degrees):
+    """The published angles have an accuracy of 0.1 degrees."""
     pose = dict(zip(POSE, position, strict=False))
     posture = place_robot(BUILT_IN["delta"](), pose=pose)
     found = np.degrees(list(joints_of(posture).values()))
@@ -128,7 +127,7 @@ def test_delta_platform_is_the_intersection_of_three_spheres(rng):
 
 
 def lower_meeting_point(centres, radius):
-    """The spheres have equal radii, so the point is below their circumcentre."""
+    """Return the lower intersection of three spheres of equal radius."""
     a, b = centres[1] - centres[0], centres[2] - centres[0]
     normal = np.cross(a, b)
     middle = np.cross((a @ a) * b - (b @ b) * a, normal) / (2 * normal @ normal)
@@ -136,7 +135,7 @@ def lower_meeting_point(centres, radius):
     return centres[0] + middle + math.sqrt(radius**2 - middle @ middle) * down
 
 
-def test_delta_platform_has_constant_orientation_and_parallel_rods(rng):
+def test_delta_platform_has_constant_orientation(rng):
     robot = BUILT_IN["delta"]()
     for _ in range(5):
         posture = place_robot(robot, pose=random_pose("delta", rng))
@@ -151,8 +150,8 @@ def test_delta_platform_has_constant_orientation_and_parallel_rods(rng):
             assert np.linalg.norm(apart) == pytest.approx(0.131, abs=1e-11)
 
 
-def test_delta_without_rod_spins_has_three_degrees_of_freedom():
-    """Without spin in its upper ball joint, a rod still rotates in the lower one."""
+def test_delta_without_rod_rotations_has_three_degrees_of_freedom():
+    """The rods cannot rotate about their axes in the upper ball joints."""
     robot = BUILT_IN["delta"]()
     frames = (
         replace(f, joint="fixed") if f.name.endswith("high_3") else f
@@ -162,13 +161,13 @@ def test_delta_without_rod_spins_has_three_degrees_of_freedom():
     assert (found.freedoms, found.locked_freedoms) == (3, 0)
 
 
-def test_delta_out_of_reach_is_rejected_with_the_reach():
+def test_delta_pose_out_of_reach_is_rejected():
     with pytest.raises(BadInput, match=r"delta: a leg requires a reach of 2\.0\d* m"):
         drive_angle(DeltaParameters(), 0.0, np.array([0.0, 0.0, -2.0]))
 
 
-def test_pose_error_of_the_delta_robot_is_the_farthest_of_64_corners(rng):
-    """The six rods constrain the platform like six struts."""
+def test_pose_error_of_the_delta_robot_equals_the_closed_form(rng):
+    """The six rods act like six struts."""
     posture = place_robot(BUILT_IN["delta"](), pose=random_pose("delta", rng))
     T, index = posture.transforms, posture.robot.index
     rods = [f"leg{k}.{r}" for k in (1, 2, 3) for r in "ab"]
@@ -187,7 +186,7 @@ def test_lengths_of_orthoglide_legs_are_constant(rng):
         posture = place_robot(robot, pose=random_pose("orthoglide", rng))
         p = posture.platform[:3, 3]
         slides = np.array(list(joints_of(posture).values()))
-        # (p_x - r_x)^2 + p_y^2 + p_z^2 = L^2, and so on
+        # The leg along x satisfies (p_x - r_x)^2 + p_y^2 + p_z^2 = L^2.
         left = (p - slides) ** 2 + p @ p - p**2 - 0.310**2
         assert np.abs(left).max() < 1e-12
         assert np.abs(posture.platform[:3, :3] - np.eye(3)).max() < 1e-11
