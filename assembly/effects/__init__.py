@@ -1,9 +1,9 @@
-"""Library of effects that a declared robot model may lack, one module per effect.
+"""Library of physical effects, such as friction and thermal expansion.
 
 Start with ``effect.py``, which defines an effect.  ``library.py`` adds the effects of
 other distributions.  Effects are applied in the order of :data:`LIBRARY`.  Friction
-acts on a joint's spring, so drive compliance comes before friction.  The elastic
-foundation adds a frame, so it comes last.
+acts on a joint's spring, so drive compliance is applied before friction.  The elastic
+foundation adds a frame, so it is applied last.
 """
 
 from collections.abc import Mapping
@@ -79,15 +79,14 @@ def apply_effects(conditions: Conditions, effects: Mapping[str, Values]) -> Cond
 
 
 def apply_known(conditions: Conditions, robot: Robot) -> Conditions:
-    """Apply all effects that are declared in the file of a robot.
+    """Apply all effects in the file of a robot.
 
     Args:
         conditions: conditions of R measurements of the robot without effects.
         robot: robot with these effects.
 
     Returns:
-        The conditions with the effects of the robot and of each session, and with its
-        functions.
+        The conditions with the effects and functions of the robot and of each session.
     """
     recorded = conditions
     conditions = apply_effects(conditions, robot.effects)

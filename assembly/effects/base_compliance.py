@@ -1,4 +1,4 @@
-"""Elastic foundation: springs at the base's origin along and about the base's axes."""
+"""Elastic foundation with springs at the base origin along and about the base axes."""
 
 from dataclasses import replace
 
@@ -24,8 +24,8 @@ def on_foundation(conditions: Conditions) -> Conditions:
         conditions: conditions of R measurements.
 
     Returns:
-        The conditions, in which the new frame comes first.  They are unchanged if the
-        robot already has such a frame.
+        The conditions with the new frame.  They are unchanged if the robot has such a
+        frame.
     """
     feet = [f for f in conditions.robot.frames if f.parent == BASE]
     foot = feet[0]
@@ -36,7 +36,7 @@ def on_foundation(conditions: Conditions) -> Conditions:
 
 
 def _standing(conditions: Conditions, robot: Robot) -> Conditions:
-    """Return the conditions with an additional fixed frame before all other frames."""
+    """Return the conditions with an additional fixed frame after the base."""
     still = np.broadcast_to(np.eye(4), (len(conditions), 1, 4, 4))
     zero = np.zeros((len(conditions), 1, 6))
     rest = (
@@ -74,7 +74,7 @@ def with_foundation(robot: Robot, values: Values) -> Robot:
 
 
 def _public(robot: Robot, values: Values) -> dict[str, float]:
-    """Convert compliances to stiffnesses; negative for a stiffer foundation."""
+    """Convert fitted compliances to stiffnesses, negative for a stiffer foundation."""
     return {
         f"stiffness.{name.removeprefix('compliance.')}": 1 / c
         for name, c in values.items()

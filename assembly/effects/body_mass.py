@@ -1,9 +1,8 @@
-"""Deviation of a body's mass and centre of mass from their declared values.
+"""Deviation of the mass and the centre of mass of a body from the robot file.
 
-Let m and c be the declared mass and centre, and M and C the true ones.  The parameter
-``mass`` is M - m, and ``moment`` is M C - m c.  The weight is linear in both; the true
-centre is (m c + moment)/M.  Moments of inertia do not influence the weight and are
-unchanged.
+Let m and c be the mass and centre in the file, and M and C the true values.  The
+parameter ``mass`` is M - m, and ``moment`` is M C - m c.  The weight is linear in both
+parameters.  The true centre is (m c + moment)/M.
 """
 
 from dataclasses import replace
@@ -18,11 +17,11 @@ from forcefit.assembly.measurement.conditions import Conditions
 from forcefit.assembly.model.robot import BeamLink, Frame, Robot
 
 _MOMENT = ("moment.x", "moment.y", "moment.z")
-_LEAST = 1e-9  # [kg] smallest mass for which a centre is defined
+_LEAST = 1e-9  # [kg] smallest mass with a defined centre
 
 
 def heavy_bodies(robot: Robot) -> tuple[str, ...]:
-    """Return the frames whose bodies have a declared mass, including beams."""
+    """Return the frames whose bodies have a mass, including beams."""
     return tuple(
         f.name
         for f in robot.frames

@@ -1,9 +1,8 @@
-"""Combine a declared effect with an effect identified by a diagnosis.
+"""Combine an effect of the robot file with an effect identified by a diagnosis.
 
-The declared effect acts first, followed by the identified one.  Together they are
-equivalent to a single effect with modified parameters: offsets and compliances are
-added, factors multiplied, eccentricities added as vectors, and frame rotations
-composed.
+The effect of the file acts first.  Both effects together are equivalent to a single
+effect.  Its offsets and compliances are sums, its factors products, its eccentricities
+vector sums, and its frame rotations compositions.
 """
 
 import math
@@ -19,19 +18,19 @@ Effects = Mapping[str, Values]
 
 
 def combined(declared: Effects, found: Effects) -> dict[str, dict[str, float]]:
-    """Combine the effects declared in a robot file with additional effects.
+    """Combine the effects of a robot file with additional effects.
 
     Args:
         declared: parameters of each effect in the file, by public name.
         found: parameters of each additional effect by public name.  Additional effects
-            act after declared ones.
+            act after those of the file.
 
     Returns:
         Parameters of the equivalent single effects.
 
     Raises:
-        ValueError: no equivalent single effect exists, for example for two contact laws
-            in one joint or two drifts with different time constants.
+        ValueError: there is no equivalent single effect, for example for two contact
+            laws in one joint.
     """
     both = {name: dict(values) for name, values in declared.items()}
     for name, values in found.items():
@@ -44,7 +43,7 @@ def combined(declared: Effects, found: Effects) -> dict[str, dict[str, float]]:
 
 
 def _sum(declared: Values, found: Values) -> dict[str, float]:
-    """Add the declared and the identified value of each parameter."""
+    """Add the values of each parameter in the file and in the diagnosis."""
     return dict(declared) | {k: declared.get(k, 0.0) + v for k, v in found.items()}
 
 
@@ -57,12 +56,12 @@ def _in_series(declared: Values, found: Values) -> dict[str, float]:
 
 
 def _product(declared: Values, found: Values) -> dict[str, float]:
-    """Multiply the declared and the identified factor of each parameter."""
+    """Multiply the factors of each parameter in the file and in the diagnosis."""
     return dict(declared) | {k: declared.get(k, 1.0) * v for k, v in found.items()}
 
 
 def _load(declared: Values, found: Values) -> dict[str, float]:
-    """Combine load gains; the identified gain acts after the declared one."""
+    """Combine load gains; the gain of the diagnosis acts after that of the file."""
     factor = found.get("factor", 1.0)
     offsets = {k: factor * v for k, v in declared.items() if k != "factor"}
     more = {k: v for k, v in found.items() if k != "factor"}
@@ -84,7 +83,7 @@ def _eccentricity(declared: Values, found: Values) -> dict[str, float]:
 
 
 def _registration(declared: Values, found: Values) -> dict[str, float]:
-    """Compose the declared and the identified registration."""
+    """Compose the registrations of the file and of the diagnosis."""
     first, second = (np.array([v.get(k, 0.0) for k in BASE]) for v in (declared, found))
     R = rotation_matrix(second[:3])
     turn = rotation_vector(R @ rotation_matrix(first[:3]))
@@ -104,7 +103,7 @@ def _drift(declared: Values, found: Values) -> dict[str, float]:
 
 
 def _contact(declared: Values, found: Values) -> dict[str, float]:
-    """Combine contact laws, which must belong to different joints."""
+    """Combine contact laws of different joints."""
     if set(declared) & set(found):
         raise ValueError(
             "two contact laws in series at one joint cannot be combined into one law"
@@ -113,7 +112,7 @@ def _contact(declared: Values, found: Values) -> dict[str, float]:
 
 
 def _delayed(declared: Values, found: Values) -> dict[str, float]:
-    """Combine expansions; those of the same body must have equal time constants."""
+    """Combine expansions; those of one body must have equal time constants."""
     both = _sum(declared, found)
     for key in set(declared) & set(found):
         if key.endswith(".time_constant"):

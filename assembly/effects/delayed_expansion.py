@@ -1,9 +1,8 @@
 """Thermal expansion of a body whose temperature lags behind the recorded temperature.
 
-The body expands by coefficient x length x its temperature, along its beam or along the
-line between its joints.  At the first reading of a session, the body and the sensor are
-at the same temperature.  Afterwards, the body temperature follows the sensor
-temperature with a first-order lag.
+The body expands by coefficient x length x body temperature, along its beam or along the
+line between its joints.  The body temperature is the sensor temperature with a
+first-order lag.  Both are equal at the first reading of a session.
 """
 
 import numpy as np
@@ -22,12 +21,12 @@ from forcefit.assembly.measurement.variables import past
 from forcefit.assembly.model.robot import Robot
 
 _SENSOR, _LATE = "cov.temperature", "time_constant"
-# initial guesses for the time constant, relative to the duration of the campaign
+# initial guesses of the time constant, relative to the duration of the campaign
 _SCAN = (0.03, 0.1, 0.3)
 
 
 def _warmth(conditions: Conditions, time_constant: float) -> NDArray:
-    """Return the (R,) [K] body temperatures, which lag behind those of the sensor."""
+    """Return the body temperatures, which lag behind those of the sensor, (R,) [K]."""
     history, row = past(conditions, [_SENSOR])
     first = np.where(history.first, np.arange(len(history.first)), 0)
     began = history.values[_SENSOR][np.maximum.accumulate(first)]

@@ -1,4 +1,4 @@
-"""Drift of the reading: amplitude (1 - exp(-time / time constant))."""
+"""Drift of the reading by amplitude (1 - exp(-time / time constant))."""
 
 from dataclasses import replace
 
@@ -11,13 +11,13 @@ from forcefit.stiffness.screws import SCREW
 
 _AMPLITUDE = tuple(f"amplitude.{axis.lower()}" for axis in SCREW)
 
-# initial guesses for the time constant, relative to the duration of the campaign
+# initial guesses of the time constant, relative to the duration of the campaign
 _SCAN = (0.03, 0.1, 0.3, 1.0, 3.0)
 
 
 def _apply(conditions: Conditions, values: Values) -> Conditions:
     amplitude = np.array([values.get(name, 0.0) for name in _AMPLITUDE])
-    with np.errstate(over="ignore"):  # time / time constant can overflow
+    with np.errstate(over="ignore"):  # the ratio time / time constant can overflow
         settled = 1.0 - np.exp(-conditions.time / values["time_constant"])
     drift = settled[:, None] * amplitude
     return replace(conditions, reading=conditions.reading + drift)

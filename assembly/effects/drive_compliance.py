@@ -1,4 +1,4 @@
-"""Compliance of actuated joints, in series with their declared stiffness, if any."""
+"""Compliance of actuated joints, in series with their stiffness in the robot file."""
 
 from dataclasses import replace
 from functools import partial
@@ -26,7 +26,7 @@ def _unit(robot: Robot, name: str) -> str:
 
 
 def _public(robot: Robot, values: Values) -> dict[str, float]:
-    """Convert compliances to stiffnesses; negative for stiffer drives."""
+    """Convert fitted compliances to stiffnesses, negative for stiffer drives."""
     ends = len(".compliance")
     return {name[:-ends]: 1 / c for name, c in values.items() if abs(c) > RIGID}
 

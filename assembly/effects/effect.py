@@ -1,4 +1,4 @@
-"""Definition of an effect, which modifies the conditions of a declared model."""
+"""Definition of an effect, which modifies the conditions of measurements."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ from forcefit.assembly.measurement.conditions import Conditions
 from forcefit.assembly.model.robot import Robot
 
 Values = Mapping[str, float]
-RIGID = 1e-12  # [rad/(N m), m/N] fitted compliance below which a part counts as rigid
+RIGID = 1e-12  # [rad/(N m), m/N] fitted compliance below which a spring is rigid
 
 
 @dataclass(frozen=True)
@@ -15,15 +15,14 @@ class Unknown:
     """An unknown of a fit, chosen so that the model is nearly linear in it.
 
     Attributes:
-        name: name of a parameter, or of part of a parameter.  For an effect that acts
-            at frames, the name is appended to the name of the frame (``""`` if the
-            latter is sufficient).
-        scale: typical magnitude, in the unit of the parameter or its part.
-        lower: smallest value that is physically possible.
-        upper: largest value that is physically possible.
-        start: value without effect, at which the first derivative is evaluated.
+        name: name of a parameter, or of part of a parameter.  For an effect at frames,
+            the name is appended to the frame name.
+        scale: typical magnitude, in the unit of the parameter.
+        lower: smallest physically possible value.
+        upper: largest physically possible value.
+        start: value without effect, at which the first derivatives are evaluated.
         scan: initial guesses, if the model is strongly nonlinear.
-        scan_by: name of the covariate by whose range ``scan`` is multiplied, if any.
+        scan_by: name of the covariate whose range multiplies ``scan``, or "".
     """
 
     name: str
@@ -36,7 +35,7 @@ class Unknown:
 
 
 def _as_they_are(robot: Robot, values: Values) -> dict[str, float]:
-    """Return the unknowns, which are identical to the parameters."""
+    """Return the unknowns as parameters without conversion."""
     return dict(values)
 
 
@@ -47,35 +46,32 @@ class Effect:
     Attributes:
         name: name of the effect in the public format.
         apply: function that adds the effect to conditions.  Its arguments are the
-            conditions without the effect and the effect's parameters by public name
-            (``<frame>``, ``<frame>.<component>`` or plain).
+            conditions and the parameters of the effect by public name.
         unit: function that returns the unit of a parameter, given the robot and its
             public name.
         frames: function that returns the frames of a robot at which the effect can act;
             None if the effect does not act at frames.
-        device_alone: whether the effect is an error of the measuring device.  A
-            function of the robot with the same influence on the readings is considered
-            more probable.
-        refines: name of an effect that is a limiting case of this one; ``""`` for none.
+        device_alone: whether the effect is an error of the measuring device.
+        refines: name of an effect that is a limiting case of this effect, or "".
         tried: function that returns the frames at which a diagnosis searches for the
-            effect; None for all frames at which it can act.
-        components: public parameters at each frame (``""`` for the frame name itself),
-            or of the effect as a whole.
-        unknowns: unknowns of the fit, at each frame or for the effect as a whole.
+            effect; None for ``frames``.
+        components: public parameters at each frame (``""`` for the frame name alone),
+            or of the complete effect.
+        unknowns: unknowns of the fit, at each frame or of the complete effect.
         public: function that converts unknowns (keys ``<frame>.<unknown>``) to
             parameters by public name.
         needs: covariates required to apply or identify the effect.
-        linear: whether the platform's deviation is linear in the unknowns, to first
-            order in all small motions.
-        by_row: whether the effect changes individual measurements, so that it can be
-            limited to one session, rather than the robot itself.
+        linear: whether the platform deviation is linear in the unknowns for small
+            motions.
+        by_row: whether the effect changes individual measurements and can be limited to
+            a session.
         finite: whether the effect requires finite motions.
         clearance: whether the effect adds clearance to joints.
-        device: unknowns that displace the measuring frame as a whole.
-        splits: whether each unknown can act without the others.
-        follows_load: whether the unknowns ``offset.<c>`` correspond to the load
-            components that a campaign records.
-        weighs: whether the effect acts through gravity alone.
+        device: unknowns that displace the measuring frame.
+        splits: whether each unknown can be fitted without the others.
+        follows_load: whether the unknowns ``offset.<c>`` correspond to recorded load
+            components.
+        weighs: whether the effect requires gravity.
     """
 
     name: str
@@ -100,5 +96,5 @@ class Effect:
 
 
 def at(frame: str, kind: str) -> str:
-    """Return the name of an unknown or a parameter of a frame."""
+    """Return the name of an unknown or a parameter at a frame."""
     return f"{frame}.{kind}" if kind else frame

@@ -1,4 +1,4 @@
-"""Encoder eccentricity: actual = command + amplitude sin(command + phase)."""
+"""Encoder eccentricity, actual = command + amplitude sin(command + phase)."""
 
 import math
 

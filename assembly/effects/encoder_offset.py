@@ -1,4 +1,4 @@
-"""Encoder offset: the actual coordinate of a drive is the command plus a constant."""
+"""Encoder offset, by which the actual and commanded coordinates of a drive differ."""
 
 from forcefit.assembly.effects.effect import Effect, Unknown, Values
 from forcefit.assembly.effects.places import drives, own_unit, with_screws

@@ -1,8 +1,8 @@
 """Forms of a function of one or two variables.
 
-A form is linear in most of its coefficients, each of which multiplies one basis column,
-so that a single fit determines them all.  Its remaining parameters, called *shapes*
-(for example a time constant or a period), change the columns nonlinearly.
+A form is a sum of basis columns, each multiplied by a coefficient.  The remaining
+parameters, called *shapes*, change the columns nonlinearly.  Examples of shapes are a
+time constant and a period.
 
 ========== ============================== =====================================
 form       numbers of the columns         columns that they multiply
@@ -47,7 +47,7 @@ from numpy.typing import NDArray
 Shapes = Mapping[str, float]
 Inputs = Sequence[NDArray]
 _MOST = 999  # largest number of powers, harmonics or knots
-# pattern of an integer in the name of a column
+# integer in the name of a column
 _INDEX = re.compile("0|-?[1-9][0-9]{0,8}")
 
 
@@ -59,12 +59,12 @@ class Form:
         name: name of the form in robot files.
         summary: one-line description.
         most: largest number of variables.
-        shapes: names of the nonlinear parameters, with True if required.
+        shapes: mapping of names of nonlinear parameters to True if required.
         indices: smallest and largest integer at the beginning of a column name; None if
             the names contain no integers.
-        words: allowed endings of a column name, such as ``"sine"``; ``""`` if a name
-            can consist of integers only.
-        basis: function that evaluates the (R, p) columns, given column names, inputs
+        words: allowed endings of a column name, such as ``"sine"``; ``""`` for names
+            without ending.
+        basis: function that returns the columns (R, p) for given column names, inputs
             (R,) and shapes.
         remembers: whether the result depends on earlier values of the first variable.
         least: smallest number of variables.
@@ -81,7 +81,7 @@ class Form:
     least: int = 1
 
     def is_column(self, name: str, variables: int) -> bool:
-        """Return whether a name denotes a column for the given number of variables."""
+        """Return whether a name is a column name for the given number of variables."""
         head, word = name, ""
         if self.words != ("",):
             head, _, word = name.rpartition(".")
@@ -140,7 +140,7 @@ _ENDS = ("first", "last")
 
 
 def natural_spline(knots: NDArray, x: NDArray) -> NDArray:
-    """Return (R, n) natural cubic splines; each is 1 at one of n knots, 0 at others."""
+    """Return natural cubic splines (R, n) that are 1 at one knot and 0 at others."""
     from scipy.interpolate import CubicSpline
 
     if len(knots) < 2:
@@ -157,8 +157,8 @@ def roughness(count: int) -> NDArray:
         count: number n of knots.
 
     Returns:
-        (n, n) [1/steps^3] matrix R such that v R v is the integral of the squared
-        second derivative for values v at the knots, with unit knot spacing.
+        Matrix R (n, n), where v R v is the integral of the squared second derivative
+        for values v at knots of unit spacing.
 
     Sources:
         Green, Silverman, Nonparametric Regression, section 2.1.2 (R = Q B^-1 Q').
@@ -183,35 +183,35 @@ def _step(names: Sequence[str], inputs: Inputs, shapes: Shapes) -> NDArray:
 
 
 def _reversal(names: Sequence[str], inputs: Inputs, shapes: Shapes) -> NDArray:
-    """Return direction columns, multiplied by powers of the second input if any."""
+    """Return the direction of motion, multiplied by powers of the second input."""
     size = inputs[1] if len(inputs) > 1 else np.ones_like(inputs[0])
     return _stacked([inputs[0] * size ** int(name) for name in names], inputs)
 
 
 def _scaled_waves(names: Sequence[str], inputs: Inputs, shapes: Shapes) -> NDArray:
-    """Return harmonics of an angle, multiplied by the second input."""
+    """Return harmonics of the first input, multiplied by the second input."""
     return _waves(names, inputs[:1], shapes) * inputs[1][:, None]
 
 
 def _reversal_waves(names: Sequence[str], inputs: Inputs, shapes: Shapes) -> NDArray:
-    """Return harmonics of an angle, multiplied by a direction."""
+    """Return harmonics of an angle, multiplied by the direction of motion."""
     return _waves(names, inputs[1:], shapes) * inputs[0][:, None]
 
 
 def _slip(names: Sequence[str], inputs: Inputs, shapes: Shapes) -> NDArray:
-    """Return the position of the slipping friction element, from -1 to 1."""
+    """Return the position of a friction element, from -1 to 1."""
     return _stacked([inputs[0]] * len(names), inputs)
 
 
 def _knee(names: Sequence[str], inputs: Inputs, shapes: Shapes) -> NDArray:
-    """Split a load into the parts below and above the knee, in both directions."""
+    """Divide a load into components below and above the knee."""
     first = np.clip(inputs[0], -shapes["at"], shapes["at"])
     parts = {"below": first, "above": inputs[0] - first, "size": first / shapes["at"]}
     return _stacked([parts[name] for name in names], inputs)
 
 
 def _stacked(columns: Sequence[NDArray], inputs: Inputs) -> NDArray:
-    """Stack columns of the length of the inputs into an (R, p) array."""
+    """Combine columns to an array (R, p)."""
     rows = len(inputs[0])
     if not columns:
         return np.zeros((rows, 0))
@@ -222,7 +222,7 @@ _WAVES = ("sine", "cosine")
 
 
 def _memory(name: str, summary: str) -> Form:
-    """Define a form whose state lags behind the variable."""
+    """Return a form whose state lags behind the variable."""
     return Form(
         name, summary, 1, {"time_constant": True}, None, ("gain", "start"), _remembered,
         remembers=True,
@@ -257,7 +257,7 @@ FORMS: dict[str, Form] = {
 
 
 def shape_names(form: Form, variables: int) -> dict[str, bool]:
-    """Return the shape names of a form, with True if required."""
+    """Return the shape names of a form, mapped to True if required."""
     if form.name == "spline" and variables > 1:
         return {f"{end}.{k}": True for k in (1, 2) for end in _ENDS}
     return dict(form.shapes)

@@ -1,9 +1,9 @@
-"""User-defined formulas in a small grammar, evaluated without executing code.
+"""User-defined formulas and their units.
 
-The grammar allows numbers, names, ``+ - * / **``, brackets, ``pi`` and the functions
-below.  Units are checked: the terms of a sum must have the same unit, and the argument
-of a function must be dimensionless (rad counts as dimensionless).  The units of the
-parameters follow from these conditions.
+A formula consists of numbers, names, ``+ - * / **``, brackets, ``pi`` and a few
+functions.  The terms of a sum must have the same unit, and the argument of a function
+must be dimensionless.  The units of the parameters follow from these conditions.  The
+unit rad is dimensionless.
 
 Sources:
     Kennedy, Relational Parametricity and Units of Measure, POPL 1997 (units of
@@ -30,8 +30,8 @@ _OPERATIONS: dict[type, Callable[[NDArray, NDArray], NDArray]] = {
 }  # fmt: skip
 _LONGEST = 500  # largest number of characters in a formula
 _DEEPEST = 50  # largest depth of nested brackets and operations
-_SAME = 1e-9  # difference below which two unit exponents count as equal
-# exponents of the units m, N, s, K ..; rad counts as dimensionless
+_SAME = 1e-9  # largest difference between equal unit exponents
+# exponents of the units m, N, s, K ..; rad is dimensionless
 Unit = Mapping[str, float]
 
 
@@ -42,10 +42,10 @@ def parse_formula(text: str) -> ast.expr:
         text: formula such as ``"a*sin(3*q) + b"``.
 
     Returns:
-        The expression; it contains only nodes of the grammar.
+        The syntax tree.
 
     Raises:
-        BadInput: the text is not a valid formula; the message states the error.
+        BadInput: the text is not a valid formula.
     """
     if len(text) > _LONGEST:
         raise BadInput(f"found {len(text)} characters, expected at most {_LONGEST}")
@@ -61,7 +61,7 @@ def parse_formula(text: str) -> ast.expr:
 
 
 def _check(node: ast.AST, depth: int) -> None:
-    """Reject parts of a formula that are not in the grammar."""
+    """Raise BadInput for elements that are not in the grammar."""
     match node:
         case _ if depth > _DEEPEST:
             raise BadInput(f"found a formula nested deeper than {_DEEPEST}")
@@ -131,21 +131,18 @@ def _value(node: ast.AST, known: Mapping[str, NDArray]) -> NDArray:
 def parameter_units(
     tree: ast.expr, variables: Mapping[str, Unit], result: Unit
 ) -> dict[str, Unit]:
-    """Infer the units of a formula's parameters from dimensional consistency.
+    """Return the units of the parameters of a formula.
 
     Args:
         tree: syntax tree of the formula.
         variables: units of its variables by name.
-        result: unit of the result; a dimensionless result is interpreted as an SI
-            value.
+        result: unit of the result; a dimensionless result is interpreted in SI units.
 
     Returns:
-        Unit exponents by parameter; a parameter that can have any unit counts as
-        dimensionless.
+        Unit exponents by parameter.  An undetermined unit is dimensionless.
 
     Raises:
-        BadInput: the formula is dimensionally inconsistent; the message states the
-            conflict.
+        BadInput: the units of the formula are inconsistent.
     """
     units = _Units(variables)
     whole = units.of(tree)
@@ -157,7 +154,7 @@ def parameter_units(
 
 @dataclass
 class _Units:
-    """Equations between units; ``?name`` is the unknown unit of a parameter."""
+    """System of equations between units; ``?name`` is the unit of a parameter."""
 
     variables: Mapping[str, Unit]
     known: dict[str, dict[str, float]] = field(default_factory=dict)
@@ -205,7 +202,7 @@ class _Units:
     def equal(
         self, one: Mapping[str, float], other: Mapping[str, float], where: str
     ) -> None:
-        """Equate two units and store the resulting unit of a parameter."""
+        """Equate two units and solve for the unit of a parameter."""
         left = self.reduced(_added(one, other, -1.0))
         free = next((name for name in left if name.startswith("?")), None)
         if free is not None:
@@ -228,7 +225,7 @@ class _Units:
 
 
 def _number(node: ast.AST) -> float | None:
-    """Return the value of a subexpression; None if it contains names."""
+    """Return the value of a subexpression, or None if it contains names."""
     if any(isinstance(n, ast.Name) and n.id != "pi" for n in ast.walk(node)):
         return None
     return float(_value(node, {}))
@@ -237,13 +234,13 @@ def _number(node: ast.AST) -> float | None:
 def _added(
     one: Mapping[str, float], other: Mapping[str, float], factor: float
 ) -> dict[str, float]:
-    """Return the exponents of a unit times a power of another."""
+    """Return the product of a unit and a power of another unit."""
     names = dict.fromkeys([*one, *other])
     return {name: one.get(name, 0.0) + factor * other.get(name, 0.0) for name in names}
 
 
 def unit_text(unit: Unit) -> str:
-    """Format a unit, such as ``1/N^2`` for rad/N^2; ``1`` if dimensionless."""
+    """Return a unit as text, such as ``1/N^2``, or ``1`` if dimensionless."""
 
     def powers(sign: float) -> list[str]:
         parts = [(name, sign * k) for name, k in unit.items() if sign * k > _SAME]

@@ -1,4 +1,4 @@
-"""Coulomb friction at an elastic joint: torque -tau x direction of approach."""
+"""Coulomb friction at an elastic joint, torque = -tau x direction of approach."""
 
 from forcefit.assembly.effects.effect import Effect, Unknown, Values
 from forcefit.assembly.effects.places import own_unit, with_screws
@@ -8,7 +8,7 @@ from forcefit.assembly.model.robot import Frame, Robot
 
 
 def elastic_joints(robot: Robot) -> tuple[str, ...]:
-    """Return the joints with a spring about z: elastic drives and compliant joints."""
+    """Return the joints with a spring along their motion."""
     softened = robot.effects.get("drive_compliance", {})
     return tuple(
         f.name
@@ -26,8 +26,8 @@ def _apply(conditions: Conditions, values: Values) -> Conditions:
     C = joint_compliances(conditions.robot)
     for name, tau in values.items():
         row = conditions.robot.index(name)
-        # an internal torque of the joint causes a stress-free motion of compliance x
-        # torque
+        # An internal torque of the joint causes the stress-free motion compliance x
+        # torque.
         deflection = C[row, :, conditions.robot.frames[row].own_axis]
         conditions = with_screws(
             conditions, name, -tau * conditions.approach[:, None] * deflection

@@ -1,9 +1,8 @@
-"""Apply functions: general effects declared in a robot file or found by a diagnosis.
+"""Apply general effects (functions) from a robot file or a diagnosis.
 
 A function changes the stress-free screws at a frame, the pose of the base, the reading,
-or the load.  A function that depends on a wrench, as every compliance does, makes its
-location compliant and is solved together with the equilibrium
-(:mod:`forcefit.assembly.measurement.yields`).
+or the load.  A function that depends on a wrench, for example a compliance, is solved
+together with the equilibrium (:mod:`forcefit.assembly.measurement.yields`).
 """
 
 from collections.abc import Iterable, Sequence
@@ -33,16 +32,16 @@ _parsed = lru_cache(maxsize=256)(parse_formula)
 
 
 def along(robot: Robot, where: str, component: str, values: NDArray) -> NDArray:
-    """Project screws or wrenches onto one direction of a frame.
+    """Project screws or wrenches onto a component at a frame.
 
     Args:
         robot: any robot.
         where: name of a frame.
         component: ``rx`` .. ``tz``, or ``rs`` for a helical joint.
-        values: (..., 6) components of the screw of the frame, or of the wrench on it.
+        values: (..., 6) screws or wrenches at the frame.
 
     Returns:
-        (...) products of the values with the unit screw.
+        Products of the values with the unit screw, (...).
     """
     if component == THREAD:
         return values @ unit_screw(robot, where, component)
@@ -50,7 +49,7 @@ def along(robot: Robot, where: str, component: str, values: NDArray) -> NDArray:
 
 
 def is_loaded(function: Function) -> bool:
-    """Return whether a function depends on wrenches transmitted by the robot."""
+    """Return whether a function depends on wrenches in the robot."""
     wrench = any(name.startswith("wrench.") for name in function.variables)
     return wrench or function.kind == "compliance"
 
@@ -63,9 +62,8 @@ def covariates_of(robot: Robot, sessions: Iterable[str]) -> dict[str, str]:
         sessions: sessions to consider.
 
     Returns:
-        The title of one dependent function for each covariate, named without ``cov.``.
-        ``time`` is included if a form depends on time, and ``approach`` if the
-        direction before the first reading is needed.
+        For each covariate, the title of a function that depends on it.  The names of
+        covariates have no prefix ``cov.``.
     """
     owners: dict[str, str] = {}
     for function in robot.functions:
@@ -85,29 +83,29 @@ def _is_covariate(name: str) -> bool:
 
 
 def components_of(where: str, robot: Robot) -> tuple[str, ...]:
-    """Return the components that a function may have at a given location.
+    """Return the components that a function can have.
 
     Args:
         where: name of a frame, ``"base"``, ``"reading"`` or ``"load"``.
         robot: the robot on which it acts.
 
     Returns:
-        ``mx`` .. ``fz`` for the load, ``rx`` .. ``tz`` for other locations, and ``rs``
-        for a helical joint.
+        ``mx`` .. ``fz`` for the load, otherwise ``rx`` .. ``tz``, and ``rs`` for a
+        helical joint.
     """
     threads = [frame.name for frame in robot.frames if frame.pitch]
     return LOADS if where == "load" else (*AXES, *[THREAD] * (where in threads))
 
 
 def unit_screw(robot: Robot, where: str, component: str) -> NDArray:
-    """Return the (6,) unit screw, or unit load wrench, of a component."""
+    """Return the unit screw or unit wrench of a component, (6,)."""
     if component == THREAD:
         return own_screw(robot.frame(where))
     return np.eye(6)[(LOADS if where == "load" else AXES).index(component)]
 
 
 def parameters_of(function: Function, component: str) -> dict[str, float]:
-    """Return the parameters of a function for one component, without its prefix."""
+    """Return the parameters of a function for one component."""
     own: dict[str, float] = {}
     for name, value in function.parameters.items():
         whose, _, rest = name.partition(".")
@@ -119,7 +117,7 @@ def parameters_of(function: Function, component: str) -> dict[str, float]:
 
 
 def columns_of(function: Function, component: str) -> list[str]:
-    """Return the names of the linear coefficients of a function, without prefix."""
+    """Return the names of the linear coefficients of a function."""
     if function.form == FORMULA:
         return []
     shapes = shape_names(FORMS[function.form], len(function.variables))
@@ -127,12 +125,12 @@ def columns_of(function: Function, component: str) -> list[str]:
 
 
 def basis(conditions: Conditions, function: Function, names: Sequence[str]) -> NDArray:
-    """Evaluate the basis column of each linear coefficient of a function.
+    """Evaluate the basis columns of a function.
 
     Args:
         conditions: conditions of R measurements.
-        function: function with a form (not a formula) whose variables are not wrenches;
-            only its shape parameters are used.
+        function: function with a form and without wrenches.  Only its shape parameters
+            are used.
         names: p names of columns, such as ``"1.sine"``.
 
     Returns:
@@ -144,15 +142,15 @@ def basis(conditions: Conditions, function: Function, names: Sequence[str]) -> N
 
 
 def inputs_of(conditions: Conditions, function: Function) -> NDArray:
-    """Evaluate the inputs of a function from its variables and their history.
+    """Evaluate the inputs of a function.
 
     Args:
         conditions: conditions of R measurements.
         function: the function.
 
     Returns:
-        (R, k) inputs: the variables, NaN for wrenches.  For a form with memory, the
-        first variable is replaced by the state.
+        (R, k) values of the variables, NaN for wrenches.  For a form with memory, the
+        state replaces the first variable.
     """
     first, *further = function.variables
     inputs = [_now(conditions, name) for name in further]
@@ -167,7 +165,7 @@ def inputs_of(conditions: Conditions, function: Function) -> NDArray:
         angle = inputs[0] if inputs else _now(conditions, first)
         return np.column_stack([history.direction(first)[row], angle])
     if form.name == "reversal":
-        # friction depends on the magnitude of the load, not its sign
+        # Friction depends on the magnitude of the load.
         sizes = [
             np.abs(x) if name.startswith("load.") else x
             for name, x in zip(further, inputs, strict=True)
@@ -175,7 +173,7 @@ def inputs_of(conditions: Conditions, function: Function) -> NDArray:
         return np.column_stack([history.direction(first)[row], *sizes])
     shapes = parameters_of(function, function.components[0])
     late = shapes["time_constant"]
-    # if the variable is time, the input is the lagged response to a unit step at time 0
+    # For the variable time, the input is the lagged response to a unit step at time 0.
     if first in CLOCKS:
         return np.column_stack([1.0 - history.fading(late), history.fading(late)])[row]
     lagged = history.lagged(first, late, held=form.name == "creep")
@@ -183,7 +181,7 @@ def inputs_of(conditions: Conditions, function: Function) -> NDArray:
 
 
 def _now(conditions: Conditions, name: str) -> NDArray:
-    """Return the (R,) values of a variable, from recorded readings if available."""
+    """Return the values of a variable, if possible from the history, (R,)."""
     if name.startswith("wrench."):
         return np.full(len(conditions), np.nan)
     if conditions.history is not None and conditions.row is not None:
@@ -221,9 +219,8 @@ def variable_names(variables: Sequence[str]) -> dict[str, int]:
         variables: public names of the variables.
 
     Returns:
-        Index of the variable by name.  Possible names are the last part of the public
-        name; its first part, if unique; and the whole public name with ``_`` instead of
-        dots.
+        Index of the variable for each name.  Names are the last part of the public
+        name, its first part if unique, and the public name with ``_`` in place of dots.
     """
     indices: dict[str, list[int]] = {}
     for k, name in enumerate(variables):
@@ -238,12 +235,12 @@ def apply_functions(
     functions: Iterable[Function],
     recorded: Conditions | None = None,
 ) -> Conditions:
-    """Apply functions to the conditions, each in its session.
+    """Apply functions to the conditions of their sessions.
 
     Args:
         conditions: conditions of R measurements.
         functions: functions to apply.
-        recorded: conditions before other effects, from which the inputs are taken.
+        recorded: conditions without effects, from which the inputs are computed.
 
     Returns:
         The conditions with all functions applied.
@@ -261,7 +258,7 @@ def apply_functions(
 
 
 def in_session(conditions: Conditions, session: str | None) -> NDArray:
-    """Return an (R,) mask of the readings of a session; all True for None."""
+    """Return a mask (R,) of the readings of a session; all True for None."""
     if session is None:
         return np.ones(len(conditions), dtype=bool)
     if conditions.session is None:
@@ -293,7 +290,7 @@ def _with_function(
 
 
 def _check_finite(function: Function, values: NDArray, inputs: NDArray) -> None:
-    """Reject a function that is not finite for a measurement in which it acts."""
+    """Raise BadInput if a function is not finite in a measurement."""
     for row in np.flatnonzero(~np.isfinite(values))[:1]:
         known = zip(function.variables, inputs[row], strict=False)
         where = ", ".join(f"{name} = {x:g}" for name, x in known)
@@ -310,8 +307,8 @@ def _yielding(
     inputs: NDArray,
     acts: NDArray,
 ) -> Conditions:
-    """Add a compliant location whose deflection depends on the local wrench."""
-    slots: dict[int, int] = {}  # column of the inputs for each wrench, by its index
+    """Add a compliance with a law to the conditions."""
+    slots: dict[int, int] = {}  # column of the inputs for each wrench index
     through: list[tuple[str, int]] = []
     for k, name in enumerate(function.variables):
         if name.startswith("wrench."):
@@ -353,8 +350,8 @@ def in_session_alone(
         session: name of the session in which the effects act.
 
     Returns:
-        The entries of ``changed`` in this session, and those of ``conditions``
-        elsewhere.
+        Conditions that equal ``changed`` in this session, and ``conditions`` in other
+        sessions.
     """
     acts = in_session(conditions, session)[:, None]
 

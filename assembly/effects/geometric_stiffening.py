@@ -1,4 +1,4 @@
-"""Stiffness change due to preload and finite rotations, computed by the exact model."""
+"""Stiffness change due to preload and finite rotations."""
 
 from dataclasses import replace
 

@@ -5,8 +5,7 @@ A distribution registers an :class:`forcefit.assembly.effects.effect.Effect`::
     [project.entry-points."forcefit.effects"]
     drive_gain = "their_package:DRIVE_GAIN"   # an Effect of this name
 
-The effect is imported on first use.  Its name must differ from the names of effects of
-forcefit.
+The effect is imported on first use.  Its name must be unique.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -28,8 +27,8 @@ GROUP = "forcefit.effects"
 class Library(Mapping[str, Effect]):
     """Effects by name, in the order in which they are applied.
 
-    Effects of other distributions are applied before the foundation, which is the last
-    effect of forcefit and adds a frame.
+    Effects of other distributions are applied before the foundation, the last effect of
+    forcefit.
 
     Args:
         own: effects of forcefit, in the order of application.
@@ -45,7 +44,7 @@ class Library(Mapping[str, Effect]):
         return tuple(name for name in found if name not in self._own)
 
     def version(self, name: str) -> str:
-        """Return name and version of a distribution; empty for forcefit itself."""
+        """Return the name and version of a distribution; empty for forcefit."""
         return "" if name in self._own else version_of_installed(GROUP, name)
 
     def __getitem__(self, name: str) -> Effect:
@@ -76,7 +75,7 @@ class Library(Mapping[str, Effect]):
 
 
 def _naming_owner(effect: Effect, words: str) -> Effect:
-    """Make the errors of an effect name the distribution that defines it."""
+    """Add the name of the distribution to errors raised by an effect."""
     functions = {
         one.name: getattr(effect, one.name) for one in fields(effect)
         if callable(getattr(effect, one.name))

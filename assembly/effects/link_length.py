@@ -1,4 +1,4 @@
-"""Length error of a body, along its beam or the line between its joints."""
+"""Length error of a body along its beam or the line between its joints."""
 
 from forcefit.assembly.effects.effect import Effect, Unknown, Values
 from forcefit.assembly.effects.places import bodies, growing, lengthening, with_screws

@@ -1,4 +1,4 @@
-"""Load gain: applied load = gain x recorded load + constant."""
+"""Gain and offset of the load, applied load = gain x recorded load + offset."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Scale factor on a link's modulus: Young's modulus = factor x declared modulus."""
+"""Factor on Young's modulus of a link."""
 
 from dataclasses import replace
 from functools import partial
@@ -10,7 +10,7 @@ from forcefit.assembly.model.robot import BeamLink, Frame, MatrixLink, MeshLink,
 
 
 def links(robot: Robot) -> tuple[str, ...]:
-    """Return the frames whose elastic body declares material constants."""
+    """Return the frames whose link has a Young's modulus."""
     own = BeamLink | MeshLink | MatrixLink
     return tuple(f.name for f in robot.frames if isinstance(f.link, own))
 

@@ -10,7 +10,7 @@ from forcefit.assembly.measurement.conditions import Conditions
 from forcefit.assembly.model.frame import between_origins
 from forcefit.assembly.model.robot import BeamLink, Frame, Robot, beam_axis
 
-_LEAST = 1e-6  # [m] smallest length of a body between two origins
+_LEAST = 1e-6  # [m] smallest distance between the origins of a body
 
 
 def drives(robot: Robot) -> tuple[str, ...]:
@@ -29,7 +29,7 @@ def beams(robot: Robot) -> tuple[str, ...]:
 
 
 def bodies(robot: Robot) -> tuple[str, ...]:
-    """Return the frames whose bodies have a length: beams, or distinct end points."""
+    """Return the frames whose bodies have a length."""
     return tuple(
         f.name
         for f in robot.frames
@@ -38,7 +38,7 @@ def bodies(robot: Robot) -> tuple[str, ...]:
 
 
 def growing(robot: Robot) -> tuple[str, ...]:
-    """Return the bodies whose length can vary: beams, or all bodies without beams."""
+    """Return the bodies whose length can vary."""
     return beams(robot) or bodies(robot)
 
 
@@ -49,9 +49,8 @@ def body_axis(frame: Frame) -> tuple[float, NDArray]:
         frame: frame of the body.
 
     Returns:
-        Length [m] and direction of the beam, a (3,) unit vector in the frame's axes.
-        Without a beam, both refer to the line from the parent's origin to the frame's
-        origin.
+        Length [m] and direction (3,) of the beam, in the frame's axes.  Without a beam,
+        they refer to the line from the parent's origin to the frame's origin.
     """
     if isinstance(frame.link, BeamLink):
         return beam_axis(frame)
@@ -87,11 +86,11 @@ def with_frame(
 
 
 def lengthening(frame: Frame) -> NDArray:
-    """Return the (6,) screw of a body that is longer by 1 m, in the frame's axes."""
+    """Return the screw of a body that is longer by 1 m, in the frame's axes, (6,)."""
     return np.concatenate([np.zeros(3), body_axis(frame)[1]])
 
 
 def own_unit(robot: Robot, parameter: str) -> str:
-    """Return the unit of a joint's own motion, ``rad`` or ``m``."""
+    """Return the unit of a joint coordinate, ``rad`` or ``m``."""
     frame = next(f for f in robot.frames if f.name == parameter)
     return "m" if frame.joint == "prismatic" else "rad"

@@ -1,4 +1,4 @@
-"""Registration: pose of the measuring frame, and position of the measured point."""
+"""Pose of the measuring frame, and position of the measured point (registration)."""
 
 from dataclasses import replace
 

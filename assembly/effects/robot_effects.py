@@ -1,4 +1,4 @@
-"""Apply the effects declared in a robot file at one posture."""
+"""Apply the effects of a robot file at one posture."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -18,7 +18,7 @@ from forcefit.results.display import html_table, short_repr
 
 @dataclass(frozen=True, eq=False)
 class AppliedEffects:
-    """Posture, load and gravity after the effects in the robot file are applied.
+    """Posture, load and gravity with the effects of a robot file.
 
     Attributes:
         posture: posture of the robot, with the resulting errors, springs, clearances
@@ -37,7 +37,7 @@ class AppliedEffects:
     __repr__, _repr_html_ = short_repr, html_table
 
     def reading(self, platform_screw: ArrayLike) -> NDArray:
-        """Return the (6,) [rad, m] device reading for a platform screw."""
+        """Return the device reading for a platform screw, (6,) [rad, m]."""
         return read(self.conditions, np.array(platform_screw, dtype=float)[None])[0]
 
 
@@ -49,13 +49,12 @@ def apply_robot_effects(
     *,
     finite: bool = False,
 ) -> AppliedEffects:
-    """Apply the effects declared in a robot file at one posture.
+    """Apply the effects of a robot file at one posture.
 
     Args:
-        posture: posture of the declared robot.
+        posture: posture of the robot without effects.
         load: (6,) [N m, N] wrench on the platform at its origin, base axes.
-        gravity: (3,) [m/s^2] gravity vector in base axes, in addition to gravity
-            introduced by effects.
+        gravity: (3,) [m/s^2] gravity vector in base axes, added to that of effects.
         covariates: values by name: ``temperature`` [K] above calibration, ``time`` [s],
             ``approach``, other variables of functions, and ``session``.
         finite: whether the exact model is used.
@@ -64,8 +63,8 @@ def apply_robot_effects(
         Posture, loads and conditions with the effects applied.
 
     Raises:
-        BadInput: an effect requires a covariate that is missing, or requires finite
-            motions while ``finite`` is False.
+        BadInput: an effect requires a missing covariate, or finite motions although
+            ``finite`` is False.
     """
     given = dict(covariates or {})
     robot = posture.robot
@@ -93,16 +92,16 @@ def apply_robot_effects(
 def check_covariates(
     robot: Robot, given: Mapping[str, float | str], *, finite: bool = False
 ) -> None:
-    """Reject effects that cannot be applied with the given covariates.
+    """Raise BadInput for effects that cannot be applied with the given covariates.
 
     Args:
-        robot: robot with its declared effects.
+        robot: robot with effects.
         given: values of the covariates by name.
         finite: whether the exact model is used.
 
     Raises:
-        BadInput: a covariate is unknown, an effect requires a covariate that is
-            missing, or an effect requires finite motions.
+        BadInput: a covariate is unknown, or an effect requires a missing covariate or
+            finite motions.
     """
     session = given.get("session")
     needed = covariates_of(robot, [str(session)])

@@ -1,4 +1,4 @@
-"""Weight of links and bodies, for a model declared without gravity."""
+"""Weight of links and bodies."""
 
 from dataclasses import replace
 

@@ -17,18 +17,18 @@ from forcefit.assembly.model.function import Function
 from forcefit.assembly.model.robot import Robot
 
 _COVARIATES: dict[str, Unit] = {"temperature": {"K": 1}, "time": {"s": 1}}
-_ANGLE: Unit = {}  # rad counts as dimensionless
+_ANGLE: Unit = {}  # rad is dimensionless
 
 
 def variable_unit(robot: Robot, name: str) -> Unit:
-    """Return the unit of a variable as exponents of m, N, s, K or of a covariate name.
+    """Return the unit of a variable as exponents of m, N, s, K and covariate names.
 
     Args:
         robot: robot with the variable.
         name: public name of the variable.
 
     Returns:
-        The unit; empty for angles and signs.
+        Exponents by unit; empty for dimensionless variables.
     """
     kind, _, rest = name.partition(".")
     if kind == "q":
@@ -58,14 +58,14 @@ def result_unit(function: Function, component: str) -> Unit:
 
 
 def units_of(robot: Robot, function: Function) -> dict[str, str]:
-    """Return the units of the parameters of a function, as written in robot files.
+    """Return the units of the parameters of a function in robot files.
 
     Args:
         robot: robot on which the function acts.
         function: any function.
 
     Returns:
-        Unit by parameter, such as ``"rad/K"``.
+        Unit of each parameter, such as ``"rad/K"``.
     """
     units: dict[str, str] = {}
     for component in function.components:
@@ -114,7 +114,7 @@ def _parameter_unit(
 
 
 def turning_variables(function: Function) -> tuple[str, ...]:
-    """Return the variables whose ``period`` is the period of a harmonic."""
+    """Return the variables of a function that have a ``period``."""
     if function.form == "reversal_waves":
         return function.variables[-1:]
     if function.form == "scaled_waves":
@@ -123,5 +123,5 @@ def turning_variables(function: Function) -> tuple[str, ...]:
 
 
 def whole_unit(unit: Unit) -> str:
-    """Format the unit of a variable; ``rad`` if it is dimensionless."""
+    """Return the unit of a variable as text, ``rad`` if dimensionless."""
     return unit_text(unit) if unit else "rad"

@@ -1,9 +1,9 @@
-"""Selection of the compiled module that fits the processor, at import.
+"""Select the compiled module for the processor at import.
 
 For x86-64 processors, there is one module for each level of the instruction set (x86-64
-psABI).  The results of all modules are bit-identical.  By default, the highest level of
-the processor is used.  The environment variable ``FORCEFIT_MARCH`` selects another
-level.  For all other processors, there is a single module.
+psABI), with bit-identical results.  The highest level of the processor is used unless
+the environment variable ``FORCEFIT_MARCH`` selects another level.  For other
+processors, there is a single module.
 """
 
 import os
@@ -20,10 +20,10 @@ _VARIABLE = "FORCEFIT_MARCH"
 
 
 def levels_here() -> list[str]:
-    """Return the levels of this processor, the lowest first; none except on x86-64.
+    """Return the instruction levels of this processor, the lowest first.
 
     Returns:
-        Names in :data:`LEVELS`.
+        Names in :data:`LEVELS`; none for processors other than x86-64.
 
     Raises:
         ImportError: the compiled modules are missing.

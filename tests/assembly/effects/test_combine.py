@@ -1,4 +1,4 @@
-"""Combination of a declared effect with a fitted difference."""
+"""Combination of two effects of the same kind."""
 
 import numpy as np
 import pytest
@@ -50,7 +50,7 @@ IN_TURN = {
 
 @pytest.fixture(scope="module")
 def standing():
-    """Three elastic drives and two tubes under load, at some temperature and time."""
+    """Return conditions of a robot with three elastic drives under load."""
     turning = {"joint": "revolute", "actuated": True, "joint_stiffness": SPRING}
     robot = Robot("arm", "tool", (
         Frame("j1", **turning),
@@ -65,9 +65,7 @@ def standing():
 
 
 @pytest.mark.parametrize("name", IN_TURN)
-def test_combined_effect_predicts_the_reading_of_both_effects_in_sequence(
-    name, standing
-):
+def test_combined_effect_equals_both_effects_in_sequence(name, standing):
     declared, found = ({name: values} for values in IN_TURN[name])
     in_turn = predict(apply_effects(apply_effects(standing, declared), found)).deviation
     once = predict(apply_effects(standing, combined(declared, found))).deviation
@@ -77,7 +75,7 @@ def test_combined_effect_predicts_the_reading_of_both_effects_in_sequence(
 
 
 def test_every_additive_effect_has_a_combination_case():
-    """Clearances add up, contact laws do not, and finite motions have no parameter."""
+    """Every effect except those without a sum is in the list of cases."""
     others = {"joint_clearance", "contact_stiffening", "geometric_stiffening"}
     assert IN_TURN.keys() | others == LIBRARY.keys()
 
@@ -88,7 +86,7 @@ def test_combined_joint_clearances_are_their_sums():
     assert both["joint_clearance"] == pytest.approx({"a.radial": 3e-5, "a.tilt": 1e-4})
 
 
-def test_effects_at_different_places_are_combined_without_change():
+def test_effects_at_different_frames_do_not_change():
     declared = {"drift": {"amplitude.tz": 1e-5, "time_constant": 60.0}}
     found = {"encoder_offset": {"a": 1e-4}}
     assert combined(declared, found) == declared | found
@@ -97,7 +95,7 @@ def test_effects_at_different_places_are_combined_without_change():
 
 
 def test_effects_with_different_exponents_or_time_constants_cannot_be_combined():
-    """Springs in series with different exponents, and different time constants."""
+    """There is no equivalent single effect."""
     law = {"a.coefficient": 1e7, "a.exponent": 1.5}
     slow, slower = ({"a": 1e-5, "a.time_constant": t} for t in (60.0, 90.0))
     with pytest.raises(ValueError, match="two delayed expansions"):

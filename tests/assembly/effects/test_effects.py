@@ -1,4 +1,4 @@
-"""Every effect of the library, compared with a closed form for a single-beam arm."""
+"""Effects of the library, compared with closed forms for a single-beam arm."""
 
 from dataclasses import replace
 from math import cos, exp, pi, sin
@@ -19,12 +19,12 @@ from forcefit.assembly.robots import load_robot
 
 L, RADIUS, E, NU, RHO = 0.8, 0.015, 70e9, 0.33, 2700.0
 AREA, I = pi * RADIUS**2, pi * RADIUS**4 / 4
-K = 4e4  # N m/rad of the drive, where it is elastic
+K = 4e4  # [N m/rad] stiffness of elastic drives
 G = 9.81
 
 
 def arm(stiffness=None, rigid=False, theory="euler"):
-    """A drive about z at the base, and a beam along x to the tip."""
+    """Return an arm with a drive about z and a beam along x."""
     beam = BeamLink({"radius": RADIUS}, E, NU, RHO, theory=theory)
     K_B = None
     if stiffness is not None:
@@ -41,21 +41,21 @@ def here(robot, load=(0, 0, 0, 0, 0, 0), q=0.0, **covariates):
 
 
 def change(conditions, name, values):
-    """Change of the reading due to an effect."""
+    """Return the change of the reading due to an effect."""
     with_effect = predict(apply_effects(conditions, {name: values}))
     assert list(with_effect.reason) == [""] * len(conditions)
     return (with_effect.deviation - predict(conditions).deviation)[0]
 
 
-def test_self_weight_deflects_a_cantilever_as_in_closed_form():
-    """q L^4 / 8 E I and q L^3 / 6 E I of a cantilever."""
+def test_self_weight_deflection_equals_the_closed_form():
+    """The deflection is q L^4 / 8 E I, and the slope q L^3 / 6 E I."""
     q = RHO * AREA * G
     seen = change(here(arm()), "self_weight", {"g.z": -G})
     expected = [0, q * L**3 / (6 * E * I), 0, 0, 0, -q * L**4 / (8 * E * I)]
     assert seen == pytest.approx(expected, rel=1e-12, abs=1e-18)
 
 
-def test_thermal_expansion_lengthens_the_beam_along_its_axis():
+def test_thermal_expansion_increases_the_beam_length():
     seen = change(
         here(arm(), temperature=12.0, q=0.4), "thermal_expansion", {"tip": 23e-6}
     )
@@ -63,7 +63,7 @@ def test_thermal_expansion_lengthens_the_beam_along_its_axis():
     assert seen == pytest.approx([0, 0, 0, dL * cos(0.4), dL * sin(0.4), 0], abs=1e-18)
 
 
-def test_drive_compliance_rotates_the_drive_by_moment_over_stiffness():
+def test_drive_compliance_equals_rotation_divided_by_moment():
     F = 30.0
     seen = change(
         here(arm(rigid=True), (0, 0, 0, 0, F, 0)), "drive_compliance", {"drive": K}
@@ -71,11 +71,11 @@ def test_drive_compliance_rotates_the_drive_by_moment_over_stiffness():
     assert seen == pytest.approx([0, 0, F * L / K, 0, F * L**2 / K, 0], rel=1e-6)
 
 
-def test_base_compliance_deflects_by_the_force_and_its_moment():
+def test_base_compliance_includes_the_moment_of_the_force():
     F = 50.0
     stiff = {"stiffness.ry": 2e5, "stiffness.tz": 1e6}
     seen = change(here(arm(), (0, 0, 0, 0, 0, F)), "base_compliance", stiff)
-    turn = -F * L / 2e5  # an upward force at the tip rotates the base about -y
+    turn = -F * L / 2e5  # An upward force at the tip rotates the base about -y.
     expected = [0, turn, 0, 0, 0, F / 1e6 - turn * L]
     assert seen == pytest.approx(expected, rel=1e-6, abs=1e-12)
 
@@ -86,7 +86,7 @@ def test_encoder_offset_rotates_the_arm_by_the_offset():
     assert seen == pytest.approx(expected, rel=1e-4, abs=1e-10)
 
 
-def test_encoder_eccentricity_adds_a_sine_of_one_period_per_turn():
+def test_encoder_eccentricity_adds_one_sine_period_per_turn():
     values = {"drive.amplitude": 2e-5, "drive.phase": 0.9}
     for q in (-1.2, 0.0, 2.0):
         seen = change(here(arm(), q=q), "encoder_eccentricity", values)
@@ -94,8 +94,8 @@ def test_encoder_eccentricity_adds_a_sine_of_one_period_per_turn():
 
 
 @pytest.mark.parametrize("frame", ["drive", "tip"])
-def test_body_without_a_beam_expands_along_the_line_between_its_joints(frame):
-    """A drive 0.3 m above the base, and a bar to the tip at 0.4 rad."""
+def test_body_without_a_beam_expands_along_its_joint_line(frame):
+    """The bar is at an angle of 0.4 rad."""
     robot = arm(rigid=True)
     first = replace(robot.frames[0], translation=np.array([0, 0, 0.3]))
     robot = replace(robot, frames=(first, robot.frames[1]))
@@ -108,7 +108,7 @@ def test_body_without_a_beam_expands_along_the_line_between_its_joints(frame):
     assert longer == pytest.approx([0, 0, 0, *(1e-4 * unit)], abs=1e-18)
 
 
-def test_delayed_expansion_lags_the_temperature_with_its_time_constant():
+def test_delayed_expansion_equals_the_lagged_temperature():
     """For a ramp r t, the body temperature is r (t - T + T exp(-t/T))."""
     time, late = np.array([0.0, 50.0, 80.0, 300.0]), 100.0
     rows = together([place_robot(arm(), joints={"drive": 0.0})] * 4)
@@ -132,8 +132,8 @@ def test_device_scale_multiplies_positions_from_the_device_origin():
     assert seen[3:] == pytest.approx(1e-3 * np.array([-at[1], 1 + at[0], 0]), abs=1e-12)
 
 
-def test_body_mass_effect_deflects_the_beam_as_in_closed_form():
-    """m g L^3/3 E I for a mass at the tip, and m c g L^2/2 E I for an offset centre."""
+def test_deflection_due_to_body_mass_equals_the_closed_form():
+    """The deflection is m g L^3/3 E I, plus m c g L^2/2 E I for an offset c."""
     there = replace(here(arm()), gravity=np.array([[0, 0, -G]]))
     seen = change(there, "body_mass", {"tip.mass": 3.0})
     assert seen[5] == pytest.approx(-3.0 * G * L**3 / (3 * E * I), rel=1e-9)
@@ -142,7 +142,7 @@ def test_body_mass_effect_deflects_the_beam_as_in_closed_form():
 
 
 def test_registration_applies_a_finite_rotation_and_translation():
-    """p' = R p + t for the device frame; the tool moves with the platform."""
+    """The measured point is p' = R p + t."""
     b, t = 0.3, np.array([0.01, -0.02, 0.03])
     values = {"base.rz": b, "base.tx": t[0], "base.ty": t[1], "base.tz": t[2]}
     seen = change(here(arm(), q=0.5), "registration", values)
@@ -162,9 +162,9 @@ def test_modulus_scale_divides_the_bending_deflection():
 
 
 def test_load_moves_a_joint_to_the_bound_of_its_clearance():
-    """The joint moves by the radius c and the tilt t in the direction of the load."""
+    """The joint moves by the radial clearance and the tilt clearance."""
     values = {"drive.radial": 2e-5, "drive.axial": 1e-5, "drive.tilt": 3e-5}
-    # force along y and z at the tip: moment (0, -Fz L, Fy L) at the drive
+    # The forces along y and z cause the moment (0, -Fz L, Fy L) at the drive.
     seen = change(
         here(arm(rigid=True), (0, 0, 0, 0, 3.0, 4.0)), "joint_clearance", values
     )
@@ -179,7 +179,7 @@ def test_unloaded_clearance_leaves_the_reading_undetermined():
     assert found.deviation == pytest.approx(0.0, abs=1e-18)
 
 
-def test_friction_rotates_an_elastic_drive_against_the_approach_direction():
+def test_friction_rotates_the_drive_against_the_approach():
     for approach in (-1.0, 1.0):
         seen = change(
             here(arm(K), approach=approach), "friction_hysteresis", {"drive": 2.0}
@@ -187,8 +187,8 @@ def test_friction_rotates_an_elastic_drive_against_the_approach_direction():
         assert seen[2] == pytest.approx(-2.0 * approach / K, rel=1e-9)
 
 
-def test_effects_of_a_driven_screw_move_along_its_thread():
-    """Each rotates the nut by an angle, which moves it by the lead times the angle."""
+def test_effects_on_a_helical_drive_move_the_nut_along_its_thread():
+    """A rotation of the nut translates it by the lead times the angle."""
     lead, F = 0.004 / (2 * pi), 500.0
     K_B = np.diag([np.inf, np.inf, K, np.inf, np.inf, np.inf])
     drive = Frame("drive", joint="helical", pitch=0.004, actuated=True)
@@ -207,7 +207,7 @@ def test_effects_of_a_driven_screw_move_along_its_thread():
 
 
 @pytest.mark.parametrize("exponent", [1.5, 2.0, 3.0])
-def test_contact_stiffening_deflects_by_its_power_law(exponent):
+def test_contact_deflection_equals_the_power_law(exponent):
     F, c = -25.0, 1e7
     values = {"drive.coefficient": c, "drive.exponent": exponent}
     seen = change(
@@ -216,7 +216,7 @@ def test_contact_stiffening_deflects_by_its_power_law(exponent):
     assert seen[2] == pytest.approx(-((abs(F) * L / c) ** (1 / exponent)), rel=1e-9)
 
 
-def test_load_gain_scales_and_offsets_the_recorded_load():
+def test_load_gain_multiplies_the_recorded_load():
     F = 20.0
     values = {"factor": 1.1, "offset.fz": 5.0}
     seen = change(here(arm(), (0, 0, 0, 0, F, 0)), "load_gain", values)
@@ -224,7 +224,7 @@ def test_load_gain_scales_and_offsets_the_recorded_load():
     assert seen[4:] == pytest.approx([0.1 * F * give, 5.0 * give], rel=1e-4)
 
 
-def test_geometric_stiffening_of_a_hinged_rod_equals_its_balance_equation():
+def test_rod_angle_with_geometric_stiffening_satisfies_equilibrium():
     """A rigid rod on a torsion spring satisfies k a = F L cos a - P L sin a."""
     P, F = 4e4, 200.0
     seen = change(
@@ -241,7 +241,7 @@ def test_drift_approaches_its_amplitude_exponentially():
     assert seen == pytest.approx([0, 2e-5 * part, 0, 1e-5 * part, 0, 0], abs=1e-18)
 
 
-# all measurements together, compared with the cone solver one by one
+# parameters of the effects that are compared with the cone solver
 CASES = {
     "drive_compliance": {"leg1.drive": 3e4, "leg2.drive": 5e4},
     "self_weight": {"g.x": 1.0, "g.z": -G},
@@ -254,7 +254,7 @@ CASES = {
 
 @pytest.fixture(scope="module")
 def parallel():
-    """A 3-RRR robot with elastic links, at two postures under different loads."""
+    """Return a 3-RRR robot with elastic links at two postures under loads."""
     robot = load_robot("3rrr")
     beam = BeamLink({"radius": 0.012, "inner_radius": 0.008}, 70e9, 0.33, 2700.0)
     links = {
@@ -275,7 +275,7 @@ def parallel():
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_effects_on_all_measurements_together_match_the_cone_solver(name, parallel):
+def test_effects_on_many_measurements_agree_with_the_cone_solver(name, parallel):
     there = apply_effects(parallel, {name: CASES[name]})
     fast = predict(there).deviation
     slow = read(
@@ -286,8 +286,8 @@ def test_effects_on_all_measurements_together_match_the_cone_solver(name, parall
     assert np.abs(fast - slow).max() < 1e-7 * np.abs(fast).max()
 
 
-def test_friction_requires_an_elastic_joint_and_slip_a_joint_without_clearance():
-    """Friction: a joint spring of any stiffness. Slip: no clearance except spin."""
+def test_friction_and_slip_are_limited_to_suitable_joints():
+    """Friction requires a joint spring."""
     own = np.diag([np.inf, np.inf, 0.4, np.inf, np.inf, np.inf])
     robot = Robot("chain", "tip", (
         Frame("soft", joint="revolute", actuated=True, joint_stiffness=own),

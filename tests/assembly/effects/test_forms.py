@@ -1,4 +1,4 @@
-"""Columns of function forms, compared with SciPy, NumPy and their definitions."""
+"""Basis columns of functions, compared with SciPy and NumPy."""
 
 import numpy as np
 import pytest
@@ -39,7 +39,7 @@ def test_natural_spline_equals_scipy():
     assert found == pytest.approx(expected, rel=1e-12)
 
 
-def test_spline_of_two_variables_is_the_product_of_two_splines():
+def test_spline_of_two_variables_equals_the_product_of_splines():
     names = [f"{j}.{k}" for j in (1, 2, 3) for k in (1, 2)]
     ends = {"first.1": -1.0, "last.1": 1.0, "first.2": -1.0, "last.2": 1.0}
     found = FORMS["spline"].basis(names, [X, Y], ends)
@@ -70,9 +70,7 @@ def test_spline_roughness_equals_the_integral_of_squared_curvature():
     ("reversal", 2, ["1"], ["1.1"]),
     ("step", 1, ["size"], []),
 ])  # fmt: skip
-def test_column_names_must_be_whole_numbers_within_their_range(
-    form, count, known, unknown
-):
+def test_column_names_are_integers_within_their_range(form, count, known, unknown):
     found = {name: FORMS[form].is_column(name, count) for name in known + unknown}
     assert found == dict.fromkeys(known, True) | dict.fromkeys(unknown, False)
 
@@ -84,7 +82,7 @@ def test_spline_of_fewer_than_three_knots_has_zero_roughness(count):
 
 
 def test_knee_changes_its_slope_at_the_given_load():
-    """Compliance 2 rad/(N m) up to 3 N m and 0.5 beyond, with a jump of 0.1."""
+    """The compliance is 2 rad/(N m) up to 3 N m, and 0.5 for larger moments."""
     load = np.array([-5.0, -3.0, -1.0, 0.0, 2.0, 7.0])
     found = FORMS["knee"].basis(["below", "above"], [load], {"at": 3.0})
     assert found @ [2.0, 0.5] == pytest.approx([-7, -6, -2, 0, 4, 8])
@@ -92,7 +90,7 @@ def test_knee_changes_its_slope_at_the_given_load():
     assert 0.1 * jump[:, 0] == pytest.approx([-0.1, -0.1, -0.1, 0, 0.1, 0.1])
 
 
-def test_scaled_waves_are_harmonics_times_the_second_variable():
+def test_scaled_waves_equal_harmonics_times_the_second_variable():
     force = np.linspace(-3.0, 5.0, len(X))
     found = FORMS["scaled_waves"].basis(["0.cosine", "2.sine"], [X, force], {})
     assert found == pytest.approx(np.column_stack([force, force * np.sin(2 * X)]))

@@ -1,4 +1,4 @@
-"""Formulas: values from Python's eval, units by hand, and rejection of other code."""
+"""Values and units of formulas, and rejection of invalid formulas."""
 
 import math
 
@@ -38,9 +38,9 @@ def test_formula_value_equals_python_eval(text):
     "q; q", "1j", "a and b", "q % 2", "q // 2",
 ])  # fmt: skip
 def test_text_that_is_not_a_formula_is_rejected(text):
-    if text == "sin":  # a name like any other, which is not declared
+    if text == "sin":  # A function name without brackets is treated as a variable.
         assert names_in(parse_formula(text)) == ["sin"]
-    elif text.startswith("(("):  # brackets alone are no depth
+    elif text.startswith("(("):  # Repeated brackets do not increase the depth.
         assert names_in(parse_formula(text)) == ["q"]
     else:
         with pytest.raises(BadInput):
@@ -75,7 +75,7 @@ def test_formula_with_inconsistent_units_is_rejected(text, variables, result):
 
 @pytest.mark.parametrize("around", ["-{}", "+{}", "abs({})", "(a+{})", "({}*a)"])
 def test_formula_nested_deeper_than_fifty_operations_is_rejected(around):
-    """Each kind of operation is nested on either side."""
+    """Operations are nested on both sides."""
     text = "q"
     for _ in range(50):
         text = around.format(text)
@@ -90,8 +90,8 @@ def test_formula_longer_than_500_characters_is_rejected():
         parse_formula("q" * 501)
 
 
-def test_exponents_of_units_add_up_across_powers():
-    """(a t)^2 sqrt(b t) / t is a length, which determines a and b up to one unit."""
+def test_unit_exponents_of_powers_add_up():
+    """The result (a t)^2 sqrt(b t) / t is a length."""
     tree = parse_formula("(a*t)**2*t**0.5*sqrt(b)/t")
     found = parameter_units(tree, {"t": S}, M)
     a, b = ({**dict.fromkeys("ms", 0), **found[name]} for name in "ab")

@@ -1,4 +1,4 @@
-"""Functions in robot files, compared with closed forms and equivalent springs."""
+"""Functions of robot files, compared with closed forms and equivalent springs."""
 
 from dataclasses import replace
 from math import cos, exp, sin
@@ -25,7 +25,7 @@ RIGID = arm(rigid=True)
 
 
 def seen(conditions, *functions):
-    """Change of the reading due to functions."""
+    """Return the change of the reading due to functions."""
     both = predict(apply_functions(conditions, functions))
     assert list(both.reason) == [""] * len(conditions)
     return both.deviation - predict(conditions).deviation
@@ -36,7 +36,7 @@ def at_drive(parameters, form="powers", variables=("q.drive",), **more):
 
 
 def turned(angle, q):
-    """Reading of an arm whose drive is off by a small angle."""
+    """Return the reading of an arm with a small angular error of its drive."""
     return [0, 0, angle, -angle * L * sin(q), angle * L * cos(q), 0]
 
 
@@ -57,7 +57,7 @@ def test_formula_effect_rotates_the_drive_by_its_value():
 
 
 def test_base_functions_rotate_and_translate_the_whole_robot():
-    """The tip rotates about the base origin, or translates together with the base."""
+    """The tip moves with the base."""
     turn = Function("base", ("ry",), ("cov.tilt",), "powers", {"1": 1.0})
     shift = Function("base", ("tx",), ("temperature",), "powers", {"1": 1e-6})
     shift = replace(shift, variables=("cov.temperature",))
@@ -79,7 +79,7 @@ def test_load_and_reading_functions_change_the_load_and_the_reading():
 
 
 def test_compliance_function_equals_an_elastic_drive():
-    """M / k of an elastic drive whose compliance increases with the angle."""
+    """The deflection is M / k, where 1 / k increases with the angle."""
     soft = at_drive({"0": 1e-5, "2": 3e-5}, kind="compliance")
     F, q = 30.0, 0.7
     there = here(RIGID, (0, 0, 0, 0, F, 0), q=q)
@@ -109,7 +109,7 @@ def three_rrr(load):
 
 @pytest.mark.parametrize("exact", [False, True])
 def test_compliance_in_a_closed_chain_equals_a_joint_spring(exact):
-    """Newton's method for the function, compared with a spring of the robot."""
+    """The function is solved by Newton's method, the spring by the linear model."""
     there = replace(three_rrr([0, 0, 5, 40, -30, 0]), exact=exact)
     robot = there.robot
     names = [f.name for f in robot.frames if f.actuated]
@@ -125,8 +125,8 @@ def test_compliance_in_a_closed_chain_equals_a_joint_spring(exact):
     assert np.abs(spring - predict(there).deviation).max() > 1e-5
 
 
-def test_nonlinear_law_in_a_closed_chain_holds_at_the_solved_wrench():
-    """e = g(w), where w is the joint wrench of the same solution."""
+def test_nonlinear_law_in_a_closed_chain_is_satisfied():
+    """The deflection is e = g(w), where w is the joint wrench of the solution."""
     there = three_rrr([0, 0, 5, 40, -30, 0])
     name = next(f.name for f in there.robot.frames if f.actuated)
     law = Function(
@@ -143,7 +143,7 @@ def test_nonlinear_law_in_a_closed_chain_holds_at_the_solved_wrench():
 
 
 def campaign_of(times, **columns):
-    """Readings of an arm, measured in sequence."""
+    """Return conditions of an arm that is measured in sequence."""
     q = np.array(columns.pop("q", np.zeros(len(times))), dtype=float)
     coordinates = np.column_stack([q, np.zeros(len(q))])
     postures, _ = place_many_joints(RIGID, coordinates)
@@ -154,7 +154,7 @@ def campaign_of(times, **columns):
 
 
 def test_lag_function_approaches_its_gain_exponentially():
-    """A step of 10 K at time 0: gain 10 (1 - exp(-t / tau))."""
+    """The result of a step of 10 K is gain 10 (1 - exp(-t / tau))."""
     t = np.array([0.0, 50.0, 200.0, 700.0])
     rows = campaign_of(t, temperature=10.0)
     lag = at_drive({"gain": 1e-6, "time_constant": 300.0}, "lag", ("cov.temperature",))
@@ -163,7 +163,7 @@ def test_lag_function_approaches_its_gain_exponentially():
     )
 
 
-def test_selected_readings_retain_the_complete_history():
+def test_selected_readings_have_the_complete_history():
     t = np.linspace(0, 900, 10)
     rows = campaign_of(t, temperature=5 * np.sin(t / 200), q=np.sin(t / 100))
     lag = at_drive({"time_constant": 100.0}, "lag", ("cov.temperature",))
@@ -174,16 +174,16 @@ def test_selected_readings_retain_the_complete_history():
         assert some == pytest.approx(whole[[7, 2, 4]], rel=1e-12)
 
 
-def test_reversal_sign_follows_the_motion_since_the_previous_reading():
+def test_reversal_sign_equals_the_direction_of_motion():
     q = [0.0, 0.5, 0.5, 0.2, 0.9]
     rows = campaign_of(np.arange(5.0), q=q, approach=-1.0)
     back = at_drive({"0": 1e-5, "1": 1e-5}, "reversal", ("q.drive", "q.drive"))
-    side = np.array([-1, 1, 1, -1, 1])  # the first sign comes from the column
+    side = np.array([-1, 1, 1, -1, 1])  # the first sign is from the column ``approach``
     expected = side * (1e-5 + 1e-5 * np.array(q))
     assert seen(rows, back)[:, 2] == pytest.approx(expected, rel=1e-9)
 
 
-def test_slip_function_follows_the_drive_within_its_depth():
+def test_slip_function_moves_with_the_drive_within_its_depth():
     q = [0.0, 0.5, 0.5, 0.2, 0.9]
     rows = campaign_of(np.arange(5.0), q=q, approach=-1.0)
     slack = at_drive({"size": 1e-5, "depth": 0.5}, "slip", ("q.drive",))
@@ -191,7 +191,7 @@ def test_slip_function_follows_the_drive_within_its_depth():
     assert seen(rows, slack)[:, 2] == pytest.approx(expected, rel=1e-9, abs=1e-15)
 
 
-def test_reversal_waves_vary_the_backlash_over_one_turn():
+def test_backlash_by_reversal_waves_varies_over_one_turn():
     q = [0.0, 0.5, 0.5, 0.2, 0.9]
     rows = campaign_of(np.arange(5.0), q=q, approach=-1.0)
     side = np.array([-1, 1, 1, -1, 1])
@@ -203,7 +203,7 @@ def test_reversal_waves_vary_the_backlash_over_one_turn():
     assert seen(rows, scaled)[:, 2] == pytest.approx(expected, rel=1e-9)
 
 
-def test_session_effects_act_only_on_readings_of_their_session():
+def test_session_effects_do_not_act_on_other_sessions():
     rows = campaign_of(np.zeros(3), session=np.array(["a", "b", "a"]))
     own = at_drive({"0": 1e-5}, session="a")
     assert seen(rows, own)[:, 2] == pytest.approx([1e-5, 0, 1e-5], abs=1e-15)
@@ -214,7 +214,7 @@ def test_session_effects_act_only_on_readings_of_their_session():
     assert found[:, 5] == pytest.approx([0, 1e-4, 0], abs=1e-15)
 
 
-def test_creep_step_and_slow_wave_follow_their_formulas():
+def test_creep_step_and_slow_wave_equal_their_formulas():
     t = np.array([0.0, 100.0, 300.0])
     rows = campaign_of(t)
     creep = at_drive({"gain": 1e-5, "time_constant": 150.0}, "creep", ("time",))

@@ -1,4 +1,4 @@
-"""Effects with omitted parameters, and published parameters of fitted effects."""
+"""Effects with omitted parameters, and conversion of fitted parameters."""
 
 from dataclasses import replace
 from math import atan2, cos, hypot, sin
@@ -29,7 +29,7 @@ def test_contact_without_an_exponent_uses_the_hertz_exponent():
 
 
 @pytest.mark.parametrize("exponent", [None, 2.0])
-def test_fitted_contact_deflection_becomes_the_coefficient_at_1_newton_metre(exponent):
+def test_fitted_contact_deflection_becomes_a_coefficient(exponent):
     give, n = 1e-4, exponent or 1.5
     values = {"drive.give": give}
     if exponent:
@@ -41,7 +41,7 @@ def test_fitted_contact_deflection_becomes_the_coefficient_at_1_newton_metre(exp
 
 
 def test_encoder_sine_and_cosine_become_amplitude_and_phase():
-    """s sin q + c cos q = a sin(q + p)."""
+    """The amplitude a and phase p satisfy s sin q + c cos q = a sin(q + p)."""
     for values in ({"drive.sine": 2e-5, "drive.cosine": 3e-5}, {"drive.sine": -2e-5},
                    {"drive.cosine": 3e-5}):  # fmt: skip
         s, c = (values.get(f"drive.{part}", 0.0) for part in ("sine", "cosine"))
@@ -60,7 +60,7 @@ def test_friction_is_zero_without_an_approach_direction():
         assert seen[2] == pytest.approx(part * 2.0 / K, rel=1e-9, abs=1e-18)
 
 
-def test_joint_clearance_effect_adds_to_the_declared_clearance():
+def test_joint_clearance_effect_is_added_to_the_robot_clearance():
     robot = arm(rigid=True)
     drive = replace(robot.frames[0], clearance=Clearance(axial=2e-5))
     robot = replace(robot, frames=(drive, robot.frames[1]))
@@ -73,7 +73,7 @@ def test_joint_clearance_effect_adds_to_the_declared_clearance():
     assert public("joint_clearance", fitted) == {"drive.radial": 2e-9}
 
 
-def test_fitted_softening_becomes_a_factor_on_the_modulus():
+def test_fitted_modulus_change_becomes_a_factor():
     assert public("modulus_scale", {"tip.softer": 0.25}) == {"tip": 0.8}
     assert public("modulus_scale", {"tip.softer": -0.5}) == {"tip": 2.0}
 
@@ -86,7 +86,7 @@ def test_fitted_softening_becomes_a_factor_on_the_modulus():
     ("powers", ("time",), ["time"]),
     ("powers", ("q.drive",), []),
 ])  # fmt: skip
-def test_functions_name_the_covariates_of_their_sessions(form, variables, needed):
+def test_covariates_of_functions_depend_on_the_session(form, variables, needed):
     function = Function("drive", ("rz",), variables, form, {"1": 0.0})
     robot = replace(arm(), functions=(function,))
     assert list(covariates_of(robot, [])) == needed

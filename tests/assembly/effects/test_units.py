@@ -25,34 +25,34 @@ def test_variables_have_the_documented_units(robot, name, unit):
     assert variable_unit(robot, name) == unit
 
 
-# place, components; variables; form, numbers; their units
+# frame and components; variables; form and parameters; units
 UNITS = [
     ("tip rx", "position.x", "powers 1", "rad/m"),
     ("reading rz", "position.x", "powers 1", "rad/m"),
     ("load mx", "position.x", "powers 1", "N"),
     ("tip rz tx", "cov.temperature", "powers rz.1 tx.1", "rad/K, m/K"),
-    # powers of two variables divide by both
+    # Powers of two variables are divided by both units.
     ("tip tx", "position.x cov.temperature", "powers 0.0 1.0 2.1 3.2",
      "m, 1, 1/(m K), 1/(m^2 K^2)"),
-    # powers of a reversal refer to the variable on which its size depends
+    # Powers of a reversal refer to the second variable.
     ("drive tx", "q.drive load.fz", "reversal 0 2", "m, m/N^2"),
     ("drive tx", "q.drive", "reversal 0", "m"),
-    # scaled waves divide by their second variable alone
+    # Scaled waves are divided by the unit of the second variable.
     ("drive tx", "q.drive load.fz", "scaled_waves 1.sine", "m/N"),
     ("drive tx", "q.drive position.x", "reversal_waves 1.sine", "m"),
-    # a period has the unit of its variable
+    # A period has the unit of its variable.
     ("tip rz", "position.x load.fz", "scaled_waves period", "m"),
     ("tip tx", "time", "slow_wave period", "s"),
-    # a knee is a slope up to a load and beyond it; a depth is of what slips
+    # Parameters of a knee are slopes and a load; a depth has the unit of the variable.
     ("tip tx", "load.fz", "knee below above size at", "m/N, m/N, m, N"),
     ("drive tx", "load.fz", "slip size depth", "m, N"),
-    # the ends of a spline have the unit of their variable
+    # The ends of a spline have the unit of their variable.
     ("tip rz", "position.x cov.temperature",
      "spline first.1 last.1 first.2 last.2", "m, m, K, K"),
     ("drive rz", "cov.temperature", "lag gain start time_constant", "rad/K, rad, s"),
     ("drive rz", "time", "creep gain start time_constant", "rad, rad, s"),
 ]  # fmt: skip
-# a compliance is over the wrench of its component
+# The units of a compliance are divided by the unit of the wrench component.
 COMPLIANCES = [
     ("tip rz", "approach", "powers 1", "rad/(N m)"),
     ("tip tz", "approach", "powers 1", "m/N"),
@@ -64,7 +64,7 @@ COMPLIANCES = [
     ("kind", "place", "variables", "form", "units"),
     [("screw", *row) for row in UNITS] + [("compliance", *row) for row in COMPLIANCES],
 )
-def test_units_of_a_function_follow_from_its_variables(
+def test_units_of_function_parameters_depend_on_the_variables(
     kind, place, variables, form, units
 ):
     where, *components = place.split()
@@ -76,13 +76,13 @@ def test_units_of_a_function_follow_from_its_variables(
     assert ", ".join(units_of(RIGID, function).values()) == units
 
 
-def test_units_of_a_formula_make_its_value_an_angle():
+def test_units_of_formula_parameters_are_consistent():
     formula = Function("drive", ("rz",), ("time",), "formula", {"a": 1.0, "k": 1.0},
                        formula="a*exp(-k*time)")  # fmt: skip
     assert units_of(RIGID, formula) == {"a": "1", "k": "1/s"}
 
 
-EFFECTS = {  # by effect and parameter: units for a revolute arm and for a prismatic arm
+EFFECTS = {  # units for a revolute and for a prismatic arm
     ("encoder_offset", "drive"): ("rad", "m"),
     ("encoder_eccentricity", "drive.amplitude"): ("rad", "rad"),
     ("encoder_eccentricity", "drive.phase"): ("rad", "rad"),
@@ -103,7 +103,7 @@ EFFECTS = {  # by effect and parameter: units for a revolute arm and for a prism
 
 
 @pytest.mark.parametrize(("effect", "name"), EFFECTS)
-def test_effect_units_depend_on_the_kind_of_joint(effect, name):
+def test_effect_units_depend_on_the_joint_type(effect, name):
     unit = LIBRARY[effect].unit
     assert (unit(arm(), name), unit(SLIDES, name)) == EFFECTS[effect, name]
 

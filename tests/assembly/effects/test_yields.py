@@ -1,4 +1,4 @@
-"""Functions whose deformation depends on the wrench at the same or another frame."""
+"""Functions of wrenches at the same or another frame."""
 
 from dataclasses import replace
 from math import cos
@@ -18,7 +18,7 @@ from tests.assembly.effects.test_functions import (
     turned,
 )
 
-F = 30.0  # [N] across the arm
+F = 30.0  # [N] transverse force on the arm
 
 
 def loaded(q):
@@ -27,14 +27,14 @@ def loaded(q):
 
 @pytest.mark.parametrize("place", ["base", "drive"])
 def test_function_of_the_base_moment_rotates_the_drive(place):
-    """Base and drive share an origin, so both carry the same moment about z."""
+    """Base and drive have the same origin and therefore the same moment about z."""
     law = at_drive({"2": 1e-7}, variables=(f"wrench.{place}.mz",))
     turn = 1e-7 * (F * L * cos(0.5)) ** 2
     found = seen(loaded(0.5), law)[0]
     assert found == pytest.approx(turned(turn, 0.5), rel=1e-4, abs=1e-9)
 
 
-def test_compliance_linear_in_the_moment_matches_its_closed_form():
+def test_compliance_linear_in_the_moment_equals_the_closed_form():
     """The drive rotates by (c + d M) M."""
     soft = at_drive(
         {"0": 1e-5, "1": 2e-7}, variables=("wrench.drive.mz",), kind="compliance"
@@ -45,8 +45,8 @@ def test_compliance_linear_in_the_moment_matches_its_closed_form():
     assert found == pytest.approx(turned(turn, 0.3), rel=1e-3, abs=1e-8)
 
 
-def test_reversal_of_a_wrench_scales_with_the_absolute_moment():
-    """The deformation is the direction of motion times |M|, for either sign of M."""
+def test_reversal_is_proportional_to_the_absolute_moment():
+    """The deflection is the direction of motion times |M|."""
     q = [0.0, 0.5, 0.2]
     rows = campaign_of(np.arange(3.0), q=q, approach=1.0)
     side = np.array([1, 1, -1])

@@ -1,6 +1,6 @@
-"""Prints a digest of each kind of compiled answer; test_choice.py and .ci/clang run it.
+"""Print a digest of each kind of compiled result.
 
-Also what is to work where a wheel was installed and nothing else of the tests is.
+This program is run by test_choice.py and by .ci/clang.  It does not import other tests.
 """
 
 import hashlib
@@ -30,7 +30,7 @@ LOAD = [5.0, -3.0, 8.0, 60.0, 20.0, -90.0]
 
 
 def digest(answer):
-    """Of all floating-point numbers of an answer, in their order."""
+    """Return a digest of all floating-point numbers of a result."""
     found = hashlib.sha256()
 
     def take(one):
@@ -49,7 +49,7 @@ def digest(answer):
 
 
 def answers():
-    """Name, and answer, of problems that have more points than any level has lanes."""
+    """Yield names and results of problems with more points than lanes."""
     rng = np.random.default_rng(5)
     for name, k in (("five_bar", 11), ("hexapod", 9)):
         robot = load_robot(name)

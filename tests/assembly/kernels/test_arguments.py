@@ -1,4 +1,4 @@
-"""Arrays of a wrong shape, type or order are refused by name before they are read."""
+"""Rejection of arrays of wrong shape, type or memory order."""
 
 import _datetime as datetime
 import re
@@ -18,7 +18,7 @@ N, K = len(ROBOT.frames), 3
 
 
 def given():
-    """Arguments of (22) by their names, as they should be."""
+    """Return valid arguments of (22) by name."""
     joints, structure = structure_of(ROBOT)
     nu, nq = joints.cones.shape[1], joints.free.shape[1]
     m, ny = 6 * len(ROBOT.closures), joints.elastic.shape[1]
@@ -56,12 +56,12 @@ def read_only(array):
         lambda array: array[..., None],
         lambda array: array[None],
         lambda array: array.astype(np.float32),
-        lambda array: np.repeat(array, 2, axis=0)[::2],  # not one after the other
+        lambda array: np.repeat(array, 2, axis=0)[::2],  # not contiguous
         lambda array: array.tolist(),
         lambda array: "none",
     ],
 )
-def test_wrong_array_of_assemble_all_is_refused_by_name(name, spoil):
+def test_wrong_array_of_assemble_all_is_rejected(name, spoil):
     right = given()
     array = np.zeros((K, 2, N, 6)) if name == "loads" else right[name]
     with pytest.raises(ValueError, match=rf"^{name}: .*, expected .*of shape \("):
@@ -69,7 +69,7 @@ def test_wrong_array_of_assemble_all_is_refused_by_name(name, spoil):
 
 
 @pytest.mark.parametrize("name", [n for n in given() if n not in {"robot", "T"}])
-def test_array_with_a_wrong_number_of_points_is_refused_by_name(name):
+def test_array_with_a_wrong_number_of_points_is_rejected(name):
     right = given()
     array = np.zeros((K, 2, N, 6)) if name == "loads" else right[name]
     with pytest.raises(ValueError, match=rf"^{name}: .* \({K - 1},.* \({K},"):
@@ -77,7 +77,7 @@ def test_array_with_a_wrong_number_of_points_is_refused_by_name(name):
 
 
 @pytest.mark.parametrize("name", ["outcome", "energy", "elastic"])
-def test_read_only_output_array_is_refused(name):
+def test_read_only_output_array_is_rejected(name):
     wrong = given()
     with pytest.raises(ValueError, match=rf"^{name}: .*read-only, expected writable"):
         kernels.assemble_all(**wrong | {name: read_only(wrong[name])})
@@ -89,7 +89,7 @@ INDEXED = ("pattern_of", "spring_frame", "spring_order", "of_joint", "group_patt
 
 @pytest.mark.parametrize("name", INDEXED)
 @pytest.mark.parametrize("index", [-1, 10**6])
-def test_index_out_of_range_is_refused_with_its_position(name, index):
+def test_index_out_of_range_is_rejected(name, index):
     structure = structure_of(ROBOT)[1]
     wrong = getattr(structure, name).copy()
     wrong[-1] = index
@@ -99,7 +99,7 @@ def test_index_out_of_range_is_refused_with_its_position(name, index):
 
 @pytest.mark.parametrize("name", ["groups", "starts"])
 @pytest.mark.parametrize("at", [0, -1])
-def test_groups_that_do_not_match_their_rows_are_refused(name, at):
+def test_inconsistent_groups_are_rejected(name, at):
     structure = structure_of(ROBOT)[1]
     wrong = getattr(structure, name).copy()
     wrong[at] = 10**6
@@ -112,7 +112,7 @@ def test_groups_that_do_not_match_their_rows_are_refused(name, at):
     [("parents", [[0, 1]]), ("kinds", [7]), ("pairs", [[0, 99]]), ("moves", [[99, 1]]),
      ("groups", [1]), ("fixed", [1.0])],
 )  # fmt: skip
-def test_wrong_array_of_a_tree_is_refused_by_name(name, wrong):
+def test_wrong_array_of_a_tree_is_rejected(name, wrong):
     fields = nominal._tree(ROBOT)
     kernels.Tree(**fields)
     wrong = np.array(wrong, dtype=np.asarray(fields[name]).dtype)
@@ -123,7 +123,7 @@ def test_wrong_array_of_a_tree_is_refused_by_name(name, wrong):
 
 
 @pytest.mark.parametrize("name", ["G", "h", "d", "H", "k", "starts", "u", "y"])
-def test_wrong_array_of_interior_point_is_refused_by_name(name, rng):
+def test_wrong_array_of_interior_point_is_rejected(name, rng):
     right = {
         "G": rng.normal(size=(3, 5)), "h": np.ones(3), "d": np.ones(5),
         "H": rng.normal(size=(1, 5)), "k": np.zeros(1),
@@ -133,14 +133,14 @@ def test_wrong_array_of_interior_point_is_refused_by_name(name, rng):
     kernels.interior_point(**right)
     assert right["u"].any()
     shorter = right | {name: right[name][:-1].copy()}
-    # G and h, H and k: of two numbers of rows it is the second that is wrong
+    # If the numbers of rows of two arguments differ, the message is about the second.
     named = {"h": "G", "d": "G", "k": "H"}.get(name, name)
     with pytest.raises(ValueError, match=rf"^{named}\b"):
         kernels.interior_point(**shorter)
 
 
 def farther(rng):
-    """Arguments of farthest points along two directions, by their names."""
+    """Return valid arguments of farthest points by name."""
     d = rng.normal(size=(2, 5))
     return {
         "H": rng.normal(size=(1, 5)), "starts": np.array([0, 2, 3, 5]),
@@ -151,7 +151,7 @@ def farther(rng):
 
 
 def walk(rng):
-    """Of a walk of two screws."""
+    """Return valid arguments of a random walk."""
     M = rng.normal(size=(5, 3))
     return {
         "axes": M, "gram": M @ M.T, "starts": np.array([0, 2, 3, 5]),
@@ -172,7 +172,7 @@ CALLS = {"farthest_points": farther, "billiard_walk": walk}
         if isinstance(value, np.ndarray)
     ],
 )
-def test_wrong_array_of_other_kernels_is_refused_by_name(call, name, rng):
+def test_wrong_array_of_other_kernels_is_rejected(call, name, rng):
     right = CALLS[call](rng)
     getattr(kernels, call)(**right)
     with pytest.raises(ValueError, match=rf"^{name}: .*expected"):
@@ -180,8 +180,8 @@ def test_wrong_array_of_other_kernels_is_refused_by_name(call, name, rng):
 
 
 @pytest.mark.parametrize("random", ["rng", "datetime"])
-def test_object_that_is_not_a_bit_generator_is_refused(rng, random):
-    """Neither a generator nor the capsule of another library is accepted."""
+def test_object_other_than_a_bit_generator_is_rejected(rng, random):
+    """The object must be a NumPy bit generator."""
     given = {"rng": rng, "datetime": datetime.datetime_CAPI}
     with pytest.raises((TypeError, ValueError)):
         kernels.billiard_walk(**walk(rng) | {"random": given[random]})

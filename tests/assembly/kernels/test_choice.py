@@ -1,4 +1,4 @@
-"""Choice of the compiled module, and results that do not depend on it."""
+"""Selection of the compiled module, and equality of its results."""
 
 import hashlib
 import os
@@ -16,7 +16,7 @@ from forcefit.inputs.errors import BadInput
 
 PROGRAM = Path(__file__).with_name("levels_for_tests.py")
 ROOT = Path(__file__).parents[3]
-# x86-64 psABI, table 3.1, in Linux's words: what each level adds
+# additional processor flags of each level, x86-64 psABI, table 3.1
 FLAGS = {
     "x86-64-v2": "cx16 lahf_lm popcnt pni ssse3 sse4_1 sse4_2",
     "x86-64-v3": "avx avx2 bmi1 bmi2 f16c fma abm movbe",
@@ -26,7 +26,7 @@ x86_64 = pytest.mark.skipif(not levels_here(), reason="no levels elsewhere")
 
 
 def run(level, *words):
-    """A fresh Python's exit status and both of its outputs."""
+    """Run Python code; return the exit status and both outputs."""
     given = os.environ | {"FORCEFIT_MARCH": level, "PYTHONPATH": str(ROOT)}
     done = subprocess.run([sys.executable, *map(str, words)], env=given, text=True,
                           capture_output=True, cwd=ROOT, check=False)  # fmt: skip
@@ -35,7 +35,7 @@ def run(level, *words):
 
 @cache
 def digests(level):
-    """Name of the module used, and digests of its answers by their names."""
+    """Return the name of the module used, and digests of its results by name."""
     status, out, err = run(level, PROGRAM)
     assert status == 0, err
     first, *rows = out.splitlines()
@@ -45,12 +45,7 @@ def digests(level):
 @x86_64
 @pytest.mark.parametrize("level", LEVELS)
 def test_every_instruction_level_gives_bit_identical_results(level):
-    """Products and sums are rounded one by one, in the same order on every processor.
-
-    Energies with loads and without, margins, pose errors, compliances, draws and where
-    clearances then are, tracks and cones, of more points than there are lanes; one
-    point takes two lanes.
-    """
+    """Operations have the same order and rounding on every processor."""
     if level not in levels_here():
         pytest.skip("this processor has not got it")
     name = "_" + level.replace("-", "_")
@@ -63,7 +58,7 @@ def test_every_instruction_level_gives_bit_identical_results(level):
 
 @pytest.mark.skipif(not Path("/proc/cpuinfo").exists(), reason="no list of flags")
 @x86_64
-def test_available_instruction_levels_follow_from_the_processor_flags():
+def test_available_levels_depend_on_the_processor_flags():
     cpuinfo = Path("/proc/cpuinfo").read_text(encoding="utf-8")
     flags = next(line for line in cpuinfo.splitlines() if line.startswith("flags"))
     wanted, expected = set(), []
@@ -82,7 +77,7 @@ def test_highest_instruction_level_is_loaded_by_default(monkeypatch):
 
 @x86_64
 @pytest.mark.parametrize("level", ["x86-64-v9", "native", "haswell"])
-def test_unknown_instruction_level_is_refused_in_one_line(level):
+def test_unknown_instruction_level_is_rejected(level):
     words = "-m forcefit assembly solve five_bar --quantities margin"
     status, out, err = run(level, *words.split())
     assert (status, out) == (2, "")
@@ -92,7 +87,7 @@ def test_unknown_instruction_level_is_refused_in_one_line(level):
     )
 
 
-def test_instruction_level_above_that_of_the_processor_is_refused(monkeypatch):
+def test_instruction_level_above_that_of_the_processor_is_rejected(monkeypatch):
     monkeypatch.setattr(choice.platform, "machine", lambda: "x86_64")
     monkeypatch.setattr(choice, "_load", lambda _: SimpleNamespace(level=lambda: 3))
     monkeypatch.setenv("FORCEFIT_MARCH", "x86-64-v4")
@@ -118,7 +113,7 @@ def test_portable_module_is_loaded_on_another_architecture(monkeypatch):
         chosen()
 
 
-def test_missing_module_raises_an_import_error_with_the_remedy(monkeypatch):
+def test_missing_module_raises_an_import_error(monkeypatch):
     monkeypatch.setattr(choice, "find_spec", lambda _: None)
     with pytest.raises(
         ImportError, match=r"^forcefit.assembly.kernels.\w+ is not built: run `"
@@ -127,7 +122,7 @@ def test_missing_module_raises_an_import_error_with_the_remedy(monkeypatch):
 
 
 def test_compiled_module_was_built_from_the_current_sources():
-    """An outdated module would be tested in place of the sources; `make` builds it."""
+    """The module is built by `make`."""
     folder, listed = ROOT / "assembly" / "kernels", ""
     for path in sorted(folder.rglob("*.*"), key=Path.as_posix):
         if path.suffix in {".cpp", ".h"}:
