@@ -15,8 +15,8 @@ paper      quantity or problem                         function
 (21)       smallest t with every |u_c| <= t            ``zone.least_margin``
 (22)       minimum of E - work, every |u_c| <= 1       ``energy.least_energy``
 (23)-(26)  wrenches, from multipliers of the closures  ``assembled.Assembly``
-(27)       the set of dx_p that (22) leaves; its       ``pose_error.reachable_screws``,
-           farthest                                    ``ReachableSet.farthest``
+(27)       set of possible dx_p; bounds on its         ``pose_error.reachable_screws``,
+           largest element                             ``ReachableSet.farthest``
 =========  ==========================================  ===============================
 
 ``closure.py`` and ``assembled.py`` are in the parent folder because the compiled
