@@ -377,7 +377,7 @@ def place_many(
         be reached; and the reason for the failure, or an empty string.
 
     Raises:
-        BadInput: the robot's closures do not hold in its home pose.
+        BadInput: a loop of the robot is open in its home pose.
     """
     return _follow_many(robot, Target(pose=np.asarray(poses, dtype=float)))
 
@@ -396,7 +396,7 @@ def place_many_joints(
         Postures and reasons, see :func:`place_many`.
 
     Raises:
-        BadInput: the robot's closures do not hold in its home pose.
+        BadInput: a loop of the robot is open in its home pose.
     """
     return _follow_many(robot, Target(coordinates=np.asarray(coordinates, dtype=float)))
 

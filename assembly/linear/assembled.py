@@ -4,17 +4,17 @@
 symbol  code                  shape     meaning
 ======  ====================  ========  ==============================================
 dx_p    ``platform_screw``    (6,)      platform's pose error at its origin, base axes
-dc      ``clearance_screws``  (n, 6)    clearances and small motions of passive joints
-de, db  ``link_screws`` ..    (n, 6)    deformations of links and joints
-w       ``wrenches``          (n, 6)    wrenches of the links' springs, in frame axes
---      ``tip_wrenches``      (n, 6)    wrenches through the sections at the links' tips
-E       ``energy``            J         elastic energy of all springs
+dc      ``clearance_screws``  (n, 6)    screws of clearances and passive joints de, db
+``link_screws`` ..    (n, 6)    deformations of links and joints w       ``wrenches``
+(n, 6)    wrenches of the links' springs, in frame axes --      ``tip_wrenches``
+(n, 6)    wrenches through the sections at the links' tips E       ``energy``
+J         elastic energy of all springs
 ======  ====================  ========  ==============================================
 
 The wrenches are computed from the closure multipliers rather than from eqs (23)-(26).
-Eq. (23) adds the wrenches of springs in series, although such springs carry the same
-wrench.  Eqs (24)-(26) include only the path to the platform, so their wrenches add up
-to zero if the platform carries no load.
+Eq. (23) adds the wrenches of springs in series, although these wrenches are equal.  Eqs
+(24)-(26) include only the path to the platform, so their wrenches add up to zero
+without a load on the platform.
 """
 
 from dataclasses import dataclass
@@ -189,8 +189,8 @@ class Assembly(Solution[N]):
         """Wrench of the second chain on the first, (..., closures, 6) [N m, N].
 
         The wrenches act at the platform's origin and are expressed in base axes.  If
-        rigid parts are overconstrained, the wrenches are not unique, and the
-        minimum-norm solution is returned.
+        rigid bodies are overconstrained, the wrenches are not unique, and those of
+        minimum norm are returned.
         """
         size = self.linearisation.size
         return _by_frames(self.multipliers) / np.array([1, 1, 1, size, size, size])
@@ -338,15 +338,15 @@ class Assembly(Solution[N]):
 
     @cached_property
     def _gap(self) -> N:
-        return plain(np.maximum(self.potential - self.bound, 0.0))  # NaN stays NaN
+        return plain(np.maximum(self.potential - self.bound, 0.0))  # NaN remains NaN
 
     def relative_gap(self) -> N:
         """Return the duality gap divided by the elastic energy.
 
         The divisor is at least 1e-4 times the energy without clearance.
         """
-        # the minimum energy vanishes inside an assembly zone, so the divisor is bounded
-        # below
+        # The minimum energy is zero in an assembly zone, so the divisor has a lower
+        # bound.
         least = np.maximum(1e-4 * np.asarray(self.energy_without_clearance), 1e-300)
         return plain(self.duality_gap() / np.maximum(self.stored, least))
 

@@ -14,8 +14,8 @@ for the computed solution and every minimum-energy solution.  The gap thus bound
 errors in the springs and in the clearances whose constraint is active.  It does not
 bound unloaded clearances: the energy does not depend on them, and the minimiser is not
 unique.  The minimum-energy platform screws form a convex set, and so do the platform
-screws that the gap allows.  A cone program with a certified objective value bounds the
-extent of each set along each axis.
+screws of all assemblies within the gap.  A cone program with a certified objective
+value bounds the extent of each set along each axis.
 """
 
 from dataclasses import dataclass, replace
@@ -91,7 +91,7 @@ def unproved(assembly: Assembly) -> str:
     allowed = GAP * (assembly.stored + abs(assembly.work))
     allowed += GAP_WITHOUT_CLEARANCE * assembly.energy_without_clearance
     sentences = []
-    # the condition is written so that NaN counts as not proved
+    # With NaN, the comparison is False, so the assembly is not proved.
     if not gap <= allowed:
         sentences.append(
             f"the minimum energy is certified to within {gap:.1e} J only, "
@@ -111,7 +111,7 @@ def unproved(assembly: Assembly) -> str:
 def unproved_screw(assembly: Assembly, bound: ScrewBound) -> list[str]:
     """Return messages if the rotation or translation of the platform is inaccurate.
 
-    The non-uniqueness due to unloaded clearances is not counted as inaccuracy.
+    Non-uniqueness due to unloaded clearances is not an inaccuracy.
 
     Args:
         assembly: minimum-energy assembly.
@@ -221,8 +221,8 @@ def _room(
     Returns:
         Columns of the clearances; their values in this assembly; the cone of each
         column; and (nu,) [-] ranges relative to the sizes of the cones.  A range of 1
-        denotes the whole cone; a smaller range bounds the distance between this
-        assembly and any minimum-energy assembly.
+        is the complete cone.  A smaller range bounds the distance between this assembly
+        and any minimum-energy assembly.
     """
     group = joints.group
     load = cone_sizes(joints.cones.T @ assembly.joint_wrenches.ravel(), group)
@@ -252,6 +252,6 @@ def _extents(reachable: ReachableSet) -> NDArray:
         try:
             height = reachable.support(d).height
             extents.append(height - float(d @ reachable.centre))
-        except SolverFailed:  # no bound is known in this direction
+        except SolverFailed:  # There is no bound in this direction.
             extents.append(np.inf)
     return np.maximum(np.reshape(extents, (2, 6)).max(axis=0), 0.0)

@@ -1,7 +1,7 @@
 """Assembly constraints, linear in the small screws.
 
 Eqs (8) and (16)-(20) are generalised to any tree with closures.  The two chains that
-meet at a closure must produce the same motion:
+end at a closure must have the same motion:
 
     sum over frames j of  sign_kj M_j (dl_j + de_j + dc_j + db_j)  =  0.
 
@@ -270,7 +270,7 @@ def linearise(posture: Posture) -> Linearisation:
 
 @lru_cache(maxsize=64)
 def checked_size(robot: Robot) -> float:
-    """Return the reference length [m] of a robot after a check of its geometric errors.
+    """Check the geometric errors of a robot, and return its reference length [m].
 
     Args:
         robot: any robot.

@@ -3,8 +3,7 @@
 The compiled method (:mod:`forcefit.assembly.linear.lanes`) computes all steps from the
 poses of the frames to the certificate, with and without loads.  The reference method
 (:mod:`forcefit.assembly.linear.reference`) solves points that the compiled method does
-not cover or cannot certify.  The field ``method`` of the result states which method was
-used.
+not cover or cannot certify.  The field ``method`` of the result contains the method.
 """
 
 from collections.abc import Mapping, Sequence
@@ -114,7 +113,7 @@ def solve_assembly(
             set for each of k postures, or k sets at one posture.
         method: ``"compiled"`` falls back on the reference method for points that the
             compiled method cannot certify; ``"reference"`` uses only numpy and
-            Clarabel.  The field ``method`` of the result states the method used for
+            Clarabel.  The field ``method`` of the result contains the method used for
             each point.
         carried: (n, 6) or (k, n, 6) [N m, N] wrenches on the bodies that the joints of
             all frames carry, each at its frame's origin, base axes.
@@ -127,7 +126,7 @@ def solve_assembly(
         the field ``reason`` contains the message.
 
     Raises:
-        CannotAssemble: no clearance and no spring can close an open closure.
+        CannotAssemble: clearances and springs cannot close the loops.
         FreeMotion: a load drives a motion that nothing resists.
         SolverFailed: the cone solver did not converge.
         ValueError: the errors do not fit the robot or the postures, a transform is not
@@ -340,7 +339,7 @@ def _compiled(
     joints: VirtualJoints, structure: Structure, T: NDArray, errors: NDArray,
     mismatch: NDArray, loads: NDArray | None, method: Method = "compiled",
 ) -> _Rows:  # fmt: skip
-    """Solve k points by the kernel; mark the points that need the reference method."""
+    """Solve k points by the kernel, and mark points that need the reference method."""
     count = len(errors) if len(T) == 1 else len(T)
     rows = _empty(joints, count)
     given = structure, T, errors, mismatch
@@ -443,7 +442,7 @@ def _record(
     rows: _Rows, apart: dict[int, Assembly | Exception], i: int,
     found: Assembly | Exception,
 ) -> None:  # fmt: skip
-    """Store a separately solved point in row i, or in ``apart`` if necessary."""
+    """Store a separately solved point in ``rows``, or in ``apart`` if necessary."""
     rows["method"][i] = "reference"
     if isinstance(found, Exception):
         for name in (*_NUMBERS, "platform_screw", *_VECTORS):

@@ -50,7 +50,7 @@ def margins_side_by_side(
     structure: Structure, T: NDArray, errors: NDArray, mismatch: NDArray,
     out: tuple[NDArray, NDArray, NDArray, NDArray],
 ) -> None:  # fmt: skip
-    """Compute the assembly margin at every point, with a lower bound.
+    """Compute the assembly margin and its lower bound at every point.
 
     Args:
         structure: the robot without springs.

@@ -139,7 +139,7 @@ def loads_on_frames(
         # Express all wrenches at the platform's origin, then add up the wrenches on the
         # frames that each frame carries.
         arms = (T[..., :3, 3] - posture.platform[..., None, :3, 3])[..., None, :, :]
-        if acting.tolist() != [robot.index(robot.platform)]:  # the platform itself
+        if acting.tolist() != [robot.index(robot.platform)]:  # not the platform alone
             given[..., acting, :] = _moved(given[..., acting, :], arms[..., acting, :])
         after += _beyond(robot)[:, acting] @ (own + after)[..., acting, :]
         own += after
@@ -218,7 +218,7 @@ def weights(posture: Posture, gravity: ArrayLike) -> tuple[NDArray, NDArray]:
         treated as weightless.
 
     Raises:
-        BadInput: gravity is not finite, exceeds 1e6 m/s^2, or its shape does not fit.
+        BadInput: gravity is not finite, exceeds 1e6 m/s^2, or has a wrong shape.
     """
     _check("gravity", gravity, LARGEST_LENGTH, "m/s^2")
     robot, T = posture.robot, posture.transforms

@@ -111,7 +111,7 @@ class _Places(NamedTuple):
     """Clearances and motions that can change under an assumption of (27).
 
     Attributes:
-        moving: structure of the robot whose columns can move.
+        moving: structure of the robot with the columns that can move.
         loaded: structure for which (22) is solved to identify the loaded clearances.
         columns: (nu,) columns in (22) of the moving clearances.
         cone_of: (cones,) cones of ``loaded`` that contain the moving clearances.

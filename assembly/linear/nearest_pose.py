@@ -98,8 +98,8 @@ class _FreeClearances:
     Attributes:
         unloaded: (nu,) bool, True for the k columns of unloaded clearances.
         deviation: (6,) [rad, m] deviation of the point at the solution.
-        map: (6, k) [rad, m] derivative of the deviation with respect to the clearances;
-            free motions follow.
+        map: (6, k) [rad, m] derivative of the deviation with respect to the clearances,
+            including the resulting free motions.
         rows: (p, k) orthonormal rows of the closures.
         start: (k,) values of the clearances at the solution.
         group: (k,) cone of each column.

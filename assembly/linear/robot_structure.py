@@ -150,7 +150,7 @@ def _structure(joints: VirtualJoints, tree: _Tree, own_axes_free: bool) -> Struc
 
 
 def _by_frame(columns: NDArray) -> tuple[NDArray, NDArray]:
-    """Return the frame of each column and its (count, 6) screw in that frame's axes."""
+    """Return the frame of each column, and its screw in the frame axes, (count, 6)."""
     blocks = columns.T.reshape(columns.shape[1], len(columns) // 6, 6)
     frame = np.abs(blocks).max(axis=2).argmax(axis=1) if len(blocks) else np.zeros(0)
     frame = frame.astype(np.int64)

@@ -47,7 +47,7 @@ def differs_from_zero(
     """Return whether minimum energies exceed their uncertainty.
 
     An energy that does not exceed the duality gap can be zero.  The work of the
-    wrenches on closure round-off is also counted as uncertainty.
+    wrenches on closure round-off is added to the gap.
 
     Args:
         energy: (...,) [J] minimum energies.
@@ -89,7 +89,7 @@ def drop_zeros(
 
 @lru_cache(maxsize=64)
 def stiffness_spread(joints: VirtualJoints, size: float) -> float:
-    """Return the stiffness ratio [-] of the stiffest to the softest spring."""
+    """Return the ratio of the largest to the smallest spring stiffness."""
     weights = np.tile(in_reference_lengths(size), len(joints.elastic) // 6)
     compliance = ((joints.elastic * weights[:, None]) ** 2).sum(axis=0)
     return float(compliance.max(initial=1e-300) / compliance.min(initial=np.inf))

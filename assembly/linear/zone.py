@@ -3,10 +3,10 @@
 The margin t is the factor by which all clearances must be scaled so that the
 manipulator can just be assembled with rigid links and joints.  Assembly is possible if
 t <= 1.  The margin is a continuous function of the errors, and 1 / t is the factor by
-which the errors could grow.
+which the errors could be multiplied.
 
-As printed, (21) makes compliant joints rigid in every direction (``"rigid"``).  With
-``"free"`` they rotate about their own axis like a hinge.
+In (21) as printed, compliant joints are rigid in every direction (``"rigid"``).  With
+``"free"``, they rotate about their own axis like a hinge.
 """
 
 from collections.abc import Sequence
@@ -141,7 +141,7 @@ def zone_margin(
             n, 6), one set for each of k postures, or k sets at one posture.
         method: ``"compiled"`` falls back on the reference method for points that the
             compiled method cannot certify; ``"reference"`` uses only numpy and
-            Clarabel.  The field ``method`` of the result states the method used for
+            Clarabel.  The field ``method`` of the result contains the method used for
             each point.
 
     Returns:

@@ -161,7 +161,7 @@ def _nearest_assembly(
 
 
 def with_second_order(conditions: Conditions) -> Conditions:
-    """Add the second-order effect of the declared errors to the conditions.
+    """Add the second-order effect of the geometric errors to the conditions.
 
     Near a singularity, geometric errors cause large motions, and the error of the
     linear model exceeds the noise of a device.  The difference between the exact and
@@ -194,7 +194,7 @@ def with_finite_motions(conditions: Conditions) -> Conditions:
     each measurement.
 
     Args:
-        conditions: conditions of R measurements, as declared.
+        conditions: conditions of R measurements without additional effects.
 
     Returns:
         The conditions, with ``second_order`` and without ``exact``.

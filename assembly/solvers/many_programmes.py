@@ -21,8 +21,8 @@ from forcefit.assembly.solvers.conic import (
 
 # fraction of GAP that is required here, because the full problem has a larger gap
 _SHARE = 0.1
-_RESIDUAL = 1e-11  # largest residual of a row without springs
-# force of a loaded cone, relative to the energy without clearance
+_RESIDUAL = 1e-11  # largest residual of an equation without springs
+# smallest force of a loaded cone, relative to the force without clearance
 _LOADED = 1e-9
 
 

@@ -114,8 +114,8 @@ def farthest(
 
     Returns:
         (2,) lower and upper bound; (6,) the screw that attains the lower bound; and the
-        number of support functions.  With more than 400 support functions, the bounds
-        can be wider than required.
+        number of support functions, at most 400.  If 400 do not suffice, the bounds are
+        wider than required.
     """
 
     def asked(direction: tuple[float, float, float]) -> tuple[float, NDArray, NDArray]:

@@ -34,8 +34,8 @@ def farthest(
 
     Returns:
         Lower and upper bound; (6,) the screw that attains the lower bound; and the
-        number of support functions.  With more than 400 support functions, the bounds
-        can be wider than required.
+        number of support functions, at most 400.  If 400 do not suffice, the bounds are
+        wider than required.
     """
     part = slice(half, half + 3)
     best, low = centre, float(np.linalg.norm(centre[part]))

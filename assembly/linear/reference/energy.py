@@ -52,7 +52,7 @@ def least_energy(
         The assembled manipulator.
 
     Raises:
-        CannotAssemble: no clearance and no spring can close an open closure.
+        CannotAssemble: clearances and springs cannot close the loops.
         FreeMotion: a load drives a motion that nothing resists.
         SolverFailed: the cone solver did not converge.
     """
@@ -86,7 +86,7 @@ def solve_with(
         The assembled manipulator.
 
     Raises:
-        CannotAssemble: no clearance and no spring can close an open closure.
+        CannotAssemble: clearances and springs cannot close the loops.
         FreeMotion: a load drives a motion that nothing resists.
         SolverFailed: the cone solver did not converge.
     """

@@ -4,7 +4,7 @@ Clearances v move within their cones, and free motions q follow through the clos
 
     A_q dq + A_v dv = 0,        platform screw = centre + P_v dv + P_q dq.
 
-A free motion that no closure constrains either leaves the platform fixed or makes
+A free motion that no closure constrains either does not move the platform, or makes
 components of its screw unbounded.
 
 Motions of passive joints are limited.  Most of these limits are never active, and a
@@ -88,8 +88,8 @@ class MovingCones(NamedTuple):
 class ReachableSet:
     """Set of possible platform screws: centre + map @ (v - start).
 
-    The points v are in unit cones and satisfy rows @ (v - start) = 0.  Because this
-    equation is homogeneous, errors in the solution of (22) add no motion.
+    The points v are in unit cones and satisfy rows @ (v - start) = 0.  This equation is
+    homogeneous, so errors in the solution of (22) do not enlarge the set.
 
     Attributes:
         centre: (6,) [rad, m] the screw at ``start``.

@@ -14,8 +14,8 @@ clearances u alone,
 
 where G u + h is the scaled deformation of the springs in addition to the deformation
 under the loads alone.  Ranks are determined from the square roots of the springs'
-compliances.  Adding compliances, for example 1 and 1e-8 rad/(N m), would lose the
-contribution of the stiff springs to round-off.
+compliances.  In a sum of compliances, for example 1 and 1e-8 rad/(N m), the
+contribution of the stiff springs would be lost in round-off.
 
 Sources:
     Golub, Van Loan, Matrix Computations, 4th ed., sections 5.4-5.5 (rank-revealing
@@ -65,18 +65,18 @@ class Reduction:
         G: (r, nu) [sqrt(2 J)] sensitivity of the scaled strains to the clearances.
         h: (r,) [sqrt(2 J)] scaled strains with zero clearances and no loads.
         d: (nu,) [J] work of the loads per unit of each clearance.
-        H: (p, nu) rows without springs.
-        k: (p,) right sides of the rows H.
-        inconsistent: [-] scaled closure error that no motion can remove; 0 if none.
+        H: (p, nu) matrix of the equations without springs.
+        k: (p,) right-hand sides of these equations.
+        inconsistent: [-] scaled closure error that no motion can compensate, or 0.
         frame_loads: loads on every small screw.
         load_multipliers: (6 closures,) multipliers that balance the loads on free
             motions.
         basis: (6 closures, m) orthonormal basis, orthogonal to all free motions.
-        rigid: (m, p) combinations of the columns of ``basis`` that form the rows H.
+        rigid: (m, p) combinations of the columns of ``basis`` that give the rows of H.
         elastic_inverse: (ny, m) pseudoinverse of the spring columns.
         spread: (ny, r) orthonormal map from the springs of the reduced problem to all
             springs.
-        ranks: numbers of free, elastic, rigid and redundant rows.
+        ranks: numbers of free, elastic, rigid and redundant equations.
     """
 
     linearisation: Linearisation
@@ -197,7 +197,7 @@ def complement(A: NDArray, tolerance: float) -> NDArray:
 
     Args:
         A: (m, n) matrix.
-        tolerance: relative size below which a column counts as dependent.
+        tolerance: relative size below which a column is treated as dependent.
 
     Returns:
         (m, m - rank) basis.

@@ -80,7 +80,7 @@ def test_base_compliance_includes_the_moment_of_the_force():
     assert seen == pytest.approx(expected, rel=1e-6, abs=1e-12)
 
 
-def test_encoder_offset_rotates_the_arm_by_the_offset():
+def test_arm_rotation_equals_the_encoder_offset():
     seen = change(here(arm(), q=0.7), "encoder_offset", {"drive": 1e-5})
     expected = [0, 0, 1e-5, -1e-5 * L * sin(0.7), 1e-5 * L * cos(0.7), 0]
     assert seen == pytest.approx(expected, rel=1e-4, abs=1e-10)
@@ -172,7 +172,7 @@ def test_load_moves_a_joint_to_the_bound_of_its_clearance():
     assert seen == pytest.approx(expected, rel=1e-6, abs=1e-9)
 
 
-def test_unloaded_clearance_leaves_the_reading_undetermined():
+def test_reading_with_unloaded_clearance_is_undetermined():
     values = {"joint_clearance": {"drive.radial": 2e-5}}
     found = predict(apply_effects(here(arm(rigid=True)), values))
     assert found.undetermined.all()
@@ -287,7 +287,7 @@ def test_effects_on_many_measurements_agree_with_the_cone_solver(name, parallel)
 
 
 def test_friction_and_slip_are_limited_to_suitable_joints():
-    """Friction requires a joint spring."""
+    """Friction requires a joint spring, and slip a joint without clearance."""
     own = np.diag([np.inf, np.inf, 0.4, np.inf, np.inf, np.inf])
     robot = Robot("chain", "tip", (
         Frame("soft", joint="revolute", actuated=True, joint_stiffness=own),

@@ -41,14 +41,14 @@ def turned(angle, q):
 
 
 @pytest.mark.parametrize("q", [-0.8, 0.0, 0.7])
-def test_joint_harmonics_rotate_the_arm_by_their_sum(q):
+def test_arm_rotation_equals_the_sum_of_joint_harmonics(q):
     waves = at_drive({"1.sine": 2e-5, "3.cosine": -1e-5}, "waves")
     angle = 2e-5 * sin(q) - 1e-5 * cos(3 * q)
     found = seen(here(RIGID, q=q), waves)[0]
     assert found == pytest.approx(turned(angle, q), rel=1e-4, abs=1e-9)
 
 
-def test_formula_effect_rotates_the_drive_by_its_value():
+def test_drive_rotation_equals_the_formula_value():
     formula = at_drive(
         {"a": 1e-5, "b": 2e-6, "n": 2.0}, "formula", formula="a*sin(3*q)**n - b/2"
     )
@@ -66,7 +66,7 @@ def test_base_functions_rotate_and_translate_the_whole_robot():
     assert seen(there, turn, shift)[0] == pytest.approx(expected, rel=1e-4, abs=1e-9)
 
 
-def test_load_and_reading_functions_change_the_load_and_the_reading():
+def test_functions_change_the_load_and_the_reading():
     load = Function("load", ("fy",), ("load.fy",), "powers", {"1": 0.1})
     read = Function("reading", ("tz",), ("position.x",), "powers", {"2": 1e-5})
     there = here(arm(), (0, 0, 0, 0, 20, 0), q=0.4)
@@ -94,7 +94,7 @@ def test_compliance_function_equals_an_elastic_drive():
     assert one.energy == pytest.approx(assemble_row(sprung, 0).energy, rel=1e-9)
 
 
-def test_function_of_a_wrench_rotates_the_joint_by_the_squared_moment():
+def test_rotation_by_a_wrench_function_is_quadratic_in_the_moment():
     square = at_drive({"2": 1e-7}, variables=("wrench.drive.mz",))
     F, q = 30.0, 0.5
     there = here(RIGID, (0, 0, 0, 0, F, 0), q=q)

@@ -133,7 +133,7 @@ def test_wrong_array_of_interior_point_is_rejected(name, rng):
     kernels.interior_point(**right)
     assert right["u"].any()
     shorter = right | {name: right[name][:-1].copy()}
-    # If the numbers of rows of two arguments differ, the message is about the second.
+    # Messages about wrong shapes of h, d and k contain the name of their matrix.
     named = {"h": "G", "d": "G", "k": "H"}.get(name, name)
     with pytest.raises(ValueError, match=rf"^{named}\b"):
         kernels.interior_point(**shorter)

@@ -95,7 +95,7 @@ def test_instruction_level_above_that_of_the_processor_is_rejected(monkeypatch):
         chosen()
 
 
-def test_processor_below_every_instruction_level_raises_an_import_error(monkeypatch):
+def test_unsupported_processor_raises_an_import_error(monkeypatch):
     monkeypatch.delenv("FORCEFIT_MARCH", raising=False)
     monkeypatch.setattr(choice.platform, "machine", lambda: "x86_64")
     monkeypatch.setattr(choice, "_load", lambda _: SimpleNamespace(level=lambda: 1))
@@ -103,7 +103,7 @@ def test_processor_below_every_instruction_level_raises_an_import_error(monkeypa
         chosen()
 
 
-def test_portable_module_is_loaded_on_another_architecture(monkeypatch):
+def test_portable_module_is_loaded_on_other_architectures(monkeypatch):
     monkeypatch.setattr(choice.platform, "machine", lambda: "aarch64")
     monkeypatch.setattr(choice, "_load", lambda name: name)
     monkeypatch.delenv("FORCEFIT_MARCH", raising=False)

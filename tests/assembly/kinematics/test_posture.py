@@ -52,7 +52,7 @@ def test_posture_reports_its_largest_closure_gap():
 
 
 def test_joints_outside_loops_remain_at_their_home_position():
-    """Their motion affects neither the closures nor the platform."""
+    """Motions of these joints affect neither the closures nor the platform."""
     robot = four_bar()
     closed = {"end", "seat"}
     frames = tuple(

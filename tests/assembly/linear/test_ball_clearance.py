@@ -34,13 +34,13 @@ def with_balls(robot):
 
 
 def pointed(clearance, at=(0.0, 0.0, 0.0)):
-    """Return the assembly of a tip that a single joint with clearance carries."""
+    """Return the assembly of a tip on a single joint with clearance."""
     frames = (Frame("joint", clearance=clearance), Frame("tip", "joint", list(at)))
     return solve_assembly(home_posture(Robot("tip", "tip", frames)))
 
 
 @pytest.mark.parametrize(("method", "width"), [("compiled", 1e-9), ("reference", 5e-7)])
-def test_ball_clearance_allows_its_radius_in_every_direction(method, width):
+def test_ball_clearance_allows_equal_motions_in_all_directions(method, width):
     """A circumscribed cylinder with radial = axial = c allows sqrt(2) c."""
     for clearance, expected in (
         (Clearance(ball=C), C),

@@ -218,7 +218,7 @@ def test_arbitrary_wrenches_give_a_lower_bound_on_the_energy(rng):
         assert other.bound == pytest.approx(by_hand, rel=1e-9, abs=1e-9 * scale)
 
 
-def test_combining_solutions_preserves_the_certificate_of_each_point():
+def test_combined_solutions_have_the_certificates_of_the_points():
     """The bound equals the energy minus the gap."""
     robot = coaxial_beams([0, 0, 0, 1e-4, 0, 0])
     best = solve_assembly(home_posture(robot))

@@ -64,7 +64,7 @@ def test_work_of_the_drive_is_twice_the_linear_elastic_energy():
     assert assembly.loaded
 
 
-def test_force_control_removes_the_stiffness_of_the_drive():
+def test_force_controlled_drive_has_no_stiffness():
     """With position control, the stiffness is k_2 + 1/(1/k_1 + 1/k_rod)."""
     k_rod, k_1, k_2 = 4e6, 1e7, 3e7
     robot = opposing_slides(k_rod, k_1, k_2)
@@ -156,7 +156,7 @@ def test_drive_torque_balances_a_weight(solve):
     np.testing.assert_allclose(assembly.platform_screw, np.zeros(6), atol=1e-15)
 
 
-def test_drive_force_moves_other_joints_to_the_end_of_their_clearance():
+def test_drive_force_moves_other_joints_within_their_clearance():
     """Tension moves the rod end by its whole axial clearance of 20 um."""
     robot = opposing_slides(4e6)
     first = replace(robot.frames[0], clearance=Clearance(axial=2e-5))
@@ -177,7 +177,7 @@ def test_drive_forces_at_many_postures_equal_those_at_single_postures():
         assert together[k].energy == pytest.approx(one.energy, rel=1e-9)
 
 
-def test_unknown_and_coupled_drives_are_rejected():
+def test_force_control_of_unknown_and_coupled_drives_is_rejected():
     robot = crossed_cranks()
     with pytest.raises(BadInput, match=r'no drive "rockr"; did you mean "rocker"'):
         with_drive_forces(robot, {"rockr": 1.0})

@@ -252,7 +252,7 @@ def turn_and_slide():
 
 
 @pytest.mark.parametrize("load", [1e-9, 1.0, 1e9])
-def test_free_motion_message_does_not_depend_on_the_size_of_the_load(load):
+def test_message_about_a_free_motion_does_not_depend_on_the_load(load):
     """Loads of 0.3 N m and 2 N drive a rotation and a translation."""
     with pytest.raises(FreeMotion) as told:
         reduced(turn_and_slide(), load * np.array([0, 0, 2.0, 0, 0, 0.3]))

@@ -60,5 +60,5 @@ def test_only_unproved_points_use_the_reference_method(monkeypatch):
     assert found.to_xarray().method.values.tolist() == found.method.tolist()
 
 
-def test_classical_stiffness_of_one_posture_is_computed_by_the_reference_method():
+def test_classical_stiffness_of_one_posture_uses_the_reference_method():
     assert platform_stiffness(beams()).method == "reference"

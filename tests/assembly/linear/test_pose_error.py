@@ -102,7 +102,7 @@ def test_pose_error_includes_the_motion_limit_of_a_passive_joint(spin):
     assert_holds(found.rotation_error, np.hypot(spin, 3e-4), 1e-7 * spin + 1e-9)
 
 
-def test_tool_point_on_a_bearing_axis_has_a_bounded_translation_error():
+def test_translation_error_on_a_bearing_axis_is_bounded():
     """At height h on the bearing axis, the bounds are radial + h tilt and axial.
 
     At other points, the translation error is infinite.

@@ -116,7 +116,7 @@ def test_redundant_joint_motions_have_minimum_norm():
     assert batch.platform_screw[0, 2] == pytest.approx(1e-3, rel=1e-9)
 
 
-def test_energy_of_a_stiff_spring_in_series_with_a_soft_one_is_accurate():
+def test_energy_of_stiff_and_soft_springs_in_series_is_accurate():
     """The compliances about the common axis are 1 and 1e-8 rad/(N m)."""
     soft = np.diag([1.0, 1e8, 1e8, 1e8, 1e8, 1e8])
     gap = np.array([1e-2, 1e-4, 0, 0, 0, 0])

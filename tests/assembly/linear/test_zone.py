@@ -60,7 +60,7 @@ def test_passive_joints_compensate_in_plane_errors_without_clearance():
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_range_of_a_passive_joint_does_not_scale_with_the_margin(method):
+def test_margin_does_not_scale_the_range_of_passive_joints(method):
     """The margin is (3e-4 - 1e-4) / 1e-5 for a slider range of 1e-4 m."""
     frames = (
         Frame("slide", joint="prismatic", clearance=Clearance(axial=1e-4)),
@@ -181,7 +181,7 @@ def test_margins_can_be_selected_by_index():
         len(one)
 
 
-def test_infinite_margin_needs_no_proof():
+def test_infinite_margin_is_not_reported_as_unproved():
     margin, bound = np.array([[np.inf] * 2, [2.0] * 2, [2.0, 1.99], [2.0, np.nan]]).T
     none = np.full((4, 1), np.nan)
     zones = Zone(margin, bound, np.full(4, "reference"), none, np.full(4, ""))

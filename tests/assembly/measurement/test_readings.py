@@ -65,7 +65,7 @@ def test_second_order_part_is_added_to_the_linear_model(rows, rng):
     assert exact == pytest.approx(np.zeros((ROWS, 6)), abs=1e-12)
 
 
-def test_work_of_a_load_does_not_depend_on_the_reference_point(rows, rng):
+def test_work_does_not_depend_on_the_reference_point(rows, rng):
     """The work M . theta + F . t is equal at both points."""
     load, screw = rng.normal(size=(ROWS, 6)), rng.normal(size=6)
     here = as_declared(rows, load, point=POINT)

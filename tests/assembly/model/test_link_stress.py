@@ -147,7 +147,7 @@ def test_stress_in_sweeps_and_draws_includes_link_weight():
     np.testing.assert_allclose(rows["stress"][:, 0], expected, rtol=1e-9)
     errors = draws_dataset(experiment, rows)["stress"].attrs["estimated_relative_error"]
     assert errors.tolist() == [0.0]  # formulas have no mesh error
-    weight = 7850 * 0.02**2 * 9.81  # through the drive
+    weight = 7850 * 0.02**2 * 9.81  # [N] force that the drive transmits
     np.testing.assert_allclose(rows["force"], weight, rtol=1e-9)
     np.testing.assert_allclose(rows["moment"], weight / 2, rtol=1e-9)
 

@@ -48,8 +48,7 @@ def test_up_directions_determine_the_rotation_about_the_span():
     assert np.allclose(R @ [0, 0, 1], [1, 0, 0])
 
 
-# --- mesh links after a prismatic joint
-# ---------------------------------------------------------
+# --- mesh links after a prismatic joint --------------------------------------------
 
 RAM = """
 name = "ram"

@@ -29,13 +29,13 @@ from tests.built_in_robots_for_tests import (
 
 # published degrees of freedom with free and with locked drives, and overconstraint
 COUNTS = {
-    "irsbot2": (2, 0, 8),  # 3 for each of two parallelograms, 2 for the legs
+    "irsbot2": (2, 0, 8),  # 8 = 2 x 3 of parallelograms + 2 of legs
     "four_bar": (1, 0, 3),  # one planar loop
     "five_bar": (2, 0, 3),  # one planar loop
     "3rrr": (3, 0, 6),  # two planar loops
     "hexapod": (6, 0, 0),
-    "delta": (9, 6, 0),  # 3 translations, 6 rotations of the rods
-    "orthoglide": (3, 0, 12),  # 3 for each of three parallelograms, 3 for the legs
+    "delta": (9, 6, 0),  # 9 = 3 translations + 6 rotations of rods
+    "orthoglide": (3, 0, 12),  # 12 = 3 x 3 of parallelograms + 3 of legs
     "arm6": (6, 0, 0),
 }
 

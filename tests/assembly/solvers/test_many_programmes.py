@@ -50,7 +50,7 @@ def test_equations_outside_the_clearances_are_infeasible():
 
 
 def unloaded(u):
-    """Return the minima of a problem without energy."""
+    """Return points of equal energy as minima."""
     u = np.array(u, dtype=float)
     return Minima(u, np.zeros((len(u), 0)), np.ones(len(u), dtype=bool))
 
