@@ -4,33 +4,34 @@ A form is a sum of basis columns, each multiplied by a coefficient.  The remaini
 parameters, called *shapes*, change the columns nonlinearly.  Examples of shapes are a
 time constant and a period.
 
-========== ============================== =====================================
-form       numbers of the columns         columns that they multiply
-========== ============================== =====================================
-powers     ``0``, ``1``, ``2`` ..;        x^i;
+========== ============================== ==========================================
+form       coefficients                   basis columns
+========== ============================== ==========================================
+powers     ``0``, ``1``, ``2`` ..         x^i
            ``i.j`` of two variables       x^i y^j
-waves      ``k.sine``, ``k.cosine``;      of k turns of x, in 2 pi or ``period``;
-           ``j.k.sine``, ``j.k.cosine``   of j x + k y
-spline     ``1`` .. ``n``;                value at the k-th of n even knots from
-           ``j.k`` of two variables       ``first`` to ``last``; natural and cubic
-                                          between, constant beyond them
-lag        ``gain``, ``start``            x with a first-order lag of
-                                          ``time_constant`` (for ``time`` itself
-                                          1 - exp); decay of the state at time 0
-creep      ``gain``, ``start``            the same for a load applied in steps
-step       ``size``                       0 below ``at``, 1 from there on
-slow_wave  ``sine``, ``cosine``           of x in turns of ``period``
-reversal   ``0``, ``1``, ``2`` ..         direction of x, times y^k; the size of y
-                                          if y is a load or a wrench
-slip       ``size``                       -1 to 1: friction element that slips after
-                                          a motion x of ``depth``
-scaled_    ``k.sine``, ``k.cosine``       of k turns of x, times y
+waves      ``k.sine``, ``k.cosine``       harmonics k x, with period 2 pi or
+                                          ``period``
+           ``j.k.sine``, ``j.k.cosine``   harmonics j x + k y of two variables
+spline     ``1`` .. ``n``                 natural cubic splines with n evenly spaced
+           ``j.k`` of two variables       knots from ``first`` to ``last``, constant
+                                          outside this interval
+lag        ``gain``                       x with a first-order lag ``time_constant``
+           ``start``                      decay of the state at time 0
+creep      ``gain``, ``start``            as for lag, for a load applied in steps
+step       ``size``                       0 for x < ``at``, otherwise 1
+slow_wave  ``sine``, ``cosine``           sine and cosine of x with ``period``
+reversal   ``0``, ``1``, ``2`` ..         direction of x times y^k, or times abs(y)^k
+                                          for a load or a wrench y
+slip       ``size``                       position from -1 to 1 of a friction element
+                                          that slips after a motion ``depth`` of x
+scaled_    ``k.sine``, ``k.cosine``       harmonics k x, multiplied by y
 waves
 reversal_  ``k.sine``, ``k.cosine``       direction of x times harmonics of y or x
 waves
-knee       ``below``, ``above``;          part of x within -``at`` to ``at``; part
-           ``size``                       beyond; -1 to 1, reached at ``at``
-========== ============================== =====================================
+knee       ``below``                      x limited to -``at`` .. ``at``
+           ``above``                      x minus the column ``below``
+           ``size``                       column ``below`` divided by ``at``
+========== ============================== ==========================================
 
 Sources:
     de Boor, A Practical Guide to Splines, chapter IV (natural cubic interpolation).

@@ -307,7 +307,7 @@ def _yielding(
     inputs: NDArray,
     acts: NDArray,
 ) -> Conditions:
-    """Add a compliance with a law to the conditions."""
+    """Add a deflection law to the conditions."""
     slots: dict[int, int] = {}  # column of the inputs for each wrench index
     through: list[tuple[str, int]] = []
     for k, name in enumerate(function.variables):

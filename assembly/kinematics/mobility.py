@@ -108,7 +108,7 @@ def mobility(posture: Posture, tolerance: float = ZERO) -> Mobility:
             smallest value is 30 times the nominal closure error.
 
     Returns:
-        The counts.
+        The degrees of freedom and redundant constraints.
 
     Sources:
         Zlatanov, Bonev, Gosselin (2002), Constraint singularities of parallel

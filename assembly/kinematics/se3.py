@@ -168,7 +168,9 @@ def bracket_form(wrench: ArrayLike) -> NDArray:
 
 
 def stumpff(turn: NDArray) -> list[NDArray]:
-    """Return the Stumpff functions c_k = sum (-a^2)^j / (2j + k)! for k = 0 to 5.
+    """Return the Stumpff functions c_0 .. c_5 of rotation angles a.
+
+    They are defined by c_k = sum (-a^2)^j / (2j + k)! over j >= 0.
 
     Args:
         turn: (..., 3) [rad] rotation vectors.

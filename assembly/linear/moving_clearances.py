@@ -111,10 +111,10 @@ class _Places(NamedTuple):
     """Clearances and motions that can change under an assumption of (27).
 
     Attributes:
-        moving: structure of the robot with the columns that can move.
+        moving: structure of the robot with the columns that can change.
         loaded: structure for which (22) is solved to identify the loaded clearances.
-        columns: (nu,) columns in (22) of the moving clearances.
-        cone_of: (cones,) cones of ``loaded`` that contain the moving clearances.
+        columns: (nu,) columns in (22) of the clearances that can change.
+        cone_of: (cones,) cones of ``loaded`` that contain these clearances.
         bounded: free motions that have a bound.
         motions: indices of these motions in (22).
     """
@@ -129,7 +129,7 @@ class _Places(NamedTuple):
 
 @lru_cache(maxsize=32)
 def _places_of(robot: Robot, assumption: str) -> _Places:
-    """Return the columns that can move under an assumption."""
+    """Return the clearances and motions that can change under an assumption."""
     own_axes_free = assumption == "free"
     moving = structure_of(robot, False, own_axes_free)[1]
     all_of = structure_of(robot)[1]

@@ -48,7 +48,7 @@ class ContactLaw:
 
 @dataclass(frozen=True, eq=False)
 class Yield:
-    """Compliance at a frame, whose deflection is a function (law) of wrenches.
+    """Deflection law: a deflection at a frame that is a function of wrenches.
 
     Attributes:
         frame: name of the frame.
@@ -95,12 +95,12 @@ class Conditions:
         row: (R,) indices of these measurements in the history.
         target: (R, 3) [m] measured point, platform axes; None for the reference point.
         laws: contact springs in series with joints.
-        yields: compliances at frames with laws.
+        yields: deflection laws.
         exact: whether to use the model with finite motions instead of the linear one.
         second_order: (R, 6) [rad, m] exact minus linear platform screw without load;
             see :func:`forcefit.assembly.measurement.predict.with_second_order`.
-        rest: (R, n, 6) rest positions of the clearances relative to their bounds; None
-            if they follow from the minimum-energy assembly.
+        rest: (R, n, 6) rest positions of the joints within their clearances, relative
+            to the bounds; None if they follow from the minimum-energy assembly.
         base: (6,) or (R, 6) [rad, m] rotation and translation of the measuring frame.
             The measured pose is multiplied by this transform from the left.
         tool: (3,) or (R, 3) [m] vector from the reference point to the measured point,

@@ -33,7 +33,7 @@ def softened(
 def secants(
     assembly: Assembly | ExactAssembly, laws: tuple[ContactLaw, ...]
 ) -> NDArray:
-    """Return the secant compliance [rad/(N m), m/N] of each law at its load."""
+    """Return the secant compliance [rad/(N m), m/N] of each contact at its load."""
     robot = assembly.posture.robot
     compliances = []
     for law in laws:

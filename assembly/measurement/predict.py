@@ -216,7 +216,7 @@ def _finite_part(conditions: Conditions, one_by_one: int | None = None) -> NDArr
 
 
 def with_rest_positions(conditions: Conditions) -> Conditions:
-    """Fix the clearances at their minimum-energy rest positions.
+    """Fix the joints at their minimum-energy positions within the clearances.
 
     The result is correct to first order if effects do not change the contact points.
 
@@ -323,7 +323,7 @@ def assemble_row(
 def _assemble_yielding(
     row: Conditions, bodies: NDArray | None, carried: NDArray | None
 ) -> Assembly | ExactAssembly:
-    """Solve one measurement of a robot with laws of compliance."""
+    """Solve one measurement of a robot with deflection laws."""
 
     def solve(held: Conditions) -> tuple[Assembly | ExactAssembly, NDArray]:
         assembly = assemble_row(held, 0, bodies, carried)

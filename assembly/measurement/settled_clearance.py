@@ -79,7 +79,8 @@ def with_clearances_at_rest(conditions: Conditions) -> Conditions:
     """
     if conditions.rest is None:
         raise ValueError(
-            "conditions.rest: missing; expected the rest positions of the clearances"
+            "conditions.rest: missing; expected the rest positions of the joints "
+            "within their clearances"
         )
     clearance_screws = conditions.rest * _component_bounds(conditions.robot)
     robot = without_joint_clearances(conditions.robot)

@@ -1,4 +1,4 @@
-"""Solve for the deflections of compliances with laws.
+"""Solve for deflections that are functions (deflection laws) of wrenches.
 
 The deflections e are stress-free screws that depend on the wrenches w by a law e =
 g(w).  In a closed chain, the wrenches depend on the deflections, w = w0 + A e, with the
@@ -34,7 +34,7 @@ _STEPS = 40
 
 @dataclass(frozen=True, eq=False)
 class Yields:
-    """Compliances with laws at the frames of a robot.
+    """Deflection laws of a robot.
 
     Attributes:
         conditions: conditions of R measurements of a robot of n frames.
@@ -116,7 +116,7 @@ class Yields:
 def with_deflections(
     conditions: Conditions, places: NDArray, give: NDArray
 ) -> Conditions:
-    """Replace compliances with laws by given deflections.
+    """Replace deflection laws by given deflections.
 
     Args:
         conditions: conditions of R measurements.
@@ -124,7 +124,7 @@ def with_deflections(
         give: (R, m) [rad or m] deflections.
 
     Returns:
-        The conditions without laws of compliance.
+        The conditions without deflection laws.
     """
     screws = (give @ places.T).reshape(conditions.errors.shape)
     return replace(conditions, errors=conditions.errors + screws, yields=())
@@ -135,7 +135,7 @@ def settle_yields(
     solve: Callable[[Conditions], tuple[T, NDArray]],
     A: Callable[[Yields], NDArray],
 ) -> T:
-    """Solve for the equilibrium of a robot with laws of compliance.
+    """Solve for the equilibrium of a robot with deflection laws.
 
     Args:
         conditions: conditions of R measurements.
@@ -162,15 +162,15 @@ def settle_yields(
 
 
 def with_springs(conditions: Conditions, row: int) -> Conditions:
-    """Replace linear laws of compliance by springs in series with the joints.
+    """Replace linear deflection laws by springs in series with the joints.
 
     Args:
         conditions: conditions of all measurements.
         row: index of the measurement.
 
     Returns:
-        Conditions of one measurement.  Laws that are nonlinear or have no positive
-        compliance do not change.
+        Conditions of one measurement.  Deflection laws that are nonlinear or have no
+        positive compliance do not change.
     """
     one, left = conditions.take([row]), []
     frames = list(conditions.robot.frames)

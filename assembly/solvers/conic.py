@@ -68,10 +68,10 @@ class ConicSolution:
         clearances: (nu,) clearances relative to their bounds.
         springs: (r,) [sqrt(2 J)] multipliers of the springs, equal to G u + h up to the
             duality gap.
-        rigid_multipliers: (p,) [J] multipliers of the rows without springs.
+        rigid_multipliers: (p,) [J] multipliers of the equations H u = k.
         value: [J] value of the objective.
         bound: [J] certified lower bound on the objective.
-        feasible: whether the rows without springs have a solution.
+        feasible: whether H u = k has a solution within the cones.
     """
 
     clearances: NDArray
@@ -287,7 +287,7 @@ def least_factor(
 
     Args:
         B: (m, nu) matrix of full row rank, m >= 1.
-        right: (m,) right side.
+        right: (m,) right-hand side.
         group: (nu,) cone of each column.
         scaled: (nu,) bool, True if t scales the cone of the column.
 

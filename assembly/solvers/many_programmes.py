@@ -31,8 +31,8 @@ class Minima(NamedTuple):
 
     Attributes:
         clearances: (n, nu) clearances relative to their bounds.
-        rigid_multipliers: (n, p) [J] multipliers of the rows without springs.
-        feasible: (n,) bool, True if the rows without springs have a solution.
+        rigid_multipliers: (n, p) [J] multipliers of the equations H u = k.
+        feasible: (n,) bool, True if H u = k has a solution within the cones.
     """
 
     clearances: NDArray

@@ -75,7 +75,7 @@ def farthest_points(
         rows: (p, nu) matrix of full row rank.
         starts: (cones + 1,) index of the first column of each cone, then nu.
         directions: (k, nu) directions d, of length 1.
-        right: (k, p) right sides.
+        right: (k, p) right-hand sides.
         tolerance: (k,) accepted gap of d.u.
 
     Returns:

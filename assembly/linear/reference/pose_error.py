@@ -69,7 +69,7 @@ class Support:
 
 
 class MovingCones(NamedTuple):
-    """Unit cones of moving clearances with nv columns in total.
+    """Unit cones of the clearances that can change, with nv columns in total.
 
     Attributes:
         closures: (6 closures, nv) columns in the scaled closures.
@@ -275,12 +275,12 @@ def within_bounds(
     assembly: Assembly, kept: frozenset[int],
     moving: Callable[[VirtualJoints], MovingCones], own_axes_free: bool = False,
 ) -> ReachableSet:  # fmt: skip
-    """Return the set of platform screws for given moving cones.
+    """Return the set of platform screws for clearances that can change.
 
     Args:
         assembly: assembly at the start.
         kept: frames whose motion limits are included from the beginning.
-        moving: function of virtual joints that returns the moving cones.
+        moving: function of virtual joints that returns the cones of these clearances.
         own_axes_free: see :func:`forcefit.assembly.linear.closure.virtual_joints`; if
             True, no spring acts.
 
@@ -302,7 +302,7 @@ def within_bounds(
 
 @dataclass(frozen=True, eq=False)
 class _Motion:
-    """Moving cones together with the free motions that the closures impose."""
+    """Clearances that can change, and the free motions that the closures impose."""
 
     assembly: Assembly
     joints: VirtualJoints

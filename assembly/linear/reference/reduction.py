@@ -289,7 +289,7 @@ def _rigid_rows(
     tolerance: float,
     noise: float,
 ) -> tuple[NDArray, NDArray, NDArray, float]:
-    """Return independent rows without springs, and their residual."""
+    """Return independent equations without springs, and their residual."""
     rows, wanted = rigid_rows.T @ A_u, rigid_rows.T @ right
     U, S, _ = svd(rows, full_matrices=True)
     # Clearances are small, so the rank is determined relative to their size.

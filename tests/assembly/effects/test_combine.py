@@ -75,7 +75,7 @@ def test_combined_effect_equals_both_effects_in_sequence(name, standing):
 
 
 def test_every_additive_effect_has_a_combination_case():
-    """Every effect except those without a sum is in the list of cases."""
+    """The list of cases contains every effect that can be combined."""
     others = {"joint_clearance", "contact_stiffening", "geometric_stiffening"}
     assert IN_TURN.keys() | others == LIBRARY.keys()
 

@@ -258,7 +258,7 @@ TURNING = {"joint": "revolute", "actuated": True}
 
 
 def side_by_side(*joints):
-    """Return parallel chains of one joint about or along z, the first driven."""
+    """Return parallel chains of one joint each; the first joint is driven."""
     frames, closures = [], []
     for k, joint in enumerate(joints):
         frames += [Frame(f"j{k}", joint=joint, actuated=k == 0),

@@ -90,7 +90,6 @@ def test_wrench_equals_stiffness_times_deformation_of_every_spring(method):
 
 @pytest.mark.parametrize("name", ["irsbot2", "3rrr", "delta"])
 def test_energy_without_clearance_equals_that_of_a_robot_without_clearance(name, rng):
-    """Under a load, the work of the load is included."""
     home = home_posture(load_robot(name))
     errors = 1e-4 * rng.normal(size=home.robot.errors.shape)
     if name == "irsbot2":  # its proximal loops are rigid
@@ -106,7 +105,7 @@ def test_energy_without_clearance_equals_that_of_a_robot_without_clearance(name,
 
 
 def test_energy_does_not_depend_on_the_platform_frame():
-    """The screw is expressed at another reference point."""
+    """The screw of the other platform frame is that of a rigid body."""
     robot = irsbot2_with(NUMBERS["cases"][0])
     arm = np.array([0.03, -0.2, 0.11])
     tool = Frame("tool", "leg1.tip", arm)

@@ -106,7 +106,7 @@ def test_base_reactions_of_a_closed_loop_sum_to_its_weight():
 
 @pytest.mark.parametrize("size", [1e6, 1e8])
 def test_large_loads_cause_proportional_deflections(size):
-    """The deflection is proportional to a load of 1e8 N."""
+    """The loads are about 1e8 N."""
     posture = home_posture(load_robot("irsbot2"))
     once, twice = (
         solve_assembly(posture, [0, 0, 0, 0, 0, k * size]).platform_screw[5]

@@ -155,7 +155,7 @@ def test_compiled_and_reference_methods_agree_on_random_robots(
 def test_load_moves_a_pin_to_its_motion_limit(
     method,
 ):
-    """A pin in an open chain rotates by its limit of 1e-3 rad, or has no limit."""
+    """Without the limit of 1e-3 rad, the pin has no equilibrium."""
     pin = Frame("pin", joint="revolute", clearance=Clearance(spin=1e-3))
     load = [0, 0, 2.0, 0, 0, 0]
     for own, status in ((pin, "ok"), (replace(pin, clearance=None), "no equilibrium")):

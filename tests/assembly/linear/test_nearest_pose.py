@@ -100,7 +100,7 @@ def nearest_by_cvxpy(posture, point, load=None):
         problem.solve(solver=cp.CLARABEL)
     if problem.status != cp.OPTIMAL:
         # The feasible set is only 1e-9 wide, so convergence depends on the processor.
-        pytest.skip(f"the reference is not sure of its own answer: {problem.status}")
+        pytest.skip(f"cvxpy found no certain optimum: {problem.status}")
     assert problem.status == "optimal"
     return deviation.value * UNIT
 

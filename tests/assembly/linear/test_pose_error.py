@@ -105,7 +105,7 @@ def test_pose_error_includes_the_motion_limit_of_a_passive_joint(spin):
 def test_translation_error_on_a_bearing_axis_is_bounded():
     """At height h on the bearing axis, the bounds are radial + h tilt and axial.
 
-    At other points, the translation error is infinite.
+    At points outside the axis, the translation error is infinite.
     """
     clearance = Clearance(radial=1e-5, axial=2e-5, tilt=3e-4)
     hub = Frame("hub", joint="revolute", clearance=clearance)

@@ -1,4 +1,4 @@
-"""Deflections by laws of wrenches, compared with bisection."""
+"""Deflection laws, compared with bisection."""
 
 from dataclasses import replace
 
