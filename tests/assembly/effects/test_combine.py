@@ -86,7 +86,7 @@ def test_combined_joint_clearances_are_their_sums():
     assert both["joint_clearance"] == pytest.approx({"a.radial": 3e-5, "a.tilt": 1e-4})
 
 
-def test_effects_at_different_frames_do_not_change():
+def test_combination_does_not_change_effects_at_different_frames():
     declared = {"drift": {"amplitude.tz": 1e-5, "time_constant": 60.0}}
     found = {"encoder_offset": {"a": 1e-4}}
     assert combined(declared, found) == declared | found

@@ -70,7 +70,7 @@ def two_slides(first=2e6, second=3e6):
 
 
 @pytest.mark.parametrize("apart", [1e-5, -3e-3])
-def test_energy_of_preloaded_drives_equals_springs_in_series(apart):
+def test_energy_of_preloaded_drives_equals_that_of_springs_in_series(apart):
     """The energy of springs in series is k1 k2 / (k1 + k2) d^2 / 2."""
     k = 2e6, 3e6
     robot = preloaded(two_slides(*k), {"one": 0.35, "two": 0.35 + apart})

@@ -74,7 +74,7 @@ def test_motion_from_a_singular_home_is_a_pure_translation():
     assert posture.pose() == pytest.approx(flat(0.002, 0.001), abs=1e-9)
 
 
-def test_drives_move_a_singular_home_in_the_translational_mode():
+def test_drive_motions_from_a_singular_home_are_translations():
     """The intersection of three spheres is x = (L^2 - l^2) / (3 (b - p)), y = 0."""
     robot = three_upu()
     posture = place_robot(robot, joints={"leg1.slide": 0.5})

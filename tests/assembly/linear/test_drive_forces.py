@@ -121,7 +121,7 @@ def test_coupler_force_equals_crank_torque_divided_by_lever_arm(torque):
     assert solve_exact(posture).platform_screw[3] == pytest.approx(-shorter, rel=1e-3)
 
 
-def test_sole_drive_of_a_motion_rejects_force_control():
+def test_force_control_of_the_sole_drive_of_a_motion_is_rejected():
     robot = crossed_cranks()
     crank = replace(robot.frames[3], actuated=False)
     robot = replace(robot, frames=(*robot.frames[:3], crank, *robot.frames[4:]))

@@ -26,7 +26,7 @@ def rigid():
 
 
 @pytest.mark.parametrize("load", [None, LOAD])
-def test_unproved_point_equals_the_reference_method(load):
+def test_unproved_point_has_the_result_of_the_reference_method(load):
     """The field ``method`` contains the method used."""
     posture = rigid()
     asked = solve_assembly(posture, load, method="reference")

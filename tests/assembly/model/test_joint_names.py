@@ -145,7 +145,7 @@ def one_joint(tmp_path, kind, more=""):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_error_and_tolerance_of_a_joint_equal_the_file(tmp_path, kind):
+def test_error_and_tolerance_of_a_joint_equal_values_in_the_file(tmp_path, kind):
     """The values are in the axes of the joint."""
     error = [1e-5, -2e-5, 3e-5, 4e-6, -5e-6, 6e-6]
     keys = f"geometric_error = {error}\ntolerance = {[abs(x) for x in error]}"
@@ -172,7 +172,7 @@ def test_error_and_tolerance_of_a_joint_equal_the_file(tmp_path, kind):
     ("cylindrical", "clearance.tilt", "clearance = {{ radial = 1e-5, tilt = {} }}"),
     ("planar", "geometric_error.rx", "geometric_error = [{}, 0, 0, 0, 0, 1e-5]"),
 ])  # fmt: skip
-def test_changed_value_of_a_joint_equals_a_changed_file(tmp_path, kind, key, more):
+def test_changed_joint_value_acts_like_a_changed_file(tmp_path, kind, key, more):
     other = read_robot(one_joint(tmp_path, kind, more.format(3e-5)))
     design = load_design(one_joint(tmp_path, kind, more.format(1e-5)))
     changed = design.robot({f"j.{key}": 3e-5})

@@ -68,8 +68,8 @@ def test_multipliers_give_a_tight_bound_on_the_factor(rng, row, fixed):
 
 
 @pytest.mark.parametrize("reach", [1.2, 1.9, 30.0])
-def test_infeasible_row_without_scaled_cones_has_no_factor(reach):
-    """The first row contains only an interval that is not scaled."""
+def test_infeasible_equation_without_scaled_cones_has_no_factor(reach):
+    """The first equation contains only an interval that is not scaled."""
     B = np.array([[3.0, 0.0], [50.0, 0.02]])
     right = np.array([3.0 * reach, 0.01])
     t, u, n = least_factor(B, right, np.array([0, 1]), np.array([False, True]))
