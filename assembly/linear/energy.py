@@ -347,7 +347,7 @@ def _compiled(
         rows["outcome"][:] = _LEFT
     elif loads is None:
         _fill(given, rows, None)
-    # Points without loads have bit-identical results with and without this argument.
+    # Points without loads have the same results as in a call without loads.
     else:
         loaded = np.any(loads, axis=(1, 2, 3))
         for some, acting in ((loaded, loads), (~loaded, None)):

@@ -256,8 +256,8 @@ def read(conditions: Conditions, screws: NDArray) -> NDArray:
     lever = _turned(turn - np.eye(3), arm + tool)
     shift = screws[:, 3:] + lever + tool
     base = rotation_matrix(conditions.base[..., :3])
-    # The device rotation is applied to the position. Without rotation, this causes no
-    # round-off.
+    # The device rotation moves the measured position. Without rotation, this term is
+    # exactly zero.
     translation = _turned(base - np.eye(3), p + arm) + _turned(base, shift)
     translation += conditions.base[..., 3:]
     turns = conditions.base[..., :3].any()
