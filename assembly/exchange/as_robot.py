@@ -2,8 +2,7 @@
 
 A moving joint becomes a frame with the name of the joint, and a body on a fixed joint
 becomes a frame with the name of the body.  A body on a moving joint has its own frame
-if it has a mass, is the last body in a chain, or is the end of a loop, because its axes
-may then differ from those of the joint.
+if it has a mass, is the last body in a chain, or is connected by a loop closure.
 """
 
 from collections.abc import Mapping
@@ -40,13 +39,13 @@ Places = Mapping[str, tuple[str, NDArray]]
 
 @dataclass(frozen=True, eq=False)
 class RobotAndMechanism:
-    """Robot together with the corresponding mechanism.
+    """A robot with frames and the same robot as a mechanism with bodies.
 
     Attributes:
         robot: robot with frames.
         mechanism: mechanism with bodies.
-        places: for each body, its frame (``"base"`` for the root), and the pose of the
-            body in this frame after the frame's motion (4, 4).
+        places: frame of each body (``"base"`` for the root), and pose of the body
+            relative to this frame after the frame's motion, (4, 4).
     """
 
     robot: Robot
@@ -59,11 +58,11 @@ def points_as_joints(mechanism: Mechanism, home: NDArray) -> Mechanism:
 
     Args:
         mechanism: mechanism with n joints.
-        home: coordinates for which the loops are closed (n,) [rad or m].
+        home: coordinates for which the loops are closed, (n,) [rad or m].
 
     Returns:
-        Mechanism at home, in which the ball joints have zero coordinates and each loop
-        constrains all six degrees of freedom.
+        Mechanism in its home pose.  The ball joints have zero coordinates, and each
+        loop constrains all six degrees of freedom.
     """
     poses = body_poses(mechanism, home)
     bodies = dict(mechanism.bodies)
@@ -94,13 +93,14 @@ def robot_of_mechanism(mechanism: Mechanism) -> RobotAndMechanism:
     """Convert a mechanism to a robot.
 
     Args:
-        mechanism: mechanism at home, whose loops constrain all six degrees of freedom.
+        mechanism: mechanism in its home pose, whose loops constrain all six degrees of
+            freedom.
 
     Returns:
-        Robot, together with the mechanism and the places of its bodies.
+        Robot, mechanism, and poses of the bodies relative to the frames.
 
     Raises:
-        BadInput: no body can be the platform.
+        BadInput: the mechanism has no body that can be the platform.
     """
     platform = mechanism.platform or guess_platform(mechanism)
     mechanism = with_possible_moments(_without_base(mechanism))
@@ -155,7 +155,7 @@ def robot_of_mechanism(mechanism: Mechanism) -> RobotAndMechanism:
 
 
 def _without_base(mechanism: Mechanism) -> Mechanism:
-    """Rename a joint that has the reserved name of the base."""
+    """Rename the joint ``base``, because this name is reserved for the fixed base."""
     names = {joint.name for joint in mechanism.joints}
     if BASE not in names:
         return mechanism
@@ -171,14 +171,14 @@ def _without_base(mechanism: Mechanism) -> Mechanism:
 
 
 def guess_platform(mechanism: Mechanism) -> str:
-    """Return the body at the end of the longest chain, apart from loop closures.
+    """Return the body at the end of the longest chain of joints.
 
     Args:
         mechanism: mechanism with at least one joint.
 
     Returns:
-        Name of a body that carries no other body; the first one among chains of equal
-        length.
+        Name of a body without child bodies.  If several chains have the same length,
+        the first one is used.
 
     Raises:
         BadInput: the mechanism has no joint.
@@ -189,7 +189,7 @@ def guess_platform(mechanism: Mechanism) -> str:
     if len(depth) == 1:
         raise BadInput(f"{mechanism.name}: found no joint, expected at least one joint")
     met = {name for loop in mechanism.loops for name in (loop.first, loop.second)}
-    # a body that only closes a loop does not belong to the main chain
+    # bodies that were added to close a loop are not candidates
     closing = [j for j in mechanism.joints if _closes(j, mechanism)]
     made = {joint.child for joint in closing}
     met |= {joint.parent for joint in closing}
@@ -200,7 +200,7 @@ def guess_platform(mechanism: Mechanism) -> str:
 
 
 def _closes(joint: Joint, mechanism: Mechanism) -> bool:
-    """Return whether a joint is part of a multi-degree-of-freedom joint in a loop."""
+    """Return whether a joint was added to close a loop."""
     return any(
         loop.first == f"{loop.name}.tip"
         and (joint.name == loop.name or joint.name.startswith(f"{loop.name}."))
@@ -209,7 +209,7 @@ def _closes(joint: Joint, mechanism: Mechanism) -> bool:
 
 
 def _with_ends(mechanism: Mechanism) -> Mechanism:
-    """Return the mechanism with a massless body added at each end of a loop."""
+    """Add a massless body at each end of a loop, unless the end is a body frame."""
     bodies, joints, loops = dict(mechanism.bodies), list(mechanism.joints), []
     for loop in mechanism.loops:
         ends = []
@@ -228,15 +228,17 @@ def _with_ends(mechanism: Mechanism) -> Mechanism:
 
 
 def mechanism_of_robot(robot: Robot, home: NDArray) -> RobotAndMechanism:
-    """Convert a robot to a mechanism of rigid bodies, without clearance and errors.
+    """Convert a robot to a mechanism of rigid bodies.
+
+    Clearances and geometric errors are omitted.
 
     Args:
         robot: robot with n frames.
-        home: coordinates at home (n,) [rad or m].
+        home: coordinates in the home pose, (n,) [rad or m].
 
     Returns:
-        Mechanism.  The body of a fixed frame has the name of the frame; the names of
-        moving bodies have the suffix ``.link``.
+        Robot and mechanism.  The body of a fixed frame has the name of the frame.  The
+        name of a moving body is the name of its frame with the suffix ``.link``.
     """
     names = {f.name for f in robot.frames}
     root = _unlike(BASE, names)
@@ -275,7 +277,7 @@ def mechanism_of_robot(robot: Robot, home: NDArray) -> RobotAndMechanism:
 
 
 def _unlike(name: str, taken: set[str]) -> str:
-    """Return the name with a suffix that makes it unique."""
+    """Append underscores to a name until it is unique."""
     while name in taken:
         name += "_"
     return name

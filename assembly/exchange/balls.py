@@ -1,4 +1,4 @@
-"""Conversion of ball joints to three rotations that are zero at the home pose."""
+"""Ball joints as three rotations whose angles are zero in the home pose."""
 
 from dataclasses import replace
 
@@ -8,18 +8,17 @@ from forcefit.assembly.exchange.mechanism import Joint, motion
 
 
 def balls_at_rest(joints: tuple[Joint, ...]) -> tuple[Joint, ...]:
-    """Return joints in which passive ball joints have zero coordinates at home.
+    """Set the coordinates of passive ball joints to zero in the home pose.
 
-    A ball joint consists of three rotations, which lose a degree of freedom if the
-    second angle is 90 degrees. The rotation at home is therefore included in the
-    placement of the joint.
+    A ball joint consists of three rotations, which are singular if the second angle is
+    90 degrees.  The rotation in the home pose is therefore included in the placement of
+    the joint.
 
     Args:
-        joints: joints at home.
+        joints: joints in the home pose.
 
     Returns:
-        Joints in the same pose.  Only the coordinates of ball joints that were
-        converted to three consecutive rotations are changed.
+        Joints in the same pose, with changed coordinates of the ball joints.
     """
     at_rest = list(joints)
     for i in range(len(joints) - 2):
@@ -34,9 +33,10 @@ def balls_at_rest(joints: tuple[Joint, ...]) -> tuple[Joint, ...]:
 
 
 def _is_ball(turns: tuple[Joint, ...]) -> bool:
-    """Return whether three joints are the rotations of a file's passive ball joint."""
+    """Return whether three joints represent one passive ball joint."""
     name = turns[0].name.removesuffix(".rx")
-    made = {f"{name}.after_rx", f"{name}.rx.after"}  # names from chain() and from MJCF
+    # names of the first intermediate body from chain() and from the MJCF reader
+    made = {f"{name}.after_rx", f"{name}.rx.after"}
     return (
         turns[0].child in made
         and [turn.name for turn in turns] == [f"{name}.r{axis}" for axis in "xyz"]

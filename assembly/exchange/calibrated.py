@@ -1,4 +1,4 @@
-"""Calibrated robots, whose known geometric errors are part of the nominal geometry."""
+"""Calibrated geometry, which includes the known geometric errors of a robot."""
 
 from dataclasses import replace
 
@@ -11,22 +11,22 @@ from forcefit.assembly.measurement.conditions import as_declared
 from forcefit.assembly.model.robot import BeamLink, MatrixLink, Robot
 from forcefit.stiffness.screws import rotation_matrix, rotation_vector, transform
 
-# effects that do not depend on pose, temperature or load
+# names of effects that do not depend on pose, temperature or load
 CONSTANT = ("encoder_offset", "link_length")
 
 
 def with_calibration(home: Posture) -> Robot:
-    """Move the known errors of a robot to its nominal geometry.
+    """Add the known geometric errors of a robot to its nominal geometry.
 
     Args:
         home: home posture of a robot with geometric errors and effects.
 
     Returns:
-        Robot whose frames include the geometric errors and constant effects, which are
-        removed from its errors and effects.
+        Robot whose frames include the geometric errors and constant effects.  The robot
+        has no geometric errors and no effects.
 
     Raises:
-        BadInput: an effect violates one of its rules.
+        BadInput: an effect has an invalid value.
     """
     robot = home.robot
     constant = {k: v for k, v in robot.effects.items() if k in CONSTANT}
@@ -48,13 +48,13 @@ def with_calibration(home: Posture) -> Robot:
 
 
 def not_rigid(robot: Robot) -> tuple[str, ...]:
-    """Return descriptions of the properties that a rigid robot cannot represent."""
+    """Describe the properties of a robot that a model of rigid bodies omits."""
     frames = robot.frames
     kinds = {
         "elastic links": [f.name for f in frames if f.link is not None],
         "joint stiffnesses": [f.name for f in frames if f.joint_stiffness is not None],
         "clearances": [f.name for f in frames if f.clearance is not None],
-        "masses of links that are no beams": [
+        "masses of links that are not beams": [
             f.name
             for f in frames
             if not isinstance(f.link, BeamLink | MatrixLink | None)

@@ -1,7 +1,7 @@
-"""Comparison of a file as read by forcefit and by MuJoCo.
+"""Comparison of the robot that forcefit and MuJoCo read from the same file.
 
-MuJoCo is optional.  If it is installed, it reads URDF and MJCF files in a separate
-process, so that invalid files can neither crash nor block this process.
+MuJoCo is optional.  It reads URDF and MJCF files in a separate process, so that an
+invalid file can neither crash nor block this process.
 """
 
 import importlib.util
@@ -18,28 +18,28 @@ from typing import Any
 from forcefit.assembly.exchange.mechanism import Mechanism
 from forcefit.assembly.model.inertia import MassProperties
 
-# [rad, m, -] largest difference of poses and masses that counts as agreement
+# [rad, m, -] largest accepted difference of poses and masses
 AGREED = 1e-9
 POSTURES = 20
-_LONGEST = 60.0  # [s] longest run time of the other program
+_LONGEST = 60.0  # [s] maximum run time of MuJoCo
 _WORKER = "from forcefit.assembly.exchange.mujoco_reading import main; main()"
 
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """Comparison of a file as read by another program and by forcefit.
+    """Comparison of the robots that forcefit and another program read from a file.
 
     Attributes:
         reader: name and version of the other program.
-        file: file read by both programs.
+        file: name of the file.
         why_not: reason why no comparison was possible; otherwise empty.
         bodies: number of compared bodies.
-        masses: number of bodies with compared mass and moments of inertia.
+        masses: number of bodies whose mass and moments of inertia were compared.
         loops: number of compared loops.
-        difference: largest difference [rad, m], or relative difference of masses;
-            lengths are divided by the size of the robot if it exceeds 1 m.
-        where: location of the largest difference.
-        weights: mass properties of bodies that only the other program can read.
+        difference: largest difference of poses [rad, m] and relative difference of
+            masses.  Lengths are divided by the robot size if it exceeds 1 m.
+        where: body or loop with the largest difference.
+        weights: mass properties of bodies that only the other program can compute.
     """
 
     reader: str
@@ -58,15 +58,15 @@ class Comparison:
         return self.difference <= AGREED
 
     def table(self) -> dict[str, Any]:
-        """Return plain values for ``--json``."""
+        """Return the values for the option ``--json``."""
         keys = ("reader", "file", "why_not", "bodies", "masses", "loops", "difference",
                 "where")  # fmt: skip
         return {key: getattr(self, key) for key in keys}
 
     def text(self) -> str:
-        """Return one line of text."""
+        """Return the result as one line of text."""
         if self.why_not:
-            return f"{self.file} was compared with no other program: {self.why_not}"
+            return f"{self.file} was not compared with another program: {self.why_not}"
         what = f"bodies {self.bodies}, masses {self.masses}, loops {self.loops}"
         if not self.agrees:
             return (
@@ -75,24 +75,26 @@ class Comparison:
                 "reads the file correctly"
             )
         return (
-            f"{self.reader} reads {self.file} alike: largest difference "
+            f"{self.reader} reads the same robot from {self.file}: largest difference "
             f"{self.difference:.1e} in {POSTURES} random postures; {what}"
         )
 
 
 def compare(mechanism: Mechanism, path: Path) -> Comparison:
-    """Compare a mechanism with its file as read by another program.
+    """Compare a mechanism with the robot that MuJoCo reads from its file.
 
     Args:
         mechanism: mechanism that was read from or written to the file.
         path: path of the file.
 
     Returns:
-        Comparison, or the reason why none was possible.
+        The comparison.  If none was possible, it contains the reason.
     """
     name = path.name
     if path.suffix.lower() not in {".urdf", ".xml"}:
-        return Comparison("", name, f"MuJoCo reads no {path.suffix.upper()[1:]}")
+        return Comparison(
+            "", name, f"MuJoCo does not read {path.suffix.upper()[1:]} files"
+        )
     if importlib.util.find_spec("mujoco") is None:
         return Comparison("", name, "MuJoCo is not installed")
     with TemporaryDirectory() as folder:

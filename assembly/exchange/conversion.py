@@ -1,4 +1,4 @@
-"""Result of a conversion, as text and as plain values."""
+"""Result of the conversion of a robot file, and its report."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,14 +17,14 @@ class Conversion:
     Attributes:
         robot: robot that was written or read.
         files: output files.
-        open_before: mismatch of the loops in the home pose of the file [rad, m].
-        open_after: mismatch of the loops in the computed home pose [rad, m].
-        drives_held: whether the drive coordinates of the file are preserved.
-        difference: largest difference between body poses in 100 random postures after
-            reading back the output file.
-        comparisons: comparisons with the files as read by another program.
-        left_out: descriptions of parts that the output file cannot represent.
-        taken: descriptions of assumptions made because the files are incomplete.
+        open_before: loop mismatch in the home pose of the file [rad, m].
+        open_after: loop mismatch in the computed home pose [rad, m].
+        drives_held: whether the drive coordinates of the file are unchanged.
+        difference: largest difference between the body poses of the robot and of the
+            output file in 100 random postures.
+        comparisons: comparisons with MuJoCo.
+        left_out: descriptions of components that the output file cannot represent.
+        taken: descriptions of assumptions that were made because data are missing.
     """
 
     robot: Robot
@@ -43,7 +43,7 @@ class Conversion:
         return all(comparison.agrees for comparison in self.comparisons)
 
     def table(self) -> dict[str, Any]:
-        """Return plain values for ``--json``."""
+        """Return the values for the option ``--json``."""
         return {
             "robot": self.robot.name,
             "platform": self.robot.platform,
@@ -62,25 +62,23 @@ class Conversion:
         }
 
     def text(self) -> str:
-        """Return a few lines of text."""
+        """Return the report as text."""
         robot = self.robot
         count = len(loops(robot))
         lines = [
             f"{robot.name}: {len(robot.frames)} frames, "
             f"{count} loop{'s' * (count != 1)}, platform {quoted(robot.platform)}",
             (
-                "read back in 100 random postures: largest difference of the "
-                f"bodies' poses {self.difference:.1e} (computed by forcefit itself, "
-                "to check the written file)"
+                "read back in 100 random postures: largest difference of body poses "
+                f"{self.difference:.1e} (by forcefit, to verify the output file)"
             ),
             *(comparison.text() for comparison in self.comparisons),
         ]
         if count:
-            moved = "" if self.drives_held else "; the drives' coordinates were changed"
+            moved = "" if self.drives_held else "; the drive coordinates were changed"
             lines.append(
-                f"home: loops open by {self.open_before:.2g} rad or m in the "
-                f"file's own pose, {self.open_after:.1e} in the computed "
-                f"pose{moved}"
+                f"home pose: loop mismatch {self.open_before:.2g} rad or m in the "
+                f"pose of the file, {self.open_after:.1e} in the computed pose{moved}"
             )
         lines += [f"taken: {line}" for line in self.taken]
         lines += [f"left out: {line}" for line in self.left_out]

@@ -80,9 +80,10 @@ def convert(
             the source.
         overlay: TOML file with elasticity, clearances and errors, by frame name.
         points: names of loops that are closed only at a point, in addition to loops of
-            type 3d; an empty list to use the declared types.  By default, the declared
-            types are used, unless all loops are declared as 6d and cannot be closed; in
-            this case, all loops become points, which the result reports.
+            type 3d.  If the list is empty, the declared types are used.  By default,
+            the declared types are used, unless all loops are declared as 6d and cannot
+            be closed.  In this case, all loops are closed only at a point, and the
+            result reports this.
         close: for a robot file or built-in robot, the result of
             :func:`forcefit.assembly.kinematics.closing.closing_of`, or None.
         version: version of the robot file format: 1 for frames and closures, 2 for
@@ -92,8 +93,8 @@ def convert(
         Output files, and their difference from the source.
 
     Raises:
-        BadInput: a file violates a rule, a loop cannot be closed, or the output differs
-            from the source; in these cases, no file is written.
+        BadInput: a file is invalid, a loop cannot be closed, or the output differs from
+            the source.  No file is written in these cases.
     """
     source, target = Path(source), Path(target)
     check_target(target)
@@ -125,14 +126,14 @@ def convert(
 
 
 def check_target(target: Path) -> None:
-    """Check before the conversion that the output file can be written.
+    """Check that the output file can be written.
 
     Args:
-        target: path of the file; for a URDF, a YAML file is written as well.
+        target: path of the file.  For a URDF, a YAML file is written as well.
 
     Raises:
-        BadInput: the file extension is not supported, or one of the files cannot be
-            written or already exists and was written by another program.
+        BadInput: the file extension is not supported, a file cannot be written, or a
+            file from another program exists at this path.
     """
     ending = target.suffix.lower()
     if ending not in _KINDS:
@@ -155,7 +156,7 @@ def write_converted(robot: Robot, target: Path, version: int = 1) -> Conversion:
         Output files, and their difference from the robot.
 
     Raises:
-        BadInput: the file cannot be written, or would describe a different robot.
+        BadInput: the file cannot be written, or the robot that is read back differs.
     """
     mismatch = home_posture(robot).mismatch
     conversion = Conversion(
@@ -174,7 +175,7 @@ def _written(
     conversion: Conversion, placed: RobotAndMechanism | None, target: Path,
     version: int = 1,
 ) -> Conversion:  # fmt: skip
-    """Write, read back and compare in a temporary folder, then move to the target."""
+    """Check the conversion in a temporary folder, then write the target files."""
     ending, robot = target.suffix.lower(), conversion.robot
     texts: dict[Path, str] = {}
     with TemporaryDirectory() as folder:
@@ -220,7 +221,7 @@ def _written(
 
 
 def _built_in(conversion: Conversion) -> tuple[Conversion, RobotAndMechanism]:
-    """Return the rigid mechanism of a calibrated robot with closed loops."""
+    """Return the mechanism with the calibrated geometry and closed loops."""
     threads = [quoted(f.name) for f in conversion.robot.frames if f.pitch]
     if threads:
         raise BadInput(
@@ -234,15 +235,15 @@ def _built_in(conversion: Conversion) -> tuple[Conversion, RobotAndMechanism]:
     mechanism = placed.mechanism
     left_out = [*conversion.left_out, *not_rigid(conversion.robot)]
     after, held = loop_residual(mechanism, home), conversion.drives_held
-    if after >= CLOSED:  # the calibrated errors open the loops
+    if after >= CLOSED:  # loops do not close with the calibrated geometry
         home, after, held = nearest_closed(mechanism, 0)
         pairs = zip(mechanism.joints, home, strict=True)
         joints = tuple(replace(j, position=float(q)) for j, q in pairs)
         placed = replace(placed, mechanism=replace(mechanism, joints=joints))
     if after >= 1e-6:
         left_out.append(
-            f"with the calibrated geometry the loops stay open by {after:.2g} "
-            "rad or m: rigid bodies cannot close them, forced assembly can"
+            f"with the calibrated geometry, the loops remain open by {after:.2g} rad "
+            "or m, because rigid bodies cannot close them; use forced assembly"
         )
     positions = dict(zip((f.name for f in robot.frames), home, strict=True))
     frames = (replace(f, position=float(positions[f.name])) for f in robot.frames)
@@ -254,7 +255,7 @@ def _built_in(conversion: Conversion) -> tuple[Conversion, RobotAndMechanism]:
 
 
 def _texts(mechanism: Mechanism, target: Path) -> dict[Path, str]:
-    """Return the text of each file to be written."""
+    """Return the text of each output file."""
     if target.suffix.lower() == ".xml":
         return {target: mjcf_text(mechanism)}
     beside: LoopsFile = loops_of(mechanism)
@@ -263,7 +264,7 @@ def _texts(mechanism: Mechanism, target: Path) -> dict[Path, str]:
 
 
 def _read_back(path: Path) -> Mechanism:
-    """Return the mechanism of the files that were just written."""
+    """Read the mechanism from the output files."""
     if path.suffix.lower() == ".xml":
         return read_mjcf(path)
     return read_urdf(path, read_loops(path.with_suffix(".yaml")))

@@ -1,4 +1,4 @@
-"""Couplings between joints: one coordinate is a polynomial in another coordinate."""
+"""Couplings, which make one joint coordinate a polynomial of another coordinate."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -25,7 +25,10 @@ class Coupling:
     leader_rest: float = 0.0
 
     def at(self, leader: float) -> tuple[float, float]:
-        """Return the follower's coordinate and its derivative by the leader's."""
+        """Return the follower's coordinate and its derivative.
+
+        The derivative is with respect to the leader's coordinate.
+        """
         x = leader - self.leader_rest
         value = slope = 0.0
         for c in reversed(self.coefficients):
@@ -34,7 +37,7 @@ class Coupling:
         return self.rest + value, slope
 
     def text(self) -> str:
-        """Return the rule as text, with the names of both joints."""
+        """Return the equation of the coupling as text."""
         c = [*self.coefficients, 0.0, 0.0]
         if self.leader is None:
             return f"{self.follower} = {self.rest + c[0]:g}"
@@ -48,7 +51,7 @@ class Coupling:
 
 
 def leaders_first(couplings: Sequence[Coupling], file: str) -> tuple[Coupling, ...]:
-    """Sort couplings so that the coupling of a leader precedes those of its followers.
+    """Sort couplings such that each leader is computed before its followers.
 
     Args:
         couplings: couplings in any order.
@@ -58,7 +61,7 @@ def leaders_first(couplings: Sequence[Coupling], file: str) -> tuple[Coupling, .
         The sorted couplings.
 
     Raises:
-        BadInput: a joint follows two others, itself, or one of its followers.
+        BadInput: a joint follows two joints, itself, or one of its followers.
     """
     of: dict[str, Coupling] = {}
     for coupling in couplings:

@@ -1,4 +1,4 @@
-"""Addition of the loops, drives, joint types and home pose in a loops file."""
+"""Addition of loops, drives, joint types and home pose from a loops file."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -20,17 +20,18 @@ def with_loops(
     mechanism: Mechanism, loops: LoopsFile | None, parts: Mapping[str, Sequence[str]],
     driven: set[str],
 ) -> Mechanism:  # fmt: skip
-    """Return the mechanism with the loops, drives, platform and home of a loops file.
+    """Add the loops, drives, platform and home pose of a loops file to a mechanism.
 
     Args:
         mechanism: mechanism of the robot's file.
         loops: the loops file; None if there is none.
-        parts: joints of the robot's file, each with the names of its parts.
+        parts: names of the elementary joints, by the name of the joint in the file.
         driven: joints that the robot's file declares as driven.
 
     Returns:
-        The mechanism.  Its drives are those of the loops file; if the loops file lists
-        none, ``driven``; if this is also empty and there are no loops, all joints.
+        The mechanism.  Its drives are those of the loops file.  If the loops file does
+        not list drives, they are the joints in ``driven``.  If this set is empty and
+        there are no loops, all joints are driven.
 
     Raises:
         BadInput: a name is not a joint or link of the robot.
@@ -44,9 +45,9 @@ def with_loops(
     mechanism, parts = _retyped(mechanism, loops.turns, parts)
     ends = {name: name for name in mechanism.bodies}
     children = {joint.name: joint.child for joint in mechanism.joints}
-    # a joint with several degrees of freedom ends at the last of its joints
+    # the child of a joint with several degrees of freedom is that of its last part
     ends |= {name: children[several[-1]] for name, several in parts.items()}
-    # a link on a fixed joint may have the joint's name: both denote the same place
+    # a fixed joint and its link may have the same name, because both mean one frame
     count, closed = len(mechanism.loops), list(mechanism.loops)
     for i, (pair, point) in enumerate(zip(loops.pairs, loops.points, strict=True), 1):
         for name in pair:
@@ -96,7 +97,7 @@ def with_loops(
 def _followed(
     joints: tuple[Joint, ...], couplings: Sequence[Coupling], loops: LoopsFile
 ) -> tuple[Joint, ...]:
-    """Return the joints; each coupled joint has the coordinate of its coupling."""
+    """Set the home coordinates of coupled joints according to their couplings."""
     at = {joint.name: joint.position for joint in joints}
     for coupling in couplings:
         name = coupling.follower
@@ -105,7 +106,7 @@ def _followed(
         if abs(given - value) > 1e-9 * max(1.0, abs(value)):
             raise BadInput(
                 f"{loops.file}: home.{name}: found {given:g}, but the joint "
-                f"follows another one ({coupling.text()}); expected "
+                f"follows another joint ({coupling.text()}); expected "
                 f"{value:.12g}, or remove this entry"
             )
         at[name] = value
@@ -115,7 +116,7 @@ def _followed(
 def _couplings_said(
     joints: tuple[Joint, ...], couplings: Sequence[Coupling]
 ) -> Iterator[str]:
-    """Yield a text for each coupled joint that becomes an independent drive."""
+    """Yield a remark on each coupled joint, which becomes an independent drive."""
     driven = {joint.name for joint in joints if joint.actuated}
     for coupling in couplings:
         line = (
@@ -124,8 +125,8 @@ def _couplings_said(
         )
         if coupling.leader is not None and coupling.leader not in driven:
             line += (
-                f" ({coupling.leader} is passive: no force passes from one to the "
-                "other)"
+                f" ({coupling.leader} is passive, and no force is transmitted between "
+                "the two joints)"
             )
         yield line
 
@@ -133,7 +134,7 @@ def _couplings_said(
 def _retyped(
     mechanism: Mechanism, turns: Mapping[str, str], parts: Mapping[str, Sequence[str]]
 ) -> tuple[Mechanism, dict[str, list[str]]]:
-    """Return joints with their declared types, which a CAD export may have lost."""
+    """Replace joints by the joint types that a loops file declares."""
     bodies, joints = dict(mechanism.bodies), list[Joint]()
     now = {name: list(several) for name, several in parts.items()}
     for joint in mechanism.joints:

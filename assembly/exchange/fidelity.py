@@ -13,25 +13,25 @@ from forcefit.assembly.kinematics.posture import home_posture
 from forcefit.assembly.model.robot import BASE, Robot
 from forcefit.inputs.errors import BadInput
 
-FAITHFUL = 1e-12  # [rad, lengths] largest accepted difference of a body's pose
+FAITHFUL = 1e-12  # [rad, m] largest accepted difference of body poses
 _POSTURES = 100
 
 
 def largest_difference(placed: RobotAndMechanism) -> float:
     """Return the largest difference between body poses in random postures.
 
-    All joints of both trees are moved by up to 1 rad or 1 m from home, without closing
-    the loops.
+    All joints are moved by up to 1 rad or 1 m from the home pose.  The loops are not
+    closed.
 
     Args:
         placed: robot and mechanism, one of which was read back from a file.
 
     Returns:
-        Largest difference between entries of the body transforms; lengths are divided
+        Largest difference between entries of the body transforms.  Lengths are divided
         by the largest distance from the base if it exceeds 1 m.
 
     Raises:
-        BadInput: a joint exists in only one of the two.
+        BadInput: a joint exists in only one of the two robots.
     """
     robot, mechanism = placed.robot, placed.mechanism
     moving = [joint.name for joint in mechanism.joints if joint.kind != "fixed"]
@@ -55,7 +55,7 @@ def largest_difference(placed: RobotAndMechanism) -> float:
         reach = max(1.0, max(np.abs(T[:3, 3]).max() for T in poses.values()))
         scale = np.array([[1.0, 1.0, 1.0, 1 / reach]])
         for name, (frame, at) in placed.places.items():
-            if frame == BASE:  # the root, whatever its name
+            if frame == BASE:
                 continue
             gap = (poses[name] - frames[frame] @ at)[:3] * scale
             worst = max(worst, float(np.abs(gap).max()))
@@ -63,19 +63,19 @@ def largest_difference(placed: RobotAndMechanism) -> float:
 
 
 def drawn_difference(robot: Robot, back: Robot, frames: Mapping[str, str]) -> float:
-    """Return the largest difference between a robot and the robot of its drawing.
+    """Return the largest difference between a robot and its file of format 2.
 
     Joints that occur in both trees in the same order are moved at random, as in
-    :func:`largest_difference`; ball, cylindrical and planar joints stay at home.
+    :func:`largest_difference`.  Ball, cylindrical and planar joints are not moved.
 
     Args:
-        robot: robot that was written as a drawing.
-        back: robot that was read back from the drawing.
+        robot: robot that was written to a file of format 2.
+        back: robot that was read back from this file.
         frames: names of joint frames in ``back``, by their names in ``robot``.
 
     Returns:
-        Largest difference of a joint's point or axis, or of the platform's point;
-        points are divided by the largest distance from the base if it exceeds 1 m.
+        Largest difference between joint positions, joint axes and platform positions.
+        Positions are divided by the largest distance from the base if it exceeds 1 m.
     """
     homes = home_posture(robot).coordinates, home_posture(back).coordinates
     rows = [(robot.index(a), back.index(b)) for a, b in frames.items()]
@@ -104,7 +104,7 @@ def drawn_difference(robot: Robot, back: Robot, frames: Mapping[str, str]) -> fl
 def _passes(
     robot: Robot, row: int, pairs: Sequence[tuple[int, int]], which: int
 ) -> tuple[object, ...]:
-    """Return the joints that precede a frame: pairs by number, others by name."""
+    """Return the numbers of the paired joints between the base and a frame."""
     numbers = {pair[which]: k for k, pair in enumerate(pairs)}
     passed = np.flatnonzero(robot.on_path[row]).tolist()
     moving = [i for i in passed if i != row and robot.frames[i].joint != "fixed"]
@@ -112,7 +112,7 @@ def _passes(
 
 
 def _placed(robot: Robot, q: NDArray) -> NDArray:
-    """Return the poses (n, 4, 4) of the frames before their joints' motions."""
+    """Return the poses of the frames before the motion of their joints, (n, 4, 4)."""
     kinds = np.array([KINDS[f.joint] for f in robot.frames])
     leads = np.array([f.lead for f in robot.frames])
     return place_frames(robot.parents, kinds, robot.fixed_transforms, q, leads)[0]

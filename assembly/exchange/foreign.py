@@ -1,4 +1,4 @@
-"""Import of robots from other programs, with a home pose in which the loops close."""
+"""Import of robots from other programs, with a home pose in which loops are closed."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -50,13 +50,14 @@ def robot_of_file(
             as a URDF.
         overlay: TOML file with elasticity, clearances and errors, by frame name.
         points: names of loops that are closed only at a point.
-        ask: whether the file is compared with the reading of another program.
+        ask: whether MuJoCo also reads the file for a comparison.
 
     Returns:
-        Robot with the report of its conversion (without files), and its mechanism.
+        Result of the conversion, which contains the robot, and the robot together with
+        its mechanism.
 
     Raises:
-        BadInput: a file violates a rule, or a loop cannot be closed.
+        BadInput: a file is invalid, or a loop cannot be closed.
     """
     if loops is None and source.suffix.lower() == ".urdf":
         loops = find_loops_file(source)
@@ -112,12 +113,13 @@ def _closed(
     Args:
         mechanism: mechanism as read from the file.
         source: path of the file.
-        beside: loops file whose types may be generated defaults, so that loops become
-            points if they cannot be closed otherwise; None if the types are certain.
+        beside: loops file whose loop types may be default values.  If the loops cannot
+            be closed with these types, all loops are closed only at a point.  None if
+            the types were chosen by a user.
 
     Returns:
         Mechanism, its home coordinates (n,) [rad or m], whether the drive coordinates
-        of the file are preserved, and descriptions of the assumptions.
+        of the file are unchanged, and descriptions of the assumptions.
 
     Raises:
         BadInput: the loops cannot be closed.
@@ -138,16 +140,16 @@ def _closed(
         reason = str(error).removeprefix(f"{source}: ")
         taken = (
             (
-                "all loops as 3d (closed at a point with free orientation): the file "
-                "declares all as 6d, which generators write by default, but then they "
-                f"cannot be closed ({reason}); use --points to declare the 3d loops"
+                "all loops as 3d (closed at a point with free orientation), because "
+                "they cannot be closed as 6d, which generators write by default "
+                f"({reason}); use --points to declare the 3d loops"
             ),
         )
         return loose, home, held, taken
 
 
 def _named_platform(overlay: Path | str) -> str | None:
-    """Return the platform named in an overlay, or None."""
+    """Return the name of the platform in an overlay, or None."""
     given = read_toml(overlay)
     if not given.has("platform"):
         return None
@@ -158,7 +160,7 @@ def _laid_over(
     placed: RobotAndMechanism, source: Path, overlay: Path | str | None,
     named: str | None,
 ) -> Robot:  # fmt: skip
-    """Apply an overlay, which may name a body as the platform, to a robot."""
+    """Apply an overlay to a robot; the overlay may specify the platform."""
     content = robot_table(placed.robot)
     if overlay is None:
         return robot_of(Table(content, str(source), ""), source.stem)
@@ -169,7 +171,7 @@ def _laid_over(
 
 
 def _left_out(placed: RobotAndMechanism, named: str | None) -> tuple[str, ...]:
-    """Return descriptions of parts that a robot of frames cannot represent."""
+    """Describe the content of a file that a robot with frames cannot represent."""
     mechanism = placed.mechanism
     weight = mechanism.bodies[mechanism.root].mass
     lines = list(mechanism.left_out)
@@ -185,7 +187,7 @@ def _left_out(placed: RobotAndMechanism, named: str | None) -> tuple[str, ...]:
 
 
 def _weighed(mechanism: Mechanism, comparison: Comparison) -> Mechanism:
-    """Adopt the masses of meshes from another program, or report them as missing."""
+    """Use the masses of meshes from MuJoCo, or report that they are missing."""
     known = comparison.weights
     bodies = dict(mechanism.bodies)
     for name, (mass, centre, J) in known.items():

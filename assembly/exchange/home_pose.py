@@ -1,4 +1,4 @@
-"""Search for a home pose in which all loops close, near the home pose of the file."""
+"""Search for a home pose with closed loops near the home pose of the file."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -16,29 +16,29 @@ from forcefit.assembly.exchange.tree import place_frames
 from forcefit.inputs.errors import BadInput, quoted
 from forcefit.stiffness.screws import rotation_vector, skew, transform
 
-CLOSED = 1e-10  # [rad, m] largest mismatch of a loop that counts as closed
-_SCREWED_TIGHT = 1e-14  # scaled loop mismatch that corresponds to machine precision
-_STARTS = 20  # number of random starts, at increasing distance from the home pose
-_STARTS_ALONE = 12  # number of starts for a single loop, to find one that cannot close
+CLOSED = 1e-10  # [rad, m] largest mismatch of a closed loop
+_SCREWED_TIGHT = 1e-14  # scaled loop mismatch at machine precision
+_STARTS = 20  # number of random starting points for all loops together
+_STARTS_ALONE = 12  # number of random starting points for a single loop
 _STEPS = 200  # maximum number of iterations per start
-_LONGEST_STEP = 0.3  # [rad or robot sizes] maximum step length
-# a search is considered stalled if ten steps reduce the sum of squares by less than
-# this factor
+_LONGEST_STEP = 0.3  # [rad, or fraction of the robot size] maximum step length
+# a search stops if ten iterations reduce the sum of squares to more than this fraction
 _STALLED = 0.999
 
 
 def loop_residual(mechanism: Mechanism, coordinates: NDArray) -> float:
-    """Return the largest component [rad, m] of the mismatch of all loops."""
+    """Return the largest component of the loop mismatches [rad, m]."""
     residual = _Loops(mechanism, 1.0).equations(coordinates)[0]
     return float(np.abs(residual).max(initial=0.0))
 
 
 def close_loops(mechanism: Mechanism, file: str) -> tuple[NDArray, bool]:
-    """Find joint coordinates close to those of the file for which all loops are closed.
+    """Find joint coordinates that close all loops, near those of the file.
 
-    The first search holds the drives.  If it fails, the next search also moves the
-    drives, and is followed by searches from random starts at increasing distances.  The
-    random starts are the same on each call.
+    In the first search, the drive coordinates are fixed.  If it fails, the drive
+    coordinates are varied as well, first from the coordinates of the file and then from
+    random starting points at increasing distances.  The random starting points are the
+    same in each call.
 
     Args:
         mechanism: mechanism with n joints.
@@ -46,11 +46,10 @@ def close_loops(mechanism: Mechanism, file: str) -> tuple[NDArray, bool]:
 
     Returns:
         Coordinates (n,) [rad or m], and whether the drive coordinates of the file are
-        preserved.
+        unchanged.
 
     Raises:
-        BadInput: no search closes the loops; the message names the loop that fails and
-            its mismatch.
+        BadInput: no search closes the loops.
     """
     coordinates, residual, held = nearest_closed(mechanism, 0)
     if residual >= CLOSED:
@@ -61,13 +60,13 @@ def close_loops(mechanism: Mechanism, file: str) -> tuple[NDArray, bool]:
         raise BadInput(
             f"{file}: its {len(mechanism.loops)} loops cannot be closed together: "
             f"the smallest gap found is {residual:.3g} rad or m; check the lengths "
-            "and the types 6d and 3d (--points)"
+            "and the loop types 6d and 3d (--points)"
         )
     return coordinates, held
 
 
 def _check_alone(mechanism: Mechanism, file: str) -> None:
-    """Raise BadInput for a loop that cannot be closed on its own."""
+    """Check that the only loop of a mechanism can be closed."""
     (loop,) = mechanism.loops
     residual = nearest_closed(mechanism, _STARTS_ALONE)[1]
     if residual >= CLOSED:
@@ -80,15 +79,15 @@ def _check_alone(mechanism: Mechanism, file: str) -> None:
 
 
 def nearest_closed(mechanism: Mechanism, starts: int) -> tuple[NDArray, float, bool]:
-    """Find joint coordinates with minimum loop mismatch, close to those of the file.
+    """Find joint coordinates with minimum loop mismatch, near those of the file.
 
     Args:
         mechanism: mechanism with n joints.
-        starts: number of random starts, in addition to the coordinates of the file.
+        starts: number of random starting points.
 
     Returns:
         Coordinates (n,) [rad or m], their loop mismatch [rad, m], and whether the drive
-        coordinates of the file are preserved.
+        coordinates of the file are unchanged.
     """
     loops = _Loops(mechanism, _size(mechanism))
     coordinates, residual, held = mechanism.home, np.inf, True
@@ -103,7 +102,7 @@ def nearest_closed(mechanism: Mechanism, starts: int) -> tuple[NDArray, float, b
 
 
 def _attempts(mechanism: Mechanism, starts: int) -> Iterator[tuple[NDArray, bool]]:
-    """Yield starting coordinates, and whether the drives are held."""
+    """Yield starting points, and whether the drive coordinates are fixed."""
     start = mechanism.home
     yield start, True
     yield start, False
@@ -116,10 +115,10 @@ def _attempts(mechanism: Mechanism, starts: int) -> Iterator[tuple[NDArray, bool
 
 
 def _solve(loops: "_Loops", start: NDArray, hold: bool) -> NDArray:
-    """Return the result of a Levenberg-Marquardt search from one start."""
+    """Run a Levenberg-Marquardt search from one starting point."""
     followers = [follower for follower, *_ in loops.coupled]
     driven = loops.actuated.copy()
-    driven[followers] = False  # leaders determine the followers
+    driven[followers] = False  # leaders determine the coordinates of followers
     free = loops.moving & loops.concerned & ~(hold & driven)
     unit = np.where(loops.kinds == 2, loops.size, 1.0)
     q, damping = start.astype(float), 1e-3
@@ -133,7 +132,7 @@ def _solve(loops: "_Loops", start: NDArray, hold: bool) -> NDArray:
                 break
             before = r @ r
         A = (J * unit)[:, free]
-        # damping as additional rows does not square the condition number
+        # damping in additional rows avoids squaring the condition number
         damped = np.vstack([A, np.sqrt(damping) * np.eye(A.shape[1])])
         x = np.linalg.lstsq(damped, np.append(r, np.zeros(A.shape[1])), rcond=None)[0]
         x *= min(1.0, _LONGEST_STEP / max(np.abs(x).max(initial=0.0), 1e-300))
@@ -151,7 +150,7 @@ def _solve(loops: "_Loops", start: NDArray, hold: bool) -> NDArray:
 
 
 def _size(mechanism: Mechanism) -> float:
-    """Return the largest distance between neighbouring joints [m], or 1 if zero."""
+    """Return the largest distance between neighbouring joints [m]; 1 if it is zero."""
     lengths = [np.linalg.norm(joint.placement[:3, 3]) for joint in mechanism.joints]
     return float(max(lengths, default=0.0)) or 1.0
 
@@ -168,28 +167,32 @@ class _Loops:
 
     @cached_property
     def kinds(self) -> NDArray:
-        """Type of each joint (n,): 0 fixed, 1 revolute or helical, 2 prismatic."""
+        """Type of each joint, (n,): 0 fixed, 1 revolute or helical, 2 prismatic."""
         kinds = {"fixed": 0, "revolute": 1, "helical": 1, "prismatic": 2}
         return np.array([kinds[j.kind] for j in self.mechanism.joints], int)
 
     @cached_property
     def leads(self) -> NDArray:
-        """Translation per angle of helical joints (n,) [m/rad]; 0 for all others."""
+        """Leads of helical joints, (n,) [m/rad]; 0 for other joints."""
         return np.array([j.lead for j in self.mechanism.joints], float)
 
     @property
     def moving(self) -> NDArray:
-        """Whether each joint can move (n,)."""
+        """Whether each joint is movable, (n,)."""
         return self.kinds > 0
 
     @cached_property
     def actuated(self) -> NDArray:
-        """Whether each joint is driven (n,)."""
+        """Whether each joint is driven, (n,)."""
         return np.array([j.actuated for j in self.mechanism.joints], dtype=bool)
 
     @cached_property
     def tree(self) -> tuple[NDArray, NDArray, dict[str, tuple[int, NDArray]]]:
-        """Parents (n,), their frames (n, 4, 4); and joint and pose of each body."""
+        """Tree of joints with the z axis along each joint axis.
+
+        The tree consists of the parent of each joint, (n,), the pose of each joint
+        relative to its parent, (n, 4, 4), and the joint and pose of each body.
+        """
         on: dict[str, tuple[int, NDArray]] = {self.mechanism.root: (-1, np.eye(4))}
         parents, fixed = [], []
         for row, joint in enumerate(self.mechanism.joints):
@@ -203,7 +206,7 @@ class _Loops:
 
     @cached_property
     def ends(self) -> list[tuple[tuple[int, NDArray], tuple[int, NDArray], NDArray]]:
-        """Joint and pose of both ends of each loop, and its constrained rows."""
+        """Joint and pose of both ends of each loop, and constrained components."""
         on, places = self.tree[2], []
         for loop in self.mechanism.loops:
             (i, A), (j, B) = on[loop.first], on[loop.second]
@@ -213,7 +216,7 @@ class _Loops:
 
     @cached_property
     def carried(self) -> NDArray:
-        """Mask (n + 1, n) of the joints that move each body; the root comes last."""
+        """Mask of the joints that move each body, (n + 1, n); the last row is zero."""
         parents = self.tree[0]
         marks = np.zeros((len(parents) + 1, len(parents)))
         for i, parent in enumerate(parents):
@@ -223,11 +226,11 @@ class _Loops:
 
     @cached_property
     def concerned(self) -> NDArray:
-        """Whether the motion of each joint affects the mismatch of a loop (n,)."""
+        """Whether the motion of each joint affects a loop mismatch, (n,)."""
         marks = np.zeros(len(self.kinds), dtype=bool)
         for (i, _), (j, _), _ in self.ends:
             marks |= self.carried[i] != self.carried[j]
-        # couplings are sorted such that followers come after their leaders
+        # in the list of couplings, leaders precede their followers
         for follower, leader, _ in reversed(self.coupled):
             if leader >= 0:
                 marks[leader] |= marks[follower]
@@ -237,7 +240,10 @@ class _Loops:
 
     @cached_property
     def coupled(self) -> list[tuple[int, int, Coupling]]:
-        """Indices of follower and leader (-1 without a leader), and their coupling."""
+        """Indices of follower and leader, and their coupling.
+
+        The index is -1 if there is no leader.
+        """
         row = {joint.name: k for k, joint in enumerate(self.mechanism.joints)}
         return [
             (row[one.follower], row.get(one.leader or "", -1), one)
@@ -245,7 +251,10 @@ class _Loops:
         ]
 
     def equations(self, q: NDArray) -> tuple[NDArray, NDArray]:
-        """Return the mismatch with scaled translations, and its Jacobian."""
+        """Return the residuals of all equations and their Jacobian.
+
+        Translations are divided by the robot size.
+        """
         parents, fixed, _ = self.tree
         before, after = place_frames(parents, self.kinds, fixed, q, self.leads)
         p = before[:, :3, 3]
@@ -258,7 +267,8 @@ class _Loops:
             poses, moved = [], []
             for joint, place in places:
                 T = place if joint < 0 else after[joint] @ place
-                # z x (origin of T - p), and the translation of a thread along z
+                # a joint at p moves the origin of T by z x (origin - p), and a helical
+                # joint also along z
                 arm = np.where(turning, z @ skew(T[:3, 3]) - past_axes, z)
                 screws = np.concatenate([z * turning, arm], axis=1)
                 poses.append(T)

@@ -1,15 +1,16 @@
-"""Loops files (``robot.yaml``): loops and drives, which URDF cannot represent.
+"""Loops files (``robot.yaml``), which add loops and drives to a URDF.
 
-The format is that of the project example-parallel-robots. ``closed_loop`` lists pairs
-of joints or links that coincide; ``type`` is ``6d``, or ``3d`` if only the points
-coincide; ``name_mot`` lists the drives.  ``joint_name`` and ``joint_type`` declare
-joints as SPHERICAL, FIXED or as a UJOINT about two axes (_XY, _YX, ..), because CAD
-programs export such joints as a single rotation.  The keys ``home`` (coordinates by
-joint) and ``platform`` are extensions of forcefit, which other readers ignore.
+The format was defined by the project example-parallel-robots.  ``closed_loop`` lists
+pairs of joints or links whose frames coincide.  ``type`` is ``6d`` if the entire frames
+coincide, and ``3d`` if only their origins coincide.  ``name_mot`` lists the drives.
+``joint_name`` and ``joint_type`` declare joints as SPHERICAL, FIXED or as a UJOINT
+about two axes (_XY, _YX, ..), because CAD programs export such joints as a single
+rotation.  The keys ``home`` (coordinates by joint) and ``platform`` are extensions of
+forcefit.
 
 The generator of that project writes ``6d`` for all loops, and users are expected to
-correct the types.  If a file contains only ``6d``, it may not have been corrected; its
-loops therefore become points if they cannot be closed otherwise.
+correct the types.  Therefore, if a file contains only ``6d`` and its loops cannot be
+closed, they are closed only at points.
 
 Sources:
     Batto, de Matteis, example-parallel-robots: ``loader_tools.py``, ``generateYAML``.
@@ -38,10 +39,10 @@ class LoopsFile:
 
     Attributes:
         file: name of the file, for messages.
-        pairs: names of joints or links that coincide.
-        points: whether only the points coincide, for each pair.
+        pairs: names of joints or links whose frames coincide.
+        points: whether only the origins of the frames coincide, for each pair.
         drives: names of the driven joints; None if the file does not list them.
-        turns: actual rotation axes by joint, for example ``"xyz"``.
+        turns: rotation axes by joint, for example ``"xyz"`` for a ball joint.
         home: coordinates at home [rad or m], by joint.
         platform: name of a link, or None.
         passed_over: unknown keys, which are ignored.
@@ -63,7 +64,7 @@ class LoopsFile:
 
 
 def find_loops_file(robot: Path) -> Path | None:
-    """Return the path of the loops file in the folder of a robot, or None."""
+    """Return the path of the loops file next to a robot file, or None."""
     for path in (robot.with_suffix(".yaml"), robot.parent / "robot.yaml"):
         if path.is_file():
             return path
@@ -113,7 +114,8 @@ def with_points(loops: LoopsFile, names: Sequence[str]) -> LoopsFile:
 
     Args:
         loops: content of a loops file.
-        names: ``loop1`` for the first loop, the name of either end, or ``all``.
+        names: names of loops.  A loop is named by its number (``loop1``) or by one of
+            its joints or links; ``all`` denotes all loops.
 
     Returns:
         Loops with the new types.
@@ -128,7 +130,7 @@ def with_points(loops: LoopsFile, names: Sequence[str]) -> LoopsFile:
     for name in names:
         if name not in of_loop:
             raise BadInput(
-                f"--points: found {quoted(name)}, expected loops of {loops.file}"
+                f"--points: found {quoted(name)}, expected a loop of {loops.file}"
                 f"{nearest(name, of_loop)}"
             )
     chosen = set().union(*(of_loop[name] for name in names))
@@ -137,7 +139,7 @@ def with_points(loops: LoopsFile, names: Sequence[str]) -> LoopsFile:
 
 
 def loops_text(loops: LoopsFile) -> str:
-    """Return the text of a loops file, with numbers at full precision."""
+    """Return the text of a loops file, with numbers in full precision."""
     rows = [f"[{_word(a)}, {_word(b)}]" for a, b in loops.pairs]
     kinds = ["3d" if point else "6d" for point in loops.points]
     lines = [
@@ -155,7 +157,7 @@ def loops_text(loops: LoopsFile) -> str:
 
 
 def _reason(error: Exception) -> str:
-    """Return the place and cause of a YAML error on one line."""
+    """Return the position and cause of a YAML error on one line."""
     mark, problem = getattr(error, "problem_mark", None), getattr(error, "problem", "")
     if mark is None or not problem:
         return one_line(str(error), 200)
@@ -194,7 +196,7 @@ def _list(table: Table, key: str) -> list[Any]:
 
 
 def _names(table: Table, key: str) -> tuple[str, ...]:
-    """Return the list of names under a key of a table."""
+    """Return a list of names under a key of a table."""
     values = _list(table, key)
     for value in values:
         if not isinstance(value, str):
@@ -203,7 +205,7 @@ def _names(table: Table, key: str) -> tuple[str, ...]:
 
 
 def _turns(table: Table) -> dict[str, str]:
-    """Return the type of each joint from ``joint_name`` and ``joint_type``."""
+    """Return the rotation axes of joints from ``joint_name`` and ``joint_type``."""
     names, kinds = _names(table, "joint_name"), _names(table, "joint_type")
     if len(names) != len(kinds):
         message = f"found {len(kinds)}, expected one for each of {len(names)} joints"
@@ -226,7 +228,7 @@ def _pair(table: Table, index: int, pair: object) -> tuple[str, str]:
 
 
 def unknown_name(loops: LoopsFile, key: str, name: str, valid: list[str]) -> str:
-    """Return the message for a name that is not a joint or link of the robot."""
+    """Return the error message for a name that is not a joint or link."""
     return (
         f"{loops.file}: {key}: found {quoted(name)}, expected a joint or link of the "
         f"robot{nearest(name, valid)}"
@@ -234,14 +236,14 @@ def unknown_name(loops: LoopsFile, key: str, name: str, valid: list[str]) -> str
 
 
 def _word(text: str) -> str:
-    """Return a text in double quotes, valid in YAML and JSON."""
+    """Return a text in double quotes, as in YAML and JSON."""
     import json
 
     return json.dumps(text)
 
 
 def _number(value: float) -> str:
-    """Return a number as text that YAML reads as a number (a point before "e")."""
+    """Return a number as text, with the decimal point that YAML requires."""
     text = repr(float(value))
     mantissa, e, exponent = text.partition("e")
     if e and "." not in mantissa:

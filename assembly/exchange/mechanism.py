@@ -1,9 +1,9 @@
 """Common representation of URDF, MJCF and SDF: bodies, joints and loops.
 
-A joint carries a child body, whose pose in the parent body is ``placement @ motion @
-after``; the motion is about or along ``axis``.  Each joint has one degree of freedom; a
-joint with several of them is a chain of such joints with massless bodies in between.
-Units are metres, radians and kilograms.
+A joint connects a child body to its parent body.  The pose of the child relative to the
+parent is ``placement @ motion @ after``, where the motion is about or along ``axis``.
+Each joint has one degree of freedom.  A joint with several degrees of freedom is a
+chain of such joints with massless bodies in between.
 """
 
 from collections.abc import Mapping, Sequence
@@ -28,9 +28,8 @@ class Body:
     Attributes:
         name: name, unique among bodies.
         mass: mass [kg].
-        centre: centre of mass (3,) [m], in body axes.
-        inertia: moments of inertia about the centre of mass (3, 3) [kg m^2], in body
-            axes.
+        centre: centre of mass, (3,) [m], in body axes.
+        inertia: inertia matrix about the centre of mass, (3, 3) [kg m^2], in body axes.
     """
 
     name: str
@@ -41,22 +40,23 @@ class Body:
 
 @dataclass(frozen=True, eq=False)
 class Joint:
-    """Joint between a body and its parent, as described at the top of this module.
+    """Joint with one degree of freedom between a body and its parent.
 
     Attributes:
         name: name, unique among joints.
         kind: ``"fixed"``, ``"revolute"``, ``"prismatic"`` or ``"helical"``.
-        parent: name of the body that carries the joint.
-        child: name of the body that the joint carries.
-        placement: (4, 4) pose of the joint in the parent.
-        axis: (3,) unit vector in the joint's axes.
-        after: (4, 4) pose of the child in the joint's axes after its motion.
-        position: [rad or m] coordinate at home.
-        actuated: whether a drive holds the joint.
-        limits: [rad or m] smallest and largest coordinate; None without limits.
-        stiffness: [N m/rad or N/m] stiffness of a spring along the motion; 0 for none.
-        rest: [rad or m] coordinate at which this spring has no load.
-        lead: [m/rad] translation per angle of a helical joint; 0 for others.
+        parent: name of the parent body.
+        child: name of the child body.
+        placement: pose of the joint relative to the parent, (4, 4).
+        axis: unit vector of the axis in the joint frame, (3,).
+        after: pose of the child relative to the moved joint frame, (4, 4).
+        position: coordinate in the home pose [rad or m].
+        actuated: whether the joint is driven.
+        limits: smallest and largest coordinate [rad or m]; None without limits.
+        stiffness: stiffness of a spring along the motion [N m/rad or N/m]; 0 without
+            spring.
+        rest: coordinate at which the spring is unloaded [rad or m].
+        lead: translation per angle of a helical joint [m/rad]; 0 for other joints.
     """
 
     name: str
@@ -76,14 +76,14 @@ class Joint:
 
 @dataclass(frozen=True, eq=False)
 class Loop:
-    """Loop closure: two places on different bodies that coincide.
+    """Loop closure: two frames on different bodies coincide.
 
     Attributes:
         name: name of the loop.
         first: name of the first body.
         second: name of the second body.
-        at_first: (4, 4) pose of the place in the first body.
-        at_second: (4, 4) pose of the place in the second body.
+        at_first: pose of the frame on the first body, (4, 4).
+        at_second: pose of the frame on the second body, (4, 4).
         point: whether only the origins coincide, as in a ball joint.
     """
 
@@ -103,14 +103,13 @@ class Mechanism:
         name: name of the robot.
         root: name of the fixed body.
         bodies: bodies by name, including the root.
-        joints: joints, sorted such that parents come first.
-        loops: pairs of places that coincide.
-        platform: name of a body; None if the file names none.
-        left_out: descriptions of parts of the file that a mechanism cannot represent.
-        taken: descriptions of assumptions where the file is incomplete.
-        couplings: joints that follow others, sorted such that a leader's own coupling
-            comes before its followers'.
-        unweighed: names of bodies whose mass comes from meshes, which are not read.
+        joints: joints, sorted such that parents precede children.
+        loops: loop closures.
+        platform: name of the platform; None if the file does not specify it.
+        left_out: descriptions of file content that a mechanism cannot represent.
+        taken: descriptions of assumptions that were made because data are missing.
+        couplings: couplings between joints, sorted such that leaders precede followers.
+        unweighed: names of bodies whose mass depends on meshes, which are not read.
     """
 
     name: str
@@ -126,7 +125,7 @@ class Mechanism:
 
     @property
     def home(self) -> NDArray:
-        """(joints,) [rad or m] coordinates at home."""
+        """Coordinates of all joints in the home pose, (joints,) [rad or m]."""
         return np.array([joint.position for joint in self.joints])
 
 
@@ -159,9 +158,9 @@ def parents_first(joints: Sequence[Joint], bodies: Mapping[str, Body], file: str
                 )
         if joint.child in carried:
             raise BadInput(
-                f"{file}: link {quoted(joint.child)}: found two joints with it "
-                f"as child, {quoted(carried[joint.child].name)} and "
-                f"{quoted(joint.name)}; expected one, and the other declared as "
+                f"{file}: link {quoted(joint.child)}: found that it is the child of "
+                f"two joints, {quoted(carried[joint.child].name)} and "
+                f"{quoted(joint.name)}; expected one joint; declare the other joint as "
                 "a loop"
             )
         carried[joint.child] = joint
@@ -171,7 +170,7 @@ def parents_first(joints: Sequence[Joint], bodies: Mapping[str, Body], file: str
         names = " and ".join(map(quoted, roots[:3])) or "none (a cycle of parents)"
         raise BadInput(
             f"{file}: found as root link {names}, expected exactly one link "
-            "that is no child of a joint"
+            "that is not the child of a joint"
         )
     order, waiting = [], list(reversed(below[roots[0]]))
     while waiting:
@@ -192,11 +191,11 @@ def body_poses(mechanism: Mechanism, coordinates: NDArray) -> dict[str, NDArray]
     """Return the poses of all bodies.
 
     Args:
-        mechanism: mechanism of n joints.
-        coordinates: (n,) [rad or m] coordinates of all joints, in their order.
+        mechanism: mechanism with n joints.
+        coordinates: coordinates of all joints, (n,) [rad or m].
 
     Returns:
-        (4, 4) pose relative to the root, by the body's name.
+        Pose relative to the root, (4, 4), by the name of the body.
     """
     poses = {mechanism.root: np.eye(4)}
     for joint, q in zip(mechanism.joints, coordinates, strict=True):
@@ -206,7 +205,7 @@ def body_poses(mechanism: Mechanism, coordinates: NDArray) -> dict[str, NDArray]
 
 
 def motion(joint: Joint, coordinate: float) -> NDArray:
-    """Return the (4, 4) motion of a joint for a coordinate [rad or m]."""
+    """Return the transform (4, 4) of a joint motion by a coordinate [rad or m]."""
     along = coordinate * joint.axis
     if joint.kind in {"revolute", "helical"}:
         return transform(joint.lead * along, rotation_matrix(along))
@@ -220,12 +219,12 @@ def chain(
     """Split a joint with several degrees of freedom into a chain of joints.
 
     Args:
-        name: name of the joint, to which the name of each part is appended.
+        name: name of the joint, to which a suffix for each new joint is appended.
         parent: name of the parent body.
-        child: name of the body that the joint carries.
-        placement: (4, 4) pose of the joint in the parent.
-        after: (4, 4) pose of the child in the axes of the last part after its motion.
-        freedoms: name, kind and axis (3,) of each part.
+        child: name of the child body.
+        placement: pose of the first new joint relative to the parent, (4, 4).
+        after: pose of the child relative to the moved frame of the last joint, (4, 4).
+        freedoms: name suffix, kind and axis (3,) of each new joint.
 
     Returns:
         The joints, and the bodies between them.
@@ -245,10 +244,10 @@ def chain(
 
 
 def ball(turns: str = "xyz") -> list[tuple[str, str, NDArray]]:
-    """Return a ball joint as three rotations, which are singular only far from home."""
+    """Return the suffix, kind and axis of each rotation of a ball joint."""
     return [(f"r{axis}", "revolute", np.array(UNIT_VECTORS[axis])) for axis in turns]
 
 
 def slides() -> list[tuple[str, str, NDArray]]:
-    """Return the parts of a spatial translation: three prismatic joints."""
+    """Return the suffix, kind and axis of each prismatic joint of a free body."""
     return [(f"t{axis}", "prismatic", np.array(UNIT_VECTORS[axis])) for axis in "xyz"]

@@ -1,9 +1,9 @@
 """Import of MJCF: bodies, joints, and equality constraints, which become loops.
 
 Sources:
-    MuJoCo documentation, XML reference: angles are in degrees unless the compiler
-    element specifies radian; joints act at ``pos`` in the body, in the order of the
-    file; a ``frame`` places its elements but is not a body.
+    MuJoCo documentation, XML reference.  Angles are in degrees unless the compiler
+    element specifies radians.  The joints of a body are located at ``pos`` in the body
+    and act in the order of the file.  A ``frame`` moves its elements but is not a body.
 """
 
 from collections.abc import Iterator
@@ -43,7 +43,7 @@ _REFUSED = ("composite", "flexcomp", "flex")
 _SECTIONS = ("compiler", "option", "size", "statistic", "visual", "asset", "default",
              "custom", "keyframe", "contact", "sensor", "worldbody", "equality",
              "tendon", "actuator")  # fmt: skip
-# joint attributes that forcefit reads
+# joint attributes that are converted
 _READ = ("name", "type", "pos", "axis", "ref", "class")
 _SPRING = ("stiffness", "springref")
 _RANGE = ("range", "limited")
@@ -52,7 +52,7 @@ _COUNTS = {"ball": 4, "free": 7}  # number of values per joint in a keyframe
 
 @dataclass(frozen=True, eq=False)
 class _Place:
-    """Place of an element: body, pose (4, 4) in it, defaults and unit of angles."""
+    """Coordinate frame, default class and angle conventions of an element."""
 
     body: str
     offset: NDArray
@@ -62,7 +62,7 @@ class _Place:
 
 @dataclass
 class _Reading:
-    """Data collected while the bodies of a file are read."""
+    """Data that are collected while the bodies of a file are read."""
 
     rules: MassRules
     defaults: dict[str, dict[str, dict[str, str]]]
@@ -71,9 +71,9 @@ class _Reading:
     parts: dict[str, list[str]] = field(default_factory=dict)
     sites: dict[str, tuple[str, NDArray]] = field(default_factory=dict)
     extra: dict[str, list[str]] = field(default_factory=dict)
-    # kind of each joint, in the order of MuJoCo's coordinates qpos
+    # type of each joint, in the order of the MuJoCo coordinates ``qpos``
     coordinates: dict[str, str] = field(default_factory=dict)
-    number: int = 0  # number of bodies so far
+    number: int = 0  # number of bodies that have been read
     unweighed: list[str] = field(default_factory=list)
 
 
@@ -81,14 +81,14 @@ def read_mjcf(path: Path | str, loops: LoopsFile | None = None) -> Mechanism:
     """Read an MJCF file.
 
     Args:
-        path: path of the file; included and attached files are read as well.
+        path: path of the file.  Included and attached files are read as well.
         loops: loops file with additional loops and drives, or None.
 
     Returns:
-        Mechanism, at the keyframe ``home`` if the file contains one.
+        Mechanism.  Its home pose is the keyframe ``home`` if the file contains one.
 
     Raises:
-        BadInput: the file violates a rule of the format, or an element is unknown.
+        BadInput: the file does not comply with the format, or an element is unknown.
     """
     root = expanded(read_xml(path, "mujoco"))
     for node in root.descendants():
@@ -114,7 +114,7 @@ def read_mjcf(path: Path | str, loops: LoopsFile | None = None) -> Mechanism:
     rests = {j.name: j.position for j in order if j.name in reading.coordinates}
     equality = reading.defaults["main"].get("equality", {})
     ties = Ties(root, equality, reading.sites, rests, reading.parts, reading.extra)
-    # constraints refer to the initial pose of the file, not to a keyframe
+    # MuJoCo evaluates constraints in the initial pose, not in a keyframe
     closed = tuple(ties.loops(body_poses(mechanism, mechanism.home)))
     driven = ties.driven()
     couplings = leaders_first(list(ties.couplings(driven)), str(path))
@@ -122,9 +122,10 @@ def read_mjcf(path: Path | str, loops: LoopsFile | None = None) -> Mechanism:
     joints = _at_key(root, reading, order)
     left_out = tuple(line for k, v in reading.extra.items() for line in counted(k, v))
     free = [name for name, kind in reading.coordinates.items() if kind == "free"]
-    floating = counted("free joints that no loop ties to the ground", free)
+    floating = counted("free joints without a loop to the ground", free)
     unweighed = tuple(reading.unweighed)
-    if unweighed and reading.rules.total > 0:  # scaling requires all masses
+    # masses can be scaled to the total mass only if all are known
+    if unweighed and reading.rules.total > 0:
         unweighed = tuple(name for name in reading.bodies if name != WORLD)
     mechanism = replace(
         mechanism, joints=joints, loops=closed, left_out=left_out, couplings=couplings,
@@ -135,7 +136,7 @@ def read_mjcf(path: Path | str, loops: LoopsFile | None = None) -> Mechanism:
 
 
 def _platform(root: Node, reading: _Reading) -> str | None:
-    """Return the body that ``<custom><text name="platform">`` names."""
+    """Return the name of the platform from ``<custom><text name="platform">``."""
     for group in root.children("custom"):
         for text in group.children("text"):
             if text.text("name") == "platform" and text.text("data") in reading.bodies:
@@ -144,14 +145,14 @@ def _platform(root: Node, reading: _Reading) -> str | None:
 
 
 def _defaults(root: Node) -> dict[str, dict[str, dict[str, str]]]:
-    """Return attributes by class and element; each class inherits from its parent."""
+    """Return the default attributes by class and tag, including inherited ones."""
     classes: dict[str, dict[str, dict[str, str]]] = {"main": {}}
 
     def gather(node: Node, inherited: dict[str, dict[str, str]], name: str) -> None:
         own = {tag: dict(values) for tag, values in inherited.items()}
         for inner in node.children():
             if inner.tag != "default":
-                # connect, weld and joint constraints share their defaults
+                # the tag ``equality`` contains the defaults of all constraint types
                 own.setdefault(inner.tag, {}).update(inner.element.attrib)
         classes[name] = own
         for inner in node.children("default"):
@@ -161,13 +162,13 @@ def _defaults(root: Node) -> dict[str, dict[str, dict[str, str]]]:
         name = node.text("class", "main")
         attached = node.has("attached")
         gather(node, {} if attached else classes["main"], name)
-        if not attached:  # the outermost class is "main", whatever its name
+        if not attached:  # the outermost class also has the name "main"
             classes["main"] = classes[name]
     return classes
 
 
 def _filled(node: Node, childclass: str, reading: _Reading) -> Node:
-    """Return an element completed by the defaults of its class."""
+    """Return an element that includes the default attributes of its class."""
     name = node.text("class", childclass)
     if name not in reading.defaults:
         hint = nearest(name, reading.defaults)
@@ -179,7 +180,7 @@ def _filled(node: Node, childclass: str, reading: _Reading) -> Node:
 
 
 def _inside(frame: Node, place: _Place) -> _Place:
-    """Return the place of the elements inside an MJCF ``frame``."""
+    """Return the coordinate frame of the elements inside an MJCF ``frame``."""
     T = place.offset @ _pose(frame, place.angles)
     angles = place.angles
     if frame.has(UNIT):  # the frame comes from an attached model
@@ -188,7 +189,7 @@ def _inside(frame: Node, place: _Place) -> _Place:
 
 
 def _elements(node: Node, place: _Place) -> Iterator[tuple[Node, _Place]]:
-    """Yield the elements of a body in order, including those in frames."""
+    """Yield the elements of a body in order, including those inside frames."""
     for inner in node.children():
         if inner.tag == "frame":
             yield from _elements(inner, _inside(inner, place))
@@ -197,7 +198,7 @@ def _elements(node: Node, place: _Place) -> Iterator[tuple[Node, _Place]]:
 
 
 def _walk(node: Node, place: _Place, reading: _Reading) -> None:
-    """Read the elements of a body other than its joints and its mass."""
+    """Read the child bodies and sites of a body, and record unknown elements."""
     for inner, at in _elements(node, place):
         if inner.tag == "body":
             _add_body(inner, at, reading)
@@ -212,7 +213,7 @@ def _walk(node: Node, place: _Place, reading: _Reading) -> None:
 
 
 def _add_body(node: Node, at: _Place, reading: _Reading) -> None:
-    """Add a body, its joints, and all elements inside it."""
+    """Add a body, its joints and its child bodies."""
     reading.number += 1
     name = node.optional("name") or f"body{reading.number}"
     if name in reading.bodies:
@@ -239,7 +240,7 @@ def _add_body(node: Node, at: _Place, reading: _Reading) -> None:
 
 
 def _massive(node: Node, place: _Place, reading: _Reading) -> Body:
-    """Return a body with its mass, either written or computed from its shapes."""
+    """Return a body with its mass, which is explicit or computed from shapes."""
     written, shapes = None, []
     for inner, at in _elements(node, place):
         if inner.tag == "inertial":
@@ -259,7 +260,7 @@ def _massive(node: Node, place: _Place, reading: _Reading) -> Body:
 
 
 def _freedoms(node: Node, place: _Place, reading: _Reading) -> Iterator[Joint]:
-    """Yield the joints of a body, one per degree of freedom, in the body's axes."""
+    """Yield the joints of a body, one for each degree of freedom."""
     number = 0
     for inner, at in _elements(node, place):
         if inner.tag not in {"joint", "freejoint"}:
@@ -289,14 +290,14 @@ def _freedoms(node: Node, place: _Place, reading: _Reading) -> Iterator[Joint]:
 
 
 def _pose(node: Node, angles: Angles) -> NDArray:
-    """Return the (4, 4) pose of an element from its ``pos`` and its orientation."""
+    """Return the pose of an element from ``pos`` and its orientation, (4, 4)."""
     return placed(node.numbers("pos", 3, "m", _ZERO), orientation(node, angles))
 
 
 def _at_key(
     root: Node, reading: _Reading, joints: tuple[Joint, ...]
 ) -> tuple[Joint, ...]:
-    """Return the joints with the coordinates of the keyframe ``home``."""
+    """Set the home coordinates of joints to those of the keyframe ``home``."""
     keys = [k for group in root.children("keyframe") for k in group.children("key")]
     counts = {name: _COUNTS.get(kind, 1) for name, kind in reading.coordinates.items()}
     for key in keys:

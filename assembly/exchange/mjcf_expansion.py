@@ -1,14 +1,14 @@
-"""Expansion of MJCF: included files, replicated bodies, attached models.
+"""Expansion of MJCF: included files, replicated bodies and attached models.
 
-Files are not expanded by MuJoCo (``MjSpec``), because MuJoCo is optional and is used to
-verify the import.  Moreover, its error messages do not name the included file, and its
-XML output has only six digits (MuJoCo 3.17).
+MuJoCo (``MjSpec``) is not used for the expansion, because it is optional and because
+the import is verified with it.
 
 Sources:
-    MuJoCo documentation, XML reference: ``include`` inserts the elements of a file.
-    Copy i of ``replicate`` is moved by i offsets and rotations; its names end in i with
-    as many digits as the count.  ``attach`` inserts a body of another model, with the
-    angles, defaults and constraints of that model; all names get a prefix.
+    MuJoCo documentation, XML reference.  ``include`` inserts the elements of a file.
+    ``replicate`` moves copy i by i times its offset and rotation and appends i to all
+    names, with as many digits as the number of copies.  ``attach`` inserts a body of
+    another model, together with the defaults and constraints of that model, and adds a
+    prefix to all names.
 """
 
 import copy
@@ -24,10 +24,10 @@ from forcefit.assembly.exchange.orientation import from_euler, to_quaternion
 from forcefit.assembly.exchange.xml_file import Node, placed, read_xml
 from forcefit.inputs.errors import BadInput, quoted
 
-_DEEPEST = 10  # largest depth of nested files
+_DEEPEST = 10  # maximum depth of nested files
 _MOST_COPIES = 10_000
 _MOST_ELEMENTS = 200_000
-# attributes whose values are names, of the element or of one that it refers to
+# attributes whose values are names of elements
 _NAMES = ("name", "class", "childclass", "joint", "joint1", "joint2", "jointinparent",
           "body", "body1", "body2", "site", "site1", "site2", "refsite", "slidersite",
           "cranksite", "tendon", "tendon1", "tendon2", "geom", "mesh")  # fmt: skip
@@ -36,18 +36,18 @@ UNIT, SEQUENCE = "attached.unit", "attached.sequence"
 
 
 def expanded(root: Node, depth: int = 0) -> Node:
-    """Expand an MJCF file so that all bodies are written out.
+    """Replace ``include``, ``replicate`` and ``attach`` by explicit elements.
 
     Args:
         root: root element of the file, which is modified in place.
-        depth: number of files that include this file, directly or indirectly.
+        depth: number of files in which this file is nested.
 
     Returns:
         Root element.
 
     Raises:
         BadInput: a file is missing or not MJCF, files are nested too deeply, there are
-            too many copies, or a model or body to be attached does not exist.
+            too many copies, or an attached model or body does not exist.
     """
     if depth > _DEEPEST:
         raise BadInput(
@@ -55,13 +55,13 @@ def expanded(root: Node, depth: int = 0) -> Node:
             f"deep, expected at most {_DEEPEST}"
         )
     _include(root.element, root, Path(root.file).parent, 0)
-    _attach(root, depth)  # before attached elements are copied
+    _attach(root, depth)  # first, because attached elements may be replicated
     angles = Angles.of(root)
     for world in root.children("worldbody"):
         _replicate(world.element, root, angles)
     if sum(1 for _ in root.element.iter()) > _MOST_ELEMENTS:
         raise BadInput(
-            f"{root.file}: found more than {_MOST_ELEMENTS} elements with all "
+            f"{root.file}: found more than {_MOST_ELEMENTS} elements including "
             "copies, expected fewer"
         )
     return root
@@ -89,7 +89,7 @@ def _include(element: Any, root: Node, folder: Path, depth: int) -> None:
 
 
 def _replicate(element: Any, root: Node, angles: Angles) -> None:
-    """Replace ``replicate`` by frames with copies, innermost elements first."""
+    """Replace ``replicate`` by frames with copies, beginning with inner elements."""
     inside: list[Any] = []
     for inner in element:
         _replicate(inner, root, angles)
@@ -106,7 +106,7 @@ def _replicate(element: Any, root: Node, angles: Angles) -> None:
 def _copies(
     node: Node, angles: Angles, ties: list[tuple[Any, Any]]
 ) -> Iterator[Any]:  # fmt: skip
-    """Yield the frames of one ``replicate``, and copy the constraints."""
+    """Yield a frame for each copy of ``replicate``, and copy the constraints."""
     count = node.number("count", "copies")
     if not 1 <= count <= _MOST_COPIES or count % 1:
         expected = f"expected a whole number from 1 to {_MOST_COPIES}"
@@ -130,7 +130,7 @@ def _copies(
 
 
 def _end(element: Any, keys: tuple[str, ...], ending: str) -> None:
-    """Append a suffix to the names of an element and of all elements in it."""
+    """Append a suffix to the names of an element and of its inner elements."""
     for one in element.iter():
         for key in keys:
             if key in one.attrib:
@@ -138,12 +138,12 @@ def _end(element: Any, keys: tuple[str, ...], ending: str) -> None:
 
 
 def _words(values: Any) -> str:
-    """Return numbers as text with all digits."""
+    """Return numbers as text in full precision."""
     return " ".join(repr(float(value)) for value in values)
 
 
 def _attach(root: Node, depth: int) -> None:
-    """Replace ``attach`` by frames with parts of other models."""
+    """Replace ``attach`` by frames with bodies of other models."""
     worlds = [world.element for world in root.children("worldbody")]
     places = [
         (outer, inner)
@@ -152,7 +152,7 @@ def _attach(root: Node, depth: int) -> None:
     ]  # fmt: skip
     if not places:
         return
-    # copied, because each copy is changed; this model is used as written
+    # a model that attaches itself is copied before it is changed
     own = copy.deepcopy(root.element)
     others = {
         name: (file, element)
@@ -176,14 +176,14 @@ def _attach(root: Node, depth: int) -> None:
 
 
 def _other(model: Node, root: Node, depth: int) -> tuple[str, str, Any]:
-    """Return the name, file and expanded element of a model asset."""
+    """Return the name, file and expanded root element of a model asset."""
     other = read_xml(Path(root.file).parent / model.text("file"), "mujoco")
     name = model.optional("name") or other.optional("model") or Path(other.file).stem
     return name, other.file, expanded(other, depth + 1).element
 
 
 def _attached(node: Node, root: Node, other: Node) -> Any:
-    """Return a frame with a part of a model, and add the constraints to the root."""
+    """Return a frame with bodies of a model, and add its constraints to the root."""
     prefix, angles = node.optional("prefix"), Angles.of(other)
     for element in other.element.iter():
         for key in _NAMES:
@@ -201,7 +201,7 @@ def _attached(node: Node, root: Node, other: Node) -> Any:
                     f"found {quoted(node.text(tag))}, expected the name of a "
                     f"{tag} of the attached model",
                 )
-    # the attached model's own defaults; the defaults of this model do not apply
+    # only the attached model's own defaults apply to its elements
     for default in [d.element for d in other.children("default")] or [
         Element("default")
     ]:
@@ -218,7 +218,10 @@ def _attached(node: Node, root: Node, other: Node) -> Any:
 
 
 def _ties_within(root: Node, part: Any) -> list[tuple[Any, Any]]:
-    """Return constraints, tendons and actuators within a part, by section."""
+    """Return constraints, tendons and actuators that refer only to inner elements.
+
+    Each is returned together with its section of the file.
+    """
     names, ties = {one.get("name") for one in part.iter()}, []
     for section in root.children("tendon", "equality", "actuator"):
         for tie in section.element:

@@ -18,13 +18,13 @@ def several_freedoms(given: Node, name: str, kind: str, offset: NDArray) -> list
     """Return the joints of a ball joint or of a free body.
 
     Args:
-        given: element, completed by its defaults.
+        given: element with its default attributes.
         name: name of the joint.
         kind: ``"ball"`` or ``"free"``.
-        offset: (4, 4) pose of the element's frame in the body.
+        offset: pose of the element's frame relative to the body, (4, 4).
 
     Returns:
-        Joints with one degree of freedom, in order, whose bodies are not set yet.
+        Joints with one degree of freedom, in order.  Their bodies are not set.
 
     Raises:
         BadInput: a number is invalid.
@@ -50,17 +50,17 @@ def one_freedom(
     """Return a hinge or slide joint with its spring.
 
     Args:
-        given: element, completed by its defaults.
+        given: element with its default attributes.
         name: name of the joint.
         kind: ``"revolute"`` or ``"prismatic"``.
-        offset: (4, 4) pose of the element's frame in the body.
-        angles: unit of angles in the file.
+        offset: pose of the element's frame relative to the body, (4, 4).
+        angles: angle conventions of the file.
 
     Returns:
-        The joint, whose bodies are not set yet.
+        The joint.  Its bodies are not set.
 
     Raises:
-        BadInput: a number is invalid, or the axis has no direction.
+        BadInput: a number is invalid, or the axis has zero length.
     """
     unit = angles.unit
     pos = given.numbers("pos", 3, "m", _ZERO)
@@ -74,7 +74,7 @@ def one_freedom(
         stiffness = given.number("stiffness", "N m/rad or N/m")
         rest = given.number("springref", "angle or m", 0.0)
         rest *= unit if kind == "revolute" else 1.0
-    # the attribute ref shifts the joint's zero and the spring's rest coordinate
+    # in the initial pose of the file, the joint coordinate is ``ref``
     return replace(
         joint, placement=anchor @ motion(joint, -ref), position=ref,
         stiffness=stiffness, rest=rest, limits=_limits(given, kind, angles),
@@ -82,7 +82,7 @@ def one_freedom(
 
 
 def _limits(node: Node, kind: str, angles: Angles) -> tuple[float, float] | None:
-    """Return the range of a hinge or slide; without ``limited`` a range applies."""
+    """Return the range of a hinge or slide joint; None if it is not limited."""
     limited = node.optional("limited") or "auto"
     binds = limited == "true" or (limited == "auto" and angles.range_limits)
     if not node.has("range") or not binds:
@@ -95,17 +95,16 @@ def _limits(node: Node, kind: str, angles: Angles) -> tuple[float, float] | None
 
 
 def at_key(key: Node, joint: Joint, values: NDArray) -> Joint:
-    """Return a joint at its keyframe values.
-
-    For a ball or free joint, the first of its joints gets the whole motion.
+    """Set the home pose of a joint from a keyframe.
 
     Args:
         key: keyframe element.
-        joint: joint with one degree of freedom, or the first of a ball or free joint.
+        joint: joint with one degree of freedom, or the first elementary joint of a ball
+            or free joint, to which the entire motion is assigned.
         values: one number, a quaternion, or a position and a quaternion.
 
     Returns:
-        The joint at home.
+        The joint in the home pose.
 
     Raises:
         BadInput: a quaternion is zero.
@@ -118,7 +117,7 @@ def at_key(key: Node, joint: Joint, values: NDArray) -> Joint:
     turn = placed(
         values[:-4] if len(values) == 7 else _ZERO, from_quaternion(quaternion)
     )
-    # a free body's values are its world pose, a ball's values its rotation from rest
+    # values are the world pose of a free body, or the rotation of a ball joint
     return replace(
         joint, placement=turn if len(values) == 7 else joint.placement @ turn
     )

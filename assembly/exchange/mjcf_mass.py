@@ -1,4 +1,4 @@
-"""Masses and moments of inertia of MJCF bodies, given explicitly or by shapes.
+"""Masses and moments of inertia of MJCF bodies, explicit or computed from shapes.
 
 Sources:
     MuJoCo documentation, XML reference, compiler (``inertiafromgeom``,
@@ -26,7 +26,7 @@ from forcefit.assembly.model.inertia import (
 )
 
 _SIZES = {"sphere": 1, "capsule": 2, "cylinder": 2, "ellipsoid": 3, "box": 3}
-# [kg, kg m^2] smaller lower bounds are ignored, because files specify them only so that
+# [kg, kg m^2] smaller lower bounds are ignored, because their only purpose is that
 # MuJoCo accepts massless bodies
 _REGULAR, _REGULAR_INERTIA = 1e-6, 1e-9
 _KINDS = (*_SIZES, "plane", "hfield", "mesh", "sdf")
@@ -37,13 +37,13 @@ class MassRules:
     """Rules for masses in the compiler element of a file.
 
     Attributes:
-        from_shapes: ``true``, ``false``, or ``auto`` to use shapes only if no mass is
-            written.
-        groups: smallest and largest group of the shapes that contribute.
-        least: [kg] lower bound of the mass of every body.
-        total: [kg] sum to which all masses are scaled, if above zero.
-        least_inertia: [kg m^2] lower bound of the principal moments of every body.
-        balanced: whether impossible moments are replaced by their mean.
+        from_shapes: whether masses are computed from shapes: ``true``, ``false``, or
+            ``auto`` for bodies without an explicit mass.
+        groups: smallest and largest group number of the shapes that have a mass.
+        least: lower bound of the mass of each body [kg].
+        total: total mass to which all masses are scaled [kg]; not used if <= 0.
+        least_inertia: lower bound of the principal moments of inertia [kg m^2].
+        balanced: whether impossible moments of inertia are replaced by their mean.
     """
 
     from_shapes: str = "auto"
@@ -55,7 +55,10 @@ class MassRules:
 
     @staticmethod
     def of(root: Node) -> "MassRules":
-        """Return the rules of the file's compiler elements; the last one applies."""
+        """Return the rules from the compiler elements of a file.
+
+        If several elements define the same rule, the last one applies.
+        """
         rules = MassRules()
         for node in root.children("compiler"):
             groups = node.numbers(
@@ -77,7 +80,7 @@ class MassRules:
         return rules
 
     def applied(self, bodies: Mapping[str, Body]) -> dict[str, Body]:
-        """Return the bodies of a file after applying bounds and the total mass."""
+        """Apply the lower bounds and the total mass to the bodies of a file."""
         bounded = {
             name: self._bounded(body) if name != WORLD else body
             for name, body in bodies.items()
@@ -92,7 +95,7 @@ class MassRules:
         }
 
     def _bounded(self, body: Body) -> Body:
-        """Return a body whose mass and principal moments meet the lower bounds."""
+        """Increase the mass and principal moments of a body to the lower bounds."""
         if self.least > _REGULAR:
             body = replace(body, mass=max(body.mass, self.least))
         if not self.balanced and self.least_inertia <= _REGULAR_INERTIA:
@@ -106,15 +109,15 @@ class MassRules:
 
 
 def written_mass(inertial: Node, offset: NDArray, angles: Angles) -> MassProperties:
-    """Return the mass properties of an ``inertial`` element, in its body's axes.
+    """Return the mass properties of an ``inertial`` element in body axes.
 
     Args:
         inertial: the element.
-        offset: (4, 4) pose of the element's frame in the body.
+        offset: pose of the element's frame relative to the body, (4, 4).
         angles: angle conventions of the file.
 
     Returns:
-        Mass, centre and moments of inertia; moments that are not written are zero.
+        Mass, centre of mass and inertia matrix, which is zero by default.
 
     Raises:
         BadInput: the mass is negative, or a number is invalid.
@@ -134,15 +137,15 @@ def written_mass(inertial: Node, offset: NDArray, angles: Angles) -> MassPropert
 
 
 def shape_mass(geom: Node, T: NDArray, rules: MassRules) -> MassProperties | None:
-    """Return the mass properties of a shape; None for a mesh of unknown volume.
+    """Return the mass properties of a shape.
 
     Args:
-        geom: element, completed by its defaults.
-        T: (4, 4) pose of the shape in its body.
-        rules: rules of the file.
+        geom: element with its default attributes.
+        T: pose of the shape relative to its body, (4, 4).
+        rules: mass rules of the file.
 
     Returns:
-        Mass, centre and moments of inertia.
+        Mass, centre of mass and inertia matrix; None for a mesh, unless its mass is 0.
 
     Raises:
         BadInput: a size or mass is invalid.
@@ -155,7 +158,8 @@ def shape_mass(geom: Node, T: NDArray, rules: MassRules) -> MassProperties | Non
     given = geom.number("mass", "kg") if geom.has("mass") else None
     if given is not None and given < 0:
         raise geom.bad("mass", f"found {given:g}, expected >= 0 [kg]")
-    if kind not in _SIZES or geom.has("mesh"):  # with "mesh", a shape fitted to a mesh
+    # the attribute ``mesh`` means that MuJoCo fits the shape to a mesh
+    if kind not in _SIZES or geom.has("mesh"):
         return nothing if given == 0.0 else None
     density, sizes = geom.number("density", "kg/m^3", 1000.0), _sizes(geom, kind)
     if geom.optional("shellinertia") == "true":
@@ -168,7 +172,7 @@ def shape_mass(geom: Node, T: NDArray, rules: MassRules) -> MassProperties | Non
 
 
 def _sizes(geom: Node, kind: str) -> list[float]:
-    """Return the sizes [m] of a shape, as full lengths and full edges."""
+    """Return the dimensions of a shape [m]: radii, half axes, lengths or edges."""
     given = geom.optional("size").split()
     count = _SIZES[kind]
     if geom.has("fromto"):
@@ -177,7 +181,7 @@ def _sizes(geom: Node, kind: str) -> list[float]:
         radius = _first(geom, len(given))
         sizes = [radius, half] if count == 2 else [radius, radius, half]
     else:
-        # ignore additional numbers that the shape does not use
+        # the format permits more numbers than the shape requires
         sizes = geom.numbers("size", max(count, len(given)), "m").tolist()[:count]
     if min(sizes) <= 0:
         raise geom.bad("size", f"found {min(sizes):g}, expected > 0 [m]")
@@ -187,12 +191,12 @@ def _sizes(geom: Node, kind: str) -> list[float]:
 
 
 def _first(geom: Node, count: int) -> float:
-    """Return the first size [m] of a shape."""
+    """Return the first number of the attribute ``size`` [m]."""
     return float(geom.numbers("size", max(1, count), "m")[0])
 
 
 def _thomsen(half_axes: list[float]) -> float:
-    """Return the area [m^2] of an ellipsoid, accurate to about 1 %."""
+    """Return the surface area of an ellipsoid [m^2], accurate to about 1 %."""
     a, b, c = (x**1.6075 for x in half_axes)
     return 4 * math.pi * ((a * b + b * c + c * a) / 3) ** (1 / 1.6075)
 
@@ -201,13 +205,13 @@ def body_of(
     name: str, written: MassProperties | None, shapes: list[MassProperties],
     rules: MassRules,
 ) -> Body:  # fmt: skip
-    """Return a body from its written mass and its shapes.
+    """Return a body from its explicit mass and its shapes.
 
     Args:
         name: name of the body.
-        written: mass properties that are written; None without ``inertial``.
+        written: mass properties from ``inertial``; None without this element.
         shapes: mass properties of each shape.
-        rules: rules of the file.
+        rules: mass rules of the file.
 
     Returns:
         The body with its mass properties.

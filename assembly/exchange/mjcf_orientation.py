@@ -1,4 +1,4 @@
-"""Orientations in MJCF, which are given in five forms, in degrees or radians."""
+"""Orientations in MJCF, which can be specified by one of five attributes."""
 
 import math
 from dataclasses import dataclass
@@ -17,9 +17,9 @@ class Angles:
     """Angle conventions of a file.
 
     Attributes:
-        unit: [rad] one unit of the file's angles.
+        unit: unit of angles [rad]: 1 for radians, pi / 180 for degrees.
         sequence: axes of the Euler angles; capital letters denote fixed axes.
-        range_limits: whether a joint with a range is limited by default.
+        range_limits: whether a joint with a range is limited without ``limited``.
     """
 
     unit: float
@@ -28,7 +28,7 @@ class Angles:
 
     @staticmethod
     def of(root: Node) -> "Angles":
-        """Return the conventions that the file's compiler elements define."""
+        """Return the conventions from the compiler elements of a file."""
         unit, sequence, automatic = "degree", "xyz", "true"
         for compiler in root.children("compiler"):
             unit = compiler.choice("angle", ("degree", "radian"), unit)
@@ -47,14 +47,14 @@ class Angles:
 
 
 def orientation(node: Node, angles: Angles) -> NDArray:
-    """Return the (3, 3) orientation of an element; the identity if none is given.
+    """Return the orientation of an element.
 
     Args:
-        node: element with one of quat, axisangle, euler, xyaxes, zaxis.
+        node: element with ``quat``, ``axisangle``, ``euler``, ``xyaxes`` or ``zaxis``.
         angles: angle conventions of the file.
 
     Returns:
-        The rotation matrix.
+        Rotation matrix (3, 3); the identity if the element has none of the attributes.
 
     Raises:
         BadInput: a direction has zero length, or the number of values is wrong.
@@ -88,15 +88,16 @@ def orientation(node: Node, angles: Angles) -> NDArray:
 
 
 def site_pose(node: Node, angles: Angles) -> NDArray:
-    """Return the (4, 4) pose of a site or shape, which two end points may define.
+    """Return the pose of a site or shape.
 
     Args:
-        node: element with ``pos`` and an orientation, or with ``fromto``.
+        node: element with ``pos`` and an orientation, or with two end points in
+            ``fromto``.
         angles: angle conventions of the file.
 
     Returns:
-        The pose. For two end points, the origin is halfway between them, and z points
-        from the second to the first.
+        Pose (4, 4). For two end points, the origin is their midpoint, and z points from
+        the second to the first end point.
 
     Raises:
         BadInput: both ``pos`` and ``fromto`` are given, or the two end points coincide.

@@ -1,11 +1,11 @@
-"""Connections of MJCF bodies other than joints: equalities, tendons, actuators.
+"""Import of equality constraints, tendons and actuators from MJCF.
 
 Sources:
-    MuJoCo documentation, XML reference, equality: ``connect`` and ``weld`` constrain
-    places that coincide in the initial configuration, unless sites or ``relpose`` are
-    given. In a weld, ``anchor`` is a place of body2 that coincides with the place
-    ``relpose`` in body1. A joint constraint is joint1 = rest1 + polynomial in (joint2 -
-    rest2).
+    MuJoCo documentation, XML reference, equality.  ``connect`` and ``weld`` constrain
+    points or frames that coincide in the initial configuration, unless the element
+    specifies sites or ``relpose``.  In a weld, the frame at ``anchor`` on ``body2``
+    coincides with the frame ``relpose`` on ``body1``.  A ``joint`` constraint is
+    joint1 = rest1 + polynomial in (joint2 - rest2).
 """
 
 from collections.abc import Iterator, Mapping
@@ -32,15 +32,15 @@ _DRIVEN_BY = ("joint", "jointinparent")
 
 @dataclass
 class Ties:
-    """Constraints of a file, and parts of the file that are not converted.
+    """Constraints of a file, and elements of the file that are not converted.
 
     Attributes:
         root: root element ``<mujoco>``.
         defaults: default attributes of ``equality``.
-        sites: body of each site and pose (4, 4) in it, by name.
-        rests: [rad or m] coordinate of each joint in the initial configuration.
-        parts: joints with one degree of freedom by the name of the joint in the file.
-        extra: kinds and names of parts that are not converted; extended while reading.
+        sites: body of each site, and pose of the site relative to it, (4, 4), by name.
+        rests: coordinate of each joint in the initial configuration [rad or m].
+        parts: elementary joints, by the name of the joint in the file.
+        extra: names of elements that are not converted, by the kind of the element.
     """
 
     root: Node
@@ -51,12 +51,12 @@ class Ties:
     extra: dict[str, list[str]] = field(default_factory=dict)
 
     def leave_out(self, what: str, name: str) -> None:
-        """Record a part that is not converted."""
+        """Record an element that is not converted."""
         self.extra.setdefault(what, []).append(name)
 
     @cached_property
     def equalities(self) -> list[Node]:
-        """Active constraints; inactive ones are recorded as not converted."""
+        """Active constraints; inactive constraints are not converted."""
         given = [n for g in self.root.children("equality") for n in g.children()]
         default = self.defaults.get("active", "true")
         off = [node for node in given if node.element.get("active", default) == "false"]
@@ -68,13 +68,13 @@ class Ties:
         """Yield the loops of ``connect`` and ``weld`` constraints.
 
         Args:
-            poses: (4, 4) poses of all bodies in the initial configuration.
+            poses: poses of all bodies in the initial configuration, (4, 4).
 
         Yields:
             The loops.
 
         Raises:
-            BadInput: a body or site does not exist, or both ends are on one body.
+            BadInput: a body or site does not exist, or a body is connected to itself.
         """
         names: set[str] = set()
         for count, node in enumerate(self.equalities, 1):
@@ -96,9 +96,9 @@ class Ties:
             yield loop
 
     def _loop(self, node: Node, name: str, poses: Mapping[str, NDArray]) -> Loop:
-        """Return one ``connect`` or ``weld`` as a loop."""
+        """Return the loop of a ``connect`` or ``weld`` constraint."""
         point = node.tag == "connect"
-        # a weld without torque scale constrains only its anchor point
+        # a weld with zero torque scale constrains only its anchor point
         point |= node.number("torquescale", "-", 1.0) == 0.0
         if node.has("site1"):
             (a, A), (b, B) = (
@@ -127,11 +127,11 @@ class Ties:
             driven: joints with an actuator.
 
         Yields:
-            The couplings.  If the follower is driven and the leader is not, a linear
-            rule is inverted.
+            The couplings.  A linear coupling is inverted if only the follower is
+            driven.
 
         Raises:
-            BadInput: a joint does not exist, or has several degrees of freedom.
+            BadInput: a joint does not exist or has several degrees of freedom.
         """
         for node in self.equalities:
             if node.tag != "joint":
@@ -156,7 +156,7 @@ class Ties:
                 yield Coupling(first, leader, tuple(rules), rest, other)
 
     def driven(self) -> set[str]:
-        """Return the joints with an actuator; record other actuators."""
+        """Return the driven joints, and record actuators that do not drive a joint."""
         names = set()
         for group in self.root.children("actuator"):
             for node in group.children():
@@ -177,7 +177,7 @@ class Ties:
         return names
 
     def tendons(self) -> None:
-        """Record tendons and their constraints as not converted."""
+        """Record tendons and their constraints, which are not converted."""
         for group in self.root.children("tendon"):
             for node in group.children():
                 self.leave_out(f"tendon{LOADED}", f"{node.tag} {_name(node)}".strip())
@@ -187,7 +187,7 @@ class Ties:
 
 
 def _polynomial(node: Node) -> list[float]:
-    """Return the five polynomial coefficients of a joint constraint."""
+    """Return the five coefficients of the polynomial of a joint constraint."""
     count = len(node.optional("polycoef").split())
     default = [0.0, 1.0, 0.0, 0.0, 0.0]
     if not count:
@@ -197,13 +197,13 @@ def _polynomial(node: Node) -> list[float]:
 
 
 def _name(node: Node, keys: "list[str] | tuple[str, ...]" = ()) -> str:
-    """Return the name of an element or of an element inside it."""
+    """Return the name of an element, or the name in one of the given attributes."""
     found = (node.optional(key) for key in ("name", *keys))
     return next((name for name in found if name), "")
 
 
 def _known(node: Node, key: str, valid: Mapping[str, Any]) -> Any:
-    """Return the object that an attribute names; reject unknown names."""
+    """Return the object whose name is given by an attribute."""
     name = node.text(key)
     if name not in valid:
         raise node.bad(key, f"found {quoted(name)}{nearest(name, valid)}")

@@ -8,7 +8,7 @@ from forcefit.assembly.exchange.mechanism import Joint, Mechanism
 from forcefit.assembly.exchange.orientation import to_quaternion
 from forcefit.assembly.exchange.urdf_writing import XML_MARK, numbers
 
-_SMALLEST_INERTIA = 1e-9  # [kg m^2] smallest moment of inertia that is written
+_SMALLEST_INERTIA = 1e-9  # [kg m^2] smallest moment of inertia in the output file
 _KINDS = {"revolute": "hinge", "prismatic": "slide"}
 
 
@@ -16,11 +16,11 @@ def mjcf_text(mechanism: Mechanism) -> str:
     """Return the text of an MJCF file.
 
     Args:
-        mechanism: mechanism in which each child has its joint's frame.
+        mechanism: mechanism in which ``after`` is the identity for all joints.
 
     Returns:
-        The text.  MuJoCo requires a mass for moving bodies, so the compiler element
-        sets the smallest possible mass for massless bodies.
+        The text.  Because MuJoCo requires a mass for each moving body, the compiler
+        element sets the smallest possible mass for massless bodies.
     """
     moving = [joint for joint in mechanism.joints if joint.kind != "fixed"]
     lines = [
@@ -54,7 +54,7 @@ def mjcf_text(mechanism: Mechanism) -> str:
 
 
 def depth_first(mechanism: Mechanism, moving: bool = False) -> list[Joint]:
-    """Return joints in the order of nested bodies, optionally only moving ones."""
+    """Return the joints, or only the moving joints, in depth-first order."""
     below: dict[str, list[Joint]] = {}
     for joint in mechanism.joints:
         below.setdefault(joint.parent, []).append(joint)
@@ -67,7 +67,10 @@ def depth_first(mechanism: Mechanism, moving: bool = False) -> list[Joint]:
 
 
 def _bodies(mechanism: Mechanism) -> list[str]:
-    """Return nested bodies as lines; not recursive, because chains may be long."""
+    """Return the lines of the nested bodies.
+
+    The function is not recursive, because chains may exceed the recursion limit.
+    """
     lines: list[str] = []
     open_bodies = [mechanism.root]
 
@@ -94,8 +97,8 @@ def _bodies(mechanism: Mechanism) -> list[str]:
             )
         if body.mass or body.inertia.any():
             J = body.inertia
-            # the format rejects collinear masses, which have no inertia about their
-            # common line
+            # the format rejects collinear masses, whose moment of inertia about their
+            # line is zero
             if np.linalg.eigvalsh(J)[0] < _SMALLEST_INERTIA:
                 J = J + _SMALLEST_INERTIA * np.eye(3)
             full = numbers(np.array([J[0, 0], J[1, 1], J[2, 2],

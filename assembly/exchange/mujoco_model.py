@@ -1,13 +1,12 @@
 """Import of a MuJoCo model in memory: ``MjModel`` or ``MjSpec``.
 
-The compiled model is converted to MJCF text, which is then read like a file: bodies
-with their masses, joints, equalities between sites, actuators and the keyframe
-``home``.
+The compiled model is converted to MJCF text, which is then read like a file.
 
 Sources:
-    MuJoCo documentation, mjModel: body_pos and similar are in the parent's frame,
-    jnt_pos in the body's frame. For a connect, eq_data contains the anchors in both
-    bodies; for a weld, the anchor in body2, the pose in body1, and the torque scale.
+    MuJoCo documentation, mjModel.  ``body_pos`` is in the frame of the parent, and
+    ``jnt_pos`` is in the frame of the body.  For a ``connect`` constraint, ``eq_data``
+    contains the anchors in both bodies.  For a ``weld`` constraint, it contains the
+    anchor in body2, the pose in body1 and the torque scale.
 """
 
 from collections.abc import Iterator
@@ -29,7 +28,7 @@ _DRIVEN = {"mjTRN_JOINT": "joint", "mjTRN_JOINTINPARENT": "jointinparent",
 
 
 def is_mujoco(model: object) -> bool:
-    """Return whether an object is a MuJoCo model, compiled or not."""
+    """Return whether an object is an ``MjModel`` or ``MjSpec`` of MuJoCo."""
     kind = type(model)
     return kind.__module__.startswith("mujoco") and kind.__name__ in {
         "MjModel", "MjSpec",
@@ -37,16 +36,16 @@ def is_mujoco(model: object) -> bool:
 
 
 def mjcf_of_model(model: Any) -> str:
-    """Return a model as the text of an MJCF file.
+    """Convert a model to the text of an MJCF file.
 
     Args:
         model: ``mujoco.MjModel``, or ``mujoco.MjSpec``, which is compiled.
 
     Returns:
-        The text, with angles in radians; unnamed parts are named as in files.
+        The text, with angles in radians.  Elements without a name are numbered.
 
     Raises:
-        BadInput: the model is not valid, or has flexible bodies.
+        BadInput: the model is invalid or has flexible bodies.
     """
     import mujoco
 
@@ -54,7 +53,7 @@ def mjcf_of_model(model: Any) -> str:
         try:
             model = model.compile()
         except ValueError as error:
-            raise BadInput(f"MjSpec: MuJoCo does not compile it: {error}") from None
+            raise BadInput(f"MjSpec: MuJoCo cannot compile it: {error}") from None
     if model.nflex:
         raise BadInput("MjModel: found a flex (flexible body), expected rigid bodies")
     root = Element("mujoco", model=_model_name(model))
@@ -80,13 +79,13 @@ def mjcf_of_model(model: Any) -> str:
 
 
 def _model_name(model: Any) -> str:
-    """Return the name of a model, which is the first of all names in it."""
+    """Return the name of a model, which is the first entry of ``names``."""
     name: str = model.names[: model.names.index(b"\0")].decode()
     return name or "mujoco model"
 
 
 def _bodies(mujoco: Any, model: Any, root: Element) -> list[Element]:
-    """Add the bodies with their joints and masses; return their elements."""
+    """Add the bodies with their joints and masses, and return their elements."""
     elements = [SubElement(root, "worldbody")]
     for i in range(1, model.nbody):
         body = model.body(i)
@@ -133,9 +132,9 @@ def _add_joint(mujoco: Any, model: Any, element: Element, j: int, name: str) -> 
 
 
 def _ties(mujoco: Any, model: Any, root: Element, bodies: list[Element]) -> None:
-    """Add the equalities; equalities of bodies get their own sites."""
+    """Add the equality constraints, with two new sites for each connect or weld."""
     group = SubElement(root, "equality")
-    names = np.cumsum(model.eq_active0)  # numbers for unnamed equalities, as in files
+    names = np.cumsum(model.eq_active0)  # numbers of constraints without a name
     for i in range(model.neq):
         kind = _TIES.get(mujoco.mjtEq(int(model.eq_type[i])).name)
         if kind is None:
@@ -166,7 +165,7 @@ def _ties(mujoco: Any, model: Any, root: Element, bodies: list[Element]) -> None
 
 
 def _places(kind: str, data: Any) -> list[tuple[Any, Any]]:
-    """Return position and quaternion of a constraint in each of its two bodies."""
+    """Return the position and quaternion of a constraint in each of its bodies."""
     straight = (1.0, 0.0, 0.0, 0.0)
     if kind == "connect":
         return [(data[:3], straight), (data[3:6], straight)]
@@ -174,7 +173,7 @@ def _places(kind: str, data: Any) -> list[tuple[Any, Any]]:
 
 
 def _drives(mujoco: Any, model: Any, root: Element) -> None:
-    """Add the actuators as MJCF elements that refer to the actuated objects."""
+    """Add the actuators with the names of the actuated objects."""
     group = SubElement(root, "actuator")
     for i in range(model.nu):
         kind = _DRIVEN.get(mujoco.mjtTrn(int(model.actuator_trntype[i])).name, "site")
@@ -198,7 +197,7 @@ def _site(model: Any, i: int) -> str:
 
 
 def _joint(model: Any, j: int, number: int) -> str:
-    """Return the name of a joint, whose number in its body is counted from 1."""
+    """Return the name of a joint; ``number`` is its number in its body from 1."""
     body = _body(model, int(model.jnt_bodyid[j]))
     return str(model.joint(j).name or f"{body}.joint{number}")
 
@@ -209,5 +208,5 @@ def _any_joint(model: Any, j: int) -> str:
 
 
 def words(values: ArrayLike) -> str:
-    """Return numbers as text with all digits."""
+    """Return numbers as text in full precision."""
     return " ".join(repr(float(v)) for v in np.ravel(values))

@@ -1,7 +1,6 @@
-"""Comparison of a robot's file as read by MuJoCo with the reading by forcefit.
+"""Comparison of the robots that MuJoCo and forcefit read from the same file.
 
-MuJoCo's compiler and kinematics compute the poses and masses of bodies, and the
-mismatch of constraints, in random postures.
+The poses of bodies and the mismatch of constraints are compared in random postures.
 """
 
 import pickle
@@ -22,42 +21,43 @@ from forcefit.assembly.model.inertia import inertia_matrix
 from forcefit.inputs.errors import one_line
 from forcefit.stiffness.screws import rotation_vector
 
-# [kg] largest mass that MuJoCo assigns to a massless body so that it can move
+# [kg] largest mass that MuJoCo assigns to a massless body
 _LIGHTEST = 1.01e-6
-# [kg m^2] smaller principal moments are not compared, as MuJoCo may raise them to 1e-9
+# [kg m^2] smallest compared principal moment; MuJoCo may increase smaller ones to 1e-9
 _LEAST_MOMENT = 1e-8
-_ROUNDING = 2e-12  # [kg m^2] accuracy of MuJoCo's principal moments
+_ROUNDING = 2e-12  # [kg m^2] accuracy of the principal moments of MuJoCo
 _KEYS = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 _UNIT_INERTIA = dict(zip(_KEYS, ("1", "1", "1", "0", "0", "0"), strict=True))
 _DRAWN = {"visual", "collision", "gazebo", "transmission", "loop_joint"}
 
 
 def compare_here(mechanism: Mechanism, path: Path) -> Comparison:
-    """Compare a mechanism with its file as read by MuJoCo, in this process.
+    """Compare a mechanism with the robot that MuJoCo reads from its file.
 
     Args:
-        mechanism: mechanism as it was read or written.
+        mechanism: mechanism that was read from or written to the file.
         path: path of a URDF or MJCF file.
 
     Returns:
-        The comparison, or the reason why none was made.
+        The comparison.  If none was possible, it contains the reason.
     """
     import mujoco
 
     reader = f"MuJoCo {mujoco.__version__}"
-    mujoco.set_mju_user_warning(lambda _: None)  # by default it writes a log file
+    # by default, MuJoCo writes warnings to a log file
+    mujoco.set_mju_user_warning(lambda _: None)
     try:
         with catch_warnings():
             simplefilter("ignore")
             model, whole = _model(mujoco, path)
         return _compared(mujoco, model, mechanism, Comparison(reader, path.name), whole)
-    except Exception as error:  # MuJoCo raises many kinds of C++ exceptions
+    except Exception as error:  # MuJoCo raises C++ exceptions of various types
         words = one_line(" ".join(str(error).split()), 160)
-        return Comparison(reader, path.name, f"{reader} does not read it ({words})")
+        return Comparison(reader, path.name, f"{reader} cannot read it ({words})")
 
 
 def main() -> None:
-    """Run the comparison of :mod:`.comparison` in a separate process."""
+    """Read the arguments of a comparison from a file and write its result."""
     given, made = Path(sys.argv[1]), Path(sys.argv[2])
     with given.open("rb") as file:
         mechanism, path = pickle.load(file)
@@ -86,7 +86,7 @@ def _model(mujoco: Any, path: Path) -> tuple[Any, bool]:
 
 
 def _settled(mujoco: Any, spec: Any) -> Any:
-    """Return a model whose bodies keep their frames and may be massless."""
+    """Compile a model with unchanged body frames, permitting massless bodies."""
     compiler = spec.compiler
     compiler.fusestatic = compiler.alignfree = 0
     for joint in spec.joints:
@@ -100,17 +100,17 @@ def _settled(mujoco: Any, spec: Any) -> Any:
 
 
 def _bare_urdf(path: Path) -> str:
-    """Return a URDF without shapes, because meshes may be missing."""
+    """Return the text of a URDF without shapes, because mesh files may be missing."""
     from xml.etree.ElementTree import Element, tostring
 
     root = read_xml(path, "robot").element
     for element in list(root.iter()):
         if element.tag.endswith(":joint") or element.get("quat_xyzw"):
-            raise ValueError(f"its URDF has no {element.tag} of this kind")
+            raise ValueError(f"its URDF reader does not support {element.tag}")
         if element.tag == "inertia" and not _comparable(_attributes(element.attrib)):
             element.attrib.update(
                 _UNIT_INERTIA
-            )  # MuJoCo rejects the inertia of thin rods
+            )  # MuJoCo rejects the zero moment of inertia of a thin rod
         for inner in list(element):
             if inner.tag in _DRAWN or ":" in inner.tag:
                 element.remove(inner)
@@ -126,7 +126,7 @@ def _bare_urdf(path: Path) -> str:
 def _compared(
     mujoco: Any, model: Any, mechanism: Mechanism, start: Comparison, whole: bool
 ) -> Comparison:
-    """Return the comparison of both readings in random postures."""
+    """Compare a MuJoCo model with a mechanism in random postures."""
     bodies = _body_names(model)
     strange = [name for name in bodies[1:] if name not in mechanism.bodies]
     unread = {} if not strange else {f"body {strange[0]}, which was not read,": np.inf}
@@ -177,19 +177,19 @@ def _compared(
 
 
 def _widen(gaps: dict[str, float], where: str, gap: float) -> None:
-    """Store the largest difference at each place."""
+    """Update the largest difference of a body or loop."""
     gaps[where] = max(gaps.get(where, 0.0), float(gap))
 
 
 def _body_names(model: Any) -> list[str]:
-    """Return the names of all bodies; unnamed ones get a number as in forcefit."""
+    """Return the names of all bodies; bodies without a name are numbered."""
     return [model.body(i).name or f"body{i}" for i in range(model.nbody)]
 
 
 def _mass_gaps(
     model: Any, mechanism: Mechanism, bodies: list[tuple[int, str]]
 ) -> dict[str, float]:
-    """Return the relative differences of masses, and the differences of centres [m]."""
+    """Return relative differences of masses and distances of centres of mass [m]."""
     gaps: dict[str, float] = {}
     for i, name in bodies:
         body, mass = mechanism.bodies[name], float(model.body_mass[i])
@@ -204,7 +204,7 @@ def _mass_gaps(
 def _inertia_gaps(
     mujoco: Any, model: Any, mechanism: Mechanism, bodies: list[tuple[int, str]]
 ) -> dict[str, float]:
-    """Return the relative differences of moments of inertia."""
+    """Return the relative differences of inertia matrices."""
     gaps: dict[str, float] = {}
     for i, name in bodies:
         J = mechanism.bodies[name].inertia
@@ -215,7 +215,7 @@ def _inertia_gaps(
 
 
 def _moments(mujoco: Any, model: Any, i: int) -> NDArray:
-    """Return the inertia (3, 3) [kg m^2] of a body about its centre, in its axes."""
+    """Return the inertia matrix of a body, (3, 3) [kg m^2], in body axes."""
     entries = np.zeros(9)
     mujoco.mju_quat2Mat(entries, model.body_iquat[i])
     R = entries.reshape(3, 3)
@@ -223,18 +223,21 @@ def _moments(mujoco: Any, model: Any, i: int) -> NDArray:
 
 
 def _comparable(J: NDArray) -> bool:
-    """Return whether MuJoCo keeps the moments of inertia (not of thin rods, plates)."""
+    """Return whether MuJoCo preserves an inertia matrix.
+
+    It changes the moments of thin rods and plates.
+    """
     least, middle, most = np.linalg.eigvalsh(J)
     return bool(least > _LEAST_MOMENT and most < (1 - 1e-9) * (least + middle))
 
 
 def _attributes(six: Mapping[str, str]) -> NDArray:
-    """Return the inertia (3, 3) [kg m^2] from a URDF element's attributes."""
+    """Return the inertia matrix from URDF attributes, (3, 3) [kg m^2]."""
     return inertia_matrix([float(six.get(key, "0")) for key in _KEYS])
 
 
 def _rules(mujoco: Any, model: Any) -> dict[str, tuple[int, float]]:
-    """Return row and rotation scale of active constraints, by forcefit's name."""
+    """Return index and torque scale of active connect and weld constraints, by name."""
     kinds = int(mujoco.mjtEq.mjEQ_CONNECT), int(mujoco.mjtEq.mjEQ_WELD)
     active = [i for i in range(model.neq) if model.eq_active0[i]]
     return {
@@ -244,7 +247,7 @@ def _rules(mujoco: Any, model: Any) -> dict[str, tuple[int, float]]:
 
 
 def _rows(mujoco: Any, data: Any, constraint: int) -> NDArray:
-    """Return the constraint rows of an equality."""
+    """Return a mask of the residuals of an equality constraint."""
     equal = data.efc_type == int(mujoco.mjtConstraint.mjCNSTR_EQUALITY)
     return np.asarray(equal & (data.efc_id == constraint))
 
@@ -252,7 +255,7 @@ def _rows(mujoco: Any, data: Any, constraint: int) -> NDArray:
 def _placed(
     mujoco: Any, model: Any, data: Any, mechanism: Mechanism, q: NDArray
 ) -> dict[str, NDArray]:
-    """Return the poses of all bodies for the coordinates in MuJoCo's ``data``."""
+    """Set the MuJoCo coordinates, and return the poses of the mechanism's bodies."""
     names, kinds = _body_names(model), mujoco.mjtJoint
     row = {j.name: k for k, j in enumerate(mechanism.joints) if j.kind != "fixed"}
     known: set[str] = set()
@@ -271,7 +274,7 @@ def _placed(
         }:  # fmt: skip
             known |= {f"{name}.{part}" for part in ("tx", "ty", "tz", "rx", "ry", "rz")}
             several.append((i, name, bool(first)))
-    # joints that MuJoCo does not know keep the coordinate of the file
+    # joints that do not exist in MuJoCo have zero coordinates
     held = [joint.name not in known for joint in mechanism.joints]
     poses = body_poses(mechanism, np.where(held, 0.0, q))
     for i, name, first in several:

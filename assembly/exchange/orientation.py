@@ -1,8 +1,8 @@
-"""Conversion of roll-pitch-yaw angles, quaternions, Euler angles to rotations.
+"""Conversion of roll-pitch-yaw angles, quaternions and Euler angles to rotations.
 
 Sources:
-    Shoemake (1994), Euler angle conversion, Graphics Gems IV: the third angle is
-    computed from the first, which remains accurate if the second is 90 degrees.
+    Shoemake (1994), Euler angle conversion, Graphics Gems IV.  The third angle is
+    computed from the first, because this is accurate if the second is 90 degrees.
 """
 
 import math
@@ -16,13 +16,13 @@ _UNIT = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 
 def from_roll_pitch_yaw(angles: ArrayLike) -> NDArray:
-    """Return the (3, 3) rotation about fixed x, then y, then z by (3,) angles [rad]."""
+    """Return the rotation (3, 3) by angles (3,) [rad] about fixed x, then y, then z."""
     roll, pitch, yaw = np.asarray(angles, dtype=float)
     return _about("z", yaw) @ _about("y", pitch) @ _about("x", roll)
 
 
 def to_roll_pitch_yaw(R: NDArray) -> tuple[float, float, float]:
-    """Return roll, pitch, yaw [rad] of a (3, 3) rotation (inverse of the above)."""
+    """Return the roll, pitch and yaw angles [rad] of a rotation (3, 3)."""
     roll = math.atan2(R[2, 1], R[2, 2])
     c, s = math.cos(roll), math.sin(roll)
     pitch = math.atan2(-R[2, 0], s * R[2, 1] + c * R[2, 2])
@@ -31,7 +31,7 @@ def to_roll_pitch_yaw(R: NDArray) -> tuple[float, float, float]:
 
 
 def from_quaternion(q: ArrayLike) -> NDArray:
-    """Return the (3, 3) rotation of a quaternion ``[w x y z]`` of nonzero length."""
+    """Return the rotation (3, 3) of a nonzero quaternion ``[w x y z]``."""
     w, x, y, z = np.asarray(q, dtype=float) / np.linalg.norm(q)
     return np.array([
         [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
@@ -41,22 +41,23 @@ def from_quaternion(q: ArrayLike) -> NDArray:
 
 
 def to_quaternion(R: NDArray) -> tuple[float, float, float, float]:
-    """Return the unit quaternion ``[w x y z]`` of a (3, 3) rotation."""
+    """Return the unit quaternion ``[w x y z]`` of a rotation (3, 3)."""
     turn = rotation_vector(R)
     angle = float(np.linalg.norm(turn))
-    half = np.sinc(angle / (2 * np.pi)) / 2 * turn  # sin(angle / 2) times the axis
+    half = np.sinc(angle / (2 * np.pi)) / 2 * turn  # sin(angle / 2) * unit axis
     return math.cos(angle / 2), float(half[0]), float(half[1]), float(half[2])
 
 
 def from_euler(angles: ArrayLike, sequence: str) -> NDArray:
-    """Return the (3, 3) rotation by three angles [rad] about axes such as ``"xyz"``.
+    """Return the rotation by three Euler angles.
 
     Args:
-        angles: (3,) angles in the order of the sequence.
-        sequence: three letters; small letters are body axes, capitals fixed axes.
+        angles: angles in the order of the sequence, (3,) [rad].
+        sequence: three axes such as ``"xyz"``; lower-case letters denote body axes,
+            capital letters fixed axes.
 
     Returns:
-        The rotation matrix.
+        Rotation matrix (3, 3).
     """
     R = np.eye(3)
     for axis, angle in zip(sequence, np.asarray(angles, dtype=float), strict=True):
@@ -66,7 +67,7 @@ def from_euler(angles: ArrayLike, sequence: str) -> NDArray:
 
 
 def onto(axis: ArrayLike) -> NDArray:
-    """Return the smallest (3, 3) rotation that rotates z to a unit vector."""
+    """Return the smallest rotation (3, 3) from z to a unit vector."""
     x, y, z = np.asarray(axis, dtype=float)
     sine = math.hypot(x, y)
     if sine == 0.0:
@@ -76,5 +77,5 @@ def onto(axis: ArrayLike) -> NDArray:
 
 
 def _about(axis: str, angle: float) -> NDArray:
-    """Return the (3, 3) rotation about a coordinate axis."""
+    """Return the rotation (3, 3) about a coordinate axis."""
     return rotation_matrix(angle * np.array(_UNIT[axis]))

@@ -1,12 +1,12 @@
-"""Readers for robot files that other Python packages provide through entry points.
+"""Readers for robot files from other Python packages.
 
-A package assigns a function to the suffix of its files::
+A package declares a function for the suffix of its files as an entry point::
 
     [project.entry-points."forcefit.readers"]
-    cad = "their_package.robots:read"   # for files that end in .cad
+    cad = "their_package.robots:read"   # for files with the suffix .cad
 
-``read(path)`` returns a :class:`forcefit.assembly.model.robot.Robot`. If it raises
-``BadInput``, the user sees its message.
+``read(path)`` returns a :class:`forcefit.assembly.model.robot.Robot`. The message of a
+``BadInput`` error that it raises is shown to the user.
 """
 
 from pathlib import Path
@@ -19,7 +19,7 @@ GROUP = "forcefit.readers"
 
 
 def has_reader(path: Path) -> bool:
-    """Return whether an installed package provides a reader for a file extension."""
+    """Return whether an installed package provides a reader for a file suffix."""
     return _ending(path) in installed_names(GROUP)
 
 
@@ -27,13 +27,13 @@ def read_by_other(path: Path) -> Robot:
     """Read a robot with the reader of an installed package.
 
     Args:
-        path: file with an extension for which a reader exists; see :func:`has_reader`.
+        path: file with a suffix for which a reader exists; see :func:`has_reader`.
 
     Returns:
         Robot.
 
     Raises:
-        BadInput: several packages read this suffix; or the reader cannot be imported,
+        BadInput: several packages read this suffix, or the reader cannot be imported,
             fails, or does not return a robot.
     """
     try:

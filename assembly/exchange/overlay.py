@@ -1,7 +1,7 @@
 """Overlays: TOML files that add elasticity, clearances and tolerances to a robot.
 
-Because an overlay is separate from the robot file, a CAD program can regenerate the
-robot file without losing measured data.
+An overlay is separate from the robot file.  A CAD program can therefore replace the
+robot file without loss of measured data.
 """
 
 from collections.abc import Mapping
@@ -12,23 +12,23 @@ from typing import Any
 from forcefit.inputs.errors import nearest, quoted
 from forcefit.inputs.table import Table, read_toml
 
-# keys that are allowed only in the robot's own file
+# keys of a frame that an overlay cannot change
 _PLACED = ("parent", "translation", "rotation", "dh", "joint")
 _WHOLE = ("name", "description", "platform", "effect", "frame")
 
 
 def lay_over(robot: Mapping[str, Any], overlay: Path | str) -> Table:
-    """Return a robot's table, with keys added or replaced by an overlay.
+    """Add or replace keys of a robot by those of an overlay.
 
     Args:
-        robot: table from :func:`forcefit.assembly.files.robot_file.robot_table`; its
-            paths are relative to the overlay's folder.
-        overlay: the file. It may contain ``[[frame]]`` with a ``name`` (``*`` matches
-            any letters) and any keys of a frame except those of its placement; also
-            ``platform``, ``description``, and ``[[effect]]`` of the whole robot.
+        robot: table from :func:`forcefit.assembly.files.robot_file.robot_table`, with
+            paths relative to the overlay's folder.
+        overlay: path of the file. It may contain ``[[frame]]`` with a ``name`` (``*``
+            matches any letters) and any keys of a frame except those of its placement.
+            It may also contain ``platform``, ``description`` and ``[[effect]]``.
 
     Returns:
-        The root table, which can then be read; error messages name the overlay.
+        Root table of the robot.  Error messages name the overlay as the file.
 
     Raises:
         BadInput: the overlay is not TOML, names an unknown frame, or changes a

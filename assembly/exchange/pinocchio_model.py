@@ -1,12 +1,12 @@
 """Import of a Pinocchio model in memory: ``pinocchio.Model``.
 
 The model is converted to MJCF text, which is then read like a file.  The model is a
-tree; Pinocchio stores loops in separate objects, which are not read.  Each joint with
-one degree of freedom is assumed to be driven, as for a URDF without specified drives.
+tree, because Pinocchio stores loops in separate objects, which are not read.  All
+joints with one degree of freedom are assumed to be driven.
 
 Sources:
-    Pinocchio documentation, Model and JointModel: motion subspaces begin with the
-    linear part; a link on a fixed joint belongs to the preceding joint.
+    Pinocchio documentation, Model and JointModel.  Motion subspaces begin with the
+    translation.  A link on a fixed joint is assigned to the preceding joint.
 """
 
 from typing import Any
@@ -19,8 +19,8 @@ from forcefit.assembly.exchange.orientation import to_quaternion
 from forcefit.inputs.errors import BadInput, quoted
 
 _SEVERAL = {"JointModelSpherical": "ball", "JointModelFreeFlyer": "free"}
-ASSUMED = "every joint of one freedom as a drive"
-_LARGEST = 1e6  # [rad, m] larger limits count as no limits
+ASSUMED = "every joint with one degree of freedom as a drive"
+_LARGEST = 1e6  # [rad, m] larger limits are ignored
 
 
 def is_pinocchio(model: object) -> bool:
@@ -30,16 +30,17 @@ def is_pinocchio(model: object) -> bool:
 
 
 def mjcf_of_pinocchio(model: Any) -> str:
-    """Return a model as the text of an MJCF file.
+    """Convert a model to the text of an MJCF file.
 
     Args:
         model: ``pinocchio.Model``.
 
     Returns:
-        The text; bodies have the names of the model's body frames, or of joints.
+        The text.  A body has the name of its body frame or, without one, the name of
+        its joint with a suffix.
 
     Raises:
-        BadInput: MJCF has no equivalent for a joint; the message names the joint.
+        BadInput: MJCF has no equivalent joint type.
     """
     root = Element("mujoco", model=model.name or "pinocchio model")
     SubElement(root, "compiler", angle="radian")
@@ -58,7 +59,7 @@ def mjcf_of_pinocchio(model: Any) -> str:
         if _add_joint(model, body, i):
             SubElement(drives, "general", name=name, joint=name)
         for frame in frames:
-            if frame is not own:  # a link on a fixed joint
+            if frame is not own:  # a link that is connected by a fixed joint
                 SubElement(body, "body", _pose(frame.placement), name=frame.name)
     return tostring(root, encoding="unicode")
 
@@ -75,7 +76,7 @@ def _pose(placement: Any) -> dict[str, str]:
 
 
 def _add_mass(body: Element, inertia: Any) -> None:
-    """Add mass and moments of inertia about the centre, in the joint's axes."""
+    """Add the mass and inertia of a body to its element."""
     if inertia.mass:
         J = np.array(inertia.inertia)
         six = [J[0, 0], J[1, 1], J[2, 2], J[0, 1], J[0, 2], J[1, 2]]
@@ -84,7 +85,7 @@ def _add_mass(body: Element, inertia: Any) -> None:
 
 
 def _add_joint(model: Any, body: Element, i: int) -> bool:
-    """Add a joint to its body; return whether it has one degree of freedom."""
+    """Add a joint to its body, and return whether it has one degree of freedom."""
     joint, name = model.joints[i], model.names[i]
     several = _SEVERAL.get(joint.shortname())
     if several == "free":
@@ -95,7 +96,8 @@ def _add_joint(model: Any, body: Element, i: int) -> bool:
         return False
     data = joint.createData()
     q = np.zeros(model.nq)
-    q[joint.idx_q] = 1.0 if joint.nq > joint.nv else 0.0  # stored as cosine and sine
+    # the coordinates of an unlimited revolute joint are cosine and sine
+    q[joint.idx_q] = 1.0 if joint.nq > joint.nv else 0.0
     joint.calc(data, q)
     S = np.reshape(data.S, (6, -1))
     turns, slides = np.any(S[3:]), np.any(S[:3])

@@ -1,4 +1,4 @@
-"""Masses and moments of inertia of imported bodies, and of frames to be exported."""
+"""Masses and moments of inertia for the import and export of robots."""
 
 from dataclasses import replace
 from typing import Any
@@ -18,7 +18,7 @@ from forcefit.stiffness.beam.sections import declared_section
 
 
 def mass_keys(body: Body) -> dict[str, Any]:
-    """Return the keys of a frame for the mass and moments of inertia of a body."""
+    """Return the mass and moments of inertia of a body as keys of a frame."""
     if not body.mass and not body.inertia.any():
         return {}
     return {
@@ -27,13 +27,13 @@ def mass_keys(body: Body) -> dict[str, Any]:
 
 
 def with_possible_moments(mechanism: Mechanism) -> Mechanism:
-    """Return the mechanism with impossible moments of inertia removed."""
+    """Set physically impossible moments of inertia to zero."""
     bodies = {
         name: replace(body, inertia=np.zeros((3, 3)))
         for name, body in mechanism.bodies.items()
         if body.inertia.any() and inertia_fault(body.inertia)
     }  # fmt: skip
-    lines = counted("moments of inertia that no body has", list(bodies))
+    lines = counted("physically impossible moments of inertia", list(bodies))
     return replace(
         mechanism, bodies={**mechanism.bodies, **bodies},
         left_out=(*mechanism.left_out, *lines),
@@ -41,7 +41,7 @@ def with_possible_moments(mechanism: Mechanism) -> Mechanism:
 
 
 def lumped_body(name: str, frames: list[Frame]) -> Body:
-    """Return one rigid body for all frames on a joint; beams count as rods."""
+    """Combine the masses of frames in one rigid body; beams are slender rods."""
     parts: list[MassProperties] = []
     for frame in frames:
         T = Robot("", frame.name, (replace(frame, parent=BASE),)).fixed_transforms[0]
@@ -55,6 +55,6 @@ def lumped_body(name: str, frames: list[Frame]) -> Body:
             span = R @ axis * length
             area = declared_section(link.section, link.poisson).area
             mass = link.density * area * length
-            # moment of inertia of a slender rod: m L^2 / 12
+            # moment of inertia of a slender rod about its centre: m L^2 / 12
             parts.append((mass, T[:3, 3] - span / 2, point_inertia(mass / 12, span)))
     return Body(name, *joined_bodies(parts))

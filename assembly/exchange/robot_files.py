@@ -1,4 +1,4 @@
-"""Import and export of robots in files of all supported formats, by their suffix."""
+"""Import and export of robots in all supported file formats."""
 
 import logging
 import os
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 _LOG = logging.getLogger("forcefit.load")
 OTHERS = (".urdf", ".xml", ".sdf")
 _BLANKS = b"\xef\xbb\xbf \r\n\t"  # byte order mark and whitespace
-# words in a remark that indicate that an omission may change results
+# phrases in the descriptions of omissions that may change results
 _WEIGHTY = ("mimic:", "no platform", "no drive", "may carry load", "masses")
 
 
@@ -34,28 +34,27 @@ def load_robot(
     *,
     links: bool = True,
 ) -> Robot:
-    """Load a robot by name, from a file or from a model in memory.
+    """Load a built-in robot, a robot from a file or a model in memory.
 
     Args:
         name: name of a built-in robot, for example ``"irsbot2"``; path of a robot file,
             MJCF file, SDF file or URDF (with its loops file in the same folder);
-            ``mujoco.MjModel`` or ``mujoco.MjSpec``, whose bodies, joints, equalities,
-            actuators and keyframe ``home`` are read; or ``pinocchio.Model``, whose
-            joints with one degree of freedom are all assumed to be driven.
+            ``mujoco.MjModel``; ``mujoco.MjSpec``; or ``pinocchio.Model``, whose joints
+            with one degree of freedom are assumed to be driven.
         close: function that closes the loops of a robot file, as in
             :mod:`forcefit.assembly.kinematics.closing`, or None.
         links: whether to solve link meshes and read link libraries, as solvers require.
-            Otherwise the robot can only be placed, written and converted, and its zone
-            margin can be computed.  Links are always solved for a robot with joints
-            that are bolted at a pose.
+            Without them, the robot can only be placed, written and converted, and its
+            zone margin can be computed.  Links are always solved for a robot with
+            joints that are bolted at a pose.
 
     Returns:
         Robot. If it was imported from another program, its remarks list assumptions and
         omissions.
 
     Raises:
-        BadInput: the name is neither a built-in robot, a file nor a model; the robot
-            violates a rule; or one of its meshes or libraries is unusable.
+        BadInput: the name is not a built-in robot, a file or a model, the robot is
+            invalid, or one of its meshes or libraries is unusable.
     """
     declared = isinstance(name, str | Path)
     robot = _load_declared(name, close) if declared else _robot_of_model(name, close)
@@ -70,7 +69,7 @@ def load_robot(
 
 
 def _load_declared(name: str | Path, close: Closing | None) -> Robot:
-    """Return the robot of a name or a file; its link stiffnesses are not solved."""
+    """Load a robot by name or from a file, without computing link stiffnesses."""
     path = Path(name)
     if path.suffix.lower() not in OTHERS:
         if _is_of_other(path):
@@ -78,7 +77,7 @@ def _load_declared(name: str | Path, close: Closing | None) -> Robot:
             return robot if close is None else close(robot)
         if os.path.isfile(path) and read_bytes(path).lstrip(_BLANKS)[:1] == b"<":
             raise BadInput(
-                f"{path}: found XML, expected a robot file, or the ending .urdf, .xml "
+                f"{path}: found XML, expected a robot file, or the suffix .urdf, .xml "
                 "(MJCF) or .sdf"
             )
         return load_declared(name, close)
@@ -91,12 +90,12 @@ def is_robot_file(path: Path) -> bool:
 
 
 def _is_of_other(path: Path) -> bool:
-    """Return whether another package has installed a reader for a file's suffix."""
+    """Return whether another package provides a reader for a file."""
     return path.suffix not in {"", ".toml"} and path.is_file() and has_reader(path)
 
 
 def _robot_of_foreign(path: Path, title: str, close: Closing | None) -> Robot:
-    """Return the robot of another program's file; its remarks begin with the title."""
+    """Read a robot from a file of another program; its remarks begin with a title."""
     from forcefit.assembly.exchange.foreign import robot_of_file
 
     conversion = robot_of_file(path, ask=False)[0]
@@ -112,7 +111,7 @@ def _robot_of_foreign(path: Path, title: str, close: Closing | None) -> Robot:
 
 
 def _robot_of_model(model: object, close: Closing | None) -> Robot:
-    """Return the robot of a model in memory."""
+    """Convert a model in memory to a robot."""
     from forcefit.assembly.exchange.mujoco_model import is_mujoco, mjcf_of_model
     from forcefit.assembly.exchange.pinocchio_model import (
         ASSUMED,
@@ -139,13 +138,14 @@ def _robot_of_model(model: object, close: Closing | None) -> Robot:
 
 
 def write_robot(robot: Robot, path: str | Path) -> None:
-    """Write a robot to a file whose format is given by the file extension.
+    """Write a robot to a file; the suffix determines the format.
 
     Args:
         robot: robot to write.
-        path: ``.toml`` for a robot file, which contains the complete robot; ``.urdf``
-            (with a YAML file in the same folder) or ``.xml`` (MJCF) for rigid bodies
-            and joints only.  ``forcefit convert`` reports what these formats omit.
+        path: path with the suffix ``.toml`` for a robot file, which contains the
+            complete robot.  The suffixes ``.urdf`` (with a YAML file in the same
+            folder) and ``.xml`` (MJCF) are for rigid bodies and joints only.  The
+            command ``forcefit convert`` reports what these formats omit.
 
     Raises:
         BadInput: the suffix is not supported, a file of another program exists at this

@@ -51,11 +51,11 @@ def read_sdf(path: Path | str, loops: LoopsFile | None = None) -> Mechanism:
         loops: loops file with drives and additional loops, or None.
 
     Returns:
-        Mechanism whose tree starts at the world, or at the first link in its pose;
-        joints outside the tree become loops.
+        Mechanism.  Its root is the world or the canonical link of the model.  Joints
+        that close a loop become loop closures.
 
     Raises:
-        BadInput: the file violates a rule of the format, or a joint type is unknown.
+        BadInput: the file does not comply with the format, or a joint type is unknown.
     """
     root = read_xml(path, "sdf")
     frames = frames_of(root)
@@ -93,12 +93,12 @@ def _tree(
     frames: Frames, ends: dict[str, tuple[str, str]], bodies: dict[str, Body],
     first: str, held: list[Joint],
 ) -> tuple[list[Joint], dict[str, list[str]], list[Loop]]:  # fmt: skip
-    """Return the joints of a tree from the root to every body, and the loops."""
+    """Return the joints of a spanning tree, their parts and the loop closures."""
     reached = {first} if held or WORLD not in bodies else {WORLD}
     tree, loops, waiting = held, list[Loop](), list(ends)
     parts: dict[str, list[str]] = {}
     while waiting:
-        # in the order of the file; joints that are not connected yet are postponed
+        # the first joint in the file that is connected to the tree
         name = next((n for n in waiting if reached & set(ends[n])), waiting[0])
         waiting.remove(name)
         parent, child = ends[name]
@@ -119,9 +119,9 @@ def _tree(
 
 
 def _of_axis(joint: Node, tag: str, part: Node) -> str:
-    """Return a description of an axis's omitted properties; empty if there are none."""
+    """Describe a property of an axis that is not converted, or return an empty text."""
     spring = part.child("spring_stiffness")
-    # forcefit does not read further axes of joints with several degrees of freedom
+    # both axes are read for these joint types, and otherwise only the first axis
     crossed = joint.optional("type") in {"universal", "revolute2"}
     single = joint.optional("type") not in {"ball", "screw"}
     taken = crossed or (tag == "axis" and single)
@@ -132,14 +132,14 @@ def _of_axis(joint: Node, tag: str, part: Node) -> str:
         return f"joint axis limit {', '.join(rest)}" if rest else ""
     screw = joint.optional("type") == "screw"
     if part.tag == "limit" and screw:
-        return "joint axis limit of a screw, whose unit the format does not state"
+        return "joint axis limit of a screw, whose unit the format does not define"
     springs_alone = all(one.tag.startswith("spring_") for one in part.children())
     held = part.tag in _HELD_OF_AXIS or (part.tag == "dynamics" and springs_alone)
     return "" if held else f"joint axis {part.tag}"
 
 
 def _taken(words: dict[str, str]) -> Iterator[str]:
-    """Yield the assumptions on masses, each with the names of the links."""
+    """Yield each assumption on masses together with the names of the links."""
     by_words: dict[str, list[str]] = {}
     for name, line in words.items():
         if line:
@@ -149,7 +149,7 @@ def _taken(words: dict[str, str]) -> Iterator[str]:
 
 
 def _left_out(frames: Frames, root: Node) -> Iterator[str]:
-    """Yield descriptions of SDF parts that a robot of frames cannot represent."""
+    """Yield descriptions of SDF elements that are not converted."""
     extra: dict[str, list[str]] = {}
 
     def add(what: str, name: str) -> None:

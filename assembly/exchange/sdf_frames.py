@@ -1,10 +1,11 @@
-"""Frames of SDF: links, joints, frames and nested models, placed and attached.
+"""Coordinate frames in SDF: those of links, joints, frames and nested models.
 
 Sources:
-    sdformat.org, specification 1.12 and "Pose frame semantics": the pose of a link is
-    relative to its model's frame, the pose of a joint to its child's frame, and the
-    pose of a frame to the frame ``attached_to``. The attribute ``relative_to`` names
-    another frame.  Names of nested models are joined by ``::``.
+    sdformat.org, specification 1.12 and "Pose frame semantics".  The pose of a link is
+    relative to the model frame, the pose of a joint is relative to its child link, and
+    the pose of a frame is relative to the frame ``attached_to``.  The attribute
+    ``relative_to`` specifies another frame.  Names of nested models are joined by
+    ``::``.
 """
 
 import math
@@ -23,19 +24,19 @@ from forcefit.inputs.errors import BadInput, nearest, quoted
 MODEL = "__model__"
 FRAMES = ("link", "joint", "frame")
 _AROUND = f"{WORLD}::"
-_NESTED = 20  # largest depth of nested models
-_OLD = 4  # last version, 1.4, in which joint axes are in the model's frame
+_NESTED = 20  # maximum depth of nested models
+_OLD = 4  # 1.4 is the last version in which joint axes are in the model frame
 
 
 @dataclass(frozen=True)
 class Named:
-    """An element with a pose, and the name prefix of its model.
+    """Element with a pose, and the name prefix of its model.
 
     Attributes:
         node: element of a link, joint, frame or model.
-        scope: name prefix: empty in the outermost model, such as ``"arm::"`` in a
-            nested one, ``"world::"`` in the world around it.
-        old: whether joint axes are in the model's frame, as in old format versions.
+        scope: name prefix, which is empty in the outermost model, ``"arm::"`` in a
+            nested model ``arm``, and ``"world::"`` in the world.
+        old: whether joint axes are in the model frame, as in old format versions.
     """
 
     node: Node
@@ -45,12 +46,12 @@ class Named:
 
 @dataclass
 class Frames:
-    """Named frames of a model and its nested models, whose poses are computed on use.
+    """Named frames of a model and its nested models.
 
     Attributes:
         model: the outermost model.
         named: links, joints, frames and models by their full names.
-        poses: (4, 4) poses in the world that have been computed so far.
+        poses: poses (4, 4) relative to the world that have been computed.
     """
 
     model: Node
@@ -58,11 +59,11 @@ class Frames:
     poses: dict[str, NDArray] = field(default_factory=dict)
 
     def of(self, tag: str) -> Iterator[tuple[str, Named]]:
-        """Yield the names and elements of one kind, in the order of the file."""
+        """Yield the names and elements with a tag, in the order of the file."""
         return ((k, v) for k, v in self.named.items() if v.node.tag == tag)
 
     def name(self, name: str, scope: str, node: Node, key: str = "") -> str:
-        """Return the full name for a name in a model; reject unknown names."""
+        """Return the full name of a link or frame in a model."""
         if name == WORLD or (name, scope) == (MODEL, _AROUND):
             return WORLD
         own = f"{self.model.optional('name')}::"
@@ -76,7 +77,7 @@ class Frames:
         raise node.bad(key, f"found {quoted(name)}, expected a link or frame{hint}")
 
     def pose(self, name: str, asked: tuple[str, ...] = ()) -> NDArray:
-        """Return the (4, 4) pose in the world of the frame with a full name."""
+        """Return the pose of a frame relative to the world, (4, 4)."""
         if name == WORLD:
             return np.eye(4)
         if name not in self.poses:
@@ -89,7 +90,7 @@ class Frames:
                 )
             own = node.child("pose")
             relative = ""
-            if own is not None:  # named "frame" until version 1.6
+            if own is not None:  # the attribute was ``frame`` until version 1.6
                 relative = own.optional("relative_to") or own.optional("frame")
             relative = relative or self._default(name)
             base = self.pose(self.name(relative, scope, node, "pose"), (*asked, name))
@@ -110,7 +111,7 @@ class Frames:
         return (node.optional("attached_to") if node.tag == "frame" else "") or MODEL
 
     def link(self, name: str, asked: tuple[str, ...] = ()) -> str:
-        """Return the link to which a frame is attached; ``"world"`` for the world."""
+        """Return the name of the link to which a frame is attached."""
         if name == WORLD:
             return WORLD
         node, scope = self.named[name].node, self.named[name].scope
@@ -127,7 +128,7 @@ class Frames:
         return self.link(self.name(to, scope, node), (*asked, name))
 
     def _canonical(self, scope: str, model: Node) -> str:
-        """Return the link to which a model's own frame is attached."""
+        """Return the name of the link to which a model frame is attached."""
         given = model.optional("canonical_link")
         if given:
             return self.link(self.name(given, scope, model, "canonical_link"))
@@ -138,22 +139,22 @@ class Frames:
 
 
 def frames_of(root: Node) -> Frames:
-    """Return all named frames of a file's only model, and of the world around it.
+    """Return all named frames of a file that contains one model.
 
     Args:
         root: root element ``<sdf>``.
 
     Returns:
-        The frames, whose poses are not computed yet.
+        The frames; their poses are computed later.
 
     Raises:
         BadInput: a name is missing or not unique, or there is not exactly one model.
     """
     worlds = list(root.children("world"))
     models = [m for group in (root, *worlds) for m in group.children("model")]
-    if len(models) > 1:  # other models may be static, such as the ground
+    if len(models) > 1:  # static models, such as the ground, are not the robot
         models = [m for m in models if not _is_static(m)]
-    if not models:  # the model may be in an included file
+    if not models:  # the robot may be in an included file
         given = [i for group in (root, *worlds) for i in group.children("include")]
         models = given if len(given) == 1 else []
     if len(models) != 1:
@@ -198,20 +199,23 @@ def _gather(frames: Frames, model: Node, scope: str, outer: str, old: bool) -> N
 
 
 def _take(frames: Frames, node: Node, scope: str, name: str, old: bool) -> None:
-    """Add a link, joint or frame; if names are equal, only the link keeps its name."""
+    """Add a link, joint or frame.
+
+    A joint or frame with the name of a link gets a suffix.
+    """
     full = scope + name
     if full in frames.named and frames.named[full].node.tag != node.tag:
-        full += f"_{node.tag}"  # libsdformat uses the same new name
+        full += f"_{node.tag}"  # same suffix as in libsdformat
     if full in frames.named:
         raise node.bad("name", "found this name twice; expected unique names")
     frames.named[full] = Named(node, scope, old)
 
 
 def _is_old(root: Node) -> bool:
-    """Return whether a file's version defines joint axes in the model's frame.
+    """Return whether joint axes are in the model frame in the version of a file.
 
     Raises:
-        BadInput: the version is stated, and it is not one of 1.4, 1.5, .. 1.10, ...
+        BadInput: the version is older than 1.4 or not of the form 1.x.
     """
     version = root.optional("version")
     if not version:
@@ -228,14 +232,14 @@ def included(node: Node) -> tuple[Node, bool]:
     """Return the model of an included file, and whether its version is old.
 
     Args:
-        node: element ``<include>``; its address is a file or folder next to the folder
-            of the file that contains it, or next to a parent folder.
+        node: element ``<include>``. The file or folder that it includes is searched in
+            the folder of the file that contains the element and in two folders above.
 
     Returns:
         The model, with the name, pose and placement frame of the include element.
 
     Raises:
-        BadInput: the file does not exist, or does not contain exactly one model.
+        BadInput: the file does not exist or does not contain exactly one model.
     """
     if node.optional("merge") in {"true", "1"}:
         raise node.bad(
@@ -275,14 +279,14 @@ def included(node: Node) -> tuple[Node, bool]:
 
 
 def word(node: Node, tag: str) -> str:
-    """Return the text of an inner element that names a link.
+    """Return the text of an inner element.
 
     Args:
-        node: element of a joint.
-        tag: tag of the inner element.
+        node: outer element, such as a joint.
+        tag: tag of the inner element, which contains the name of a link.
 
     Returns:
-        The name of the link.
+        The text.
 
     Raises:
         BadInput: the inner element is missing or empty.
@@ -294,13 +298,13 @@ def word(node: Node, tag: str) -> str:
 
 
 def own_pose(node: Node) -> NDArray:
-    """Return the (4, 4) transform of a pose element; the identity if it is empty.
+    """Return the transform in a pose element.
 
     Args:
         node: element ``<pose>``.
 
     Returns:
-        The transform.
+        Transform (4, 4); the identity if the element is empty.
 
     Raises:
         BadInput: the number of values is wrong.

@@ -1,11 +1,13 @@
-"""Conversion of SDF joints, also in ``<gazebo>`` elements of a URDF.
+"""Conversion of SDF joints, including those in ``<gazebo>`` elements of a URDF.
 
 Sources:
-    sdformat.org, specification 1.12, ``<joint>``: an axis is in the model's frame until
-    version 1.4, until 1.6 with ``use_parent_model_frame``, later with
-    ``expressed_in``.  gazebosim/sdformat, pull request 1168: ``screw_thread_pitch``
-    [m per turn] is positive for a right-hand thread; the older ``thread_pitch``
-    [rad/m] is positive for a left-hand thread, as in Gazebo classic.
+    sdformat.org, specification 1.12, ``<joint>``.  An axis is in the model frame until
+    version 1.4, with ``use_parent_model_frame`` until version 1.6, and with
+    ``expressed_in`` in later versions.
+
+    gazebosim/sdformat, pull request 1168.  ``screw_thread_pitch`` [m per turn] is
+    positive for a right-hand thread.  The older ``thread_pitch`` [rad/m] is positive
+    for a left-hand thread.
 """
 
 from dataclasses import replace
@@ -32,7 +34,7 @@ _Z = (0.0, 0.0, 1.0)
 
 
 def joint_ends(frames: Frames, named: Named) -> tuple[str, str]:
-    """Return the parent and child links of a joint, which may name attached frames.
+    """Return the parent and child links of a joint.
 
     Args:
         frames: frames of the model.
@@ -42,7 +44,7 @@ def joint_ends(frames: Frames, named: Named) -> tuple[str, str]:
         Names of two different links; ``"world"`` for the world.
 
     Raises:
-        BadInput: a name does not exist in the model, or both are the same link.
+        BadInput: a name does not exist in the model, or both links are the same.
     """
     node = named.node
     ends = [
@@ -61,23 +63,22 @@ def joint_parts(
     frames: Frames, name: str, named: Named, ends: tuple[str, str], carried: str,
     backwards: bool = False,
 ) -> tuple[list[Joint], list[Body]]:  # fmt: skip
-    """Return the elementary joints of a joint, one per degree of freedom.
-
-    They are reversed if the joint is defined backwards.
+    """Return the elementary joints of a joint, one for each degree of freedom.
 
     Args:
         frames: frames of the model.
         name: name of the joint.
         named: element of the joint.
-        ends: links of parent and child.
-        carried: name of the body on the joint.
-        backwards: whether the tree reaches the child before the parent.
+        ends: names of the parent and child links.
+        carried: name of the child body in the mechanism.
+        backwards: whether the child precedes the parent in the tree, so that the joint
+            is reversed.
 
     Returns:
         The joints and the bodies between them.
 
     Raises:
-        BadInput: the joint has an unknown type, or an axis has no direction.
+        BadInput: the joint has an unknown type, or an axis has zero length.
     """
     node = named.node
     kind = node.choice("type", _KINDS, "")
@@ -103,11 +104,12 @@ def joint_parts(
     if len(parts) == 1:
         ((_, one, axis),) = parts
         joint = Joint(name, one, parent, carried, placement, axis, after)
-        if kind == "screw":  # the format does not define the unit of its range
+        if kind == "screw":  # not converted: the unit of its range is undefined
             return [replace(joint, lead=_lead(node))], []
         return [joint if one == "fixed" else _of_axis(joint, node, "axis")], []
     joints, between = chain(name, parent, carried, placement, after, parts)
-    tags = {"first": "axis", "second": "axis2"}  # the rotations of a ball have no tag
+    # the rotations of a ball joint do not have a range or a spring
+    tags = {"first": "axis", "second": "axis2"}
     known = [tags.get(part, "") for part, _, _ in parts]
     return [_of_axis(j, node, t) for j, t in zip(joints, known, strict=True)], between
 
@@ -135,7 +137,7 @@ def _lead(node: Node) -> float:
 
 
 def _of_axis(joint: Joint, node: Node, tag: str) -> Joint:
-    """Return the joint with the range and the spring of its axis."""
+    """Add the range and the spring of an axis to a joint."""
     axis = node.child(tag)
     if axis is None:
         return joint
@@ -154,7 +156,7 @@ def _of_axis(joint: Joint, node: Node, tag: str) -> Joint:
 
 
 def _axis(frames: Frames, named: Named, tag: str, at: NDArray) -> NDArray:
-    """Return the direction (3,) of an axis in the joint's axes."""
+    """Return the direction of an axis in the joint frame, (3,)."""
     axis = named.node.child(tag)
     if axis is None:
         return np.array(_Z)
@@ -183,7 +185,7 @@ def joint_couplings(
         frames: frames of the model.
         name: name of the joint.
         named: element of the joint.
-        parts: names of the elementary joints by the name of the whole joint.
+        parts: names of the elementary joints, by the name of the joint.
 
     Returns:
         A coupling for each axis that follows another axis.
@@ -213,7 +215,7 @@ def joint_couplings(
 
 
 def _part(mimic: Node, parts: list[str], tag: str) -> str:
-    """Return the elementary joint that belongs to an axis of a joint."""
+    """Return the name of the elementary joint for an axis of a joint."""
     if len(parts) == 1 and tag == "axis":
         return parts[0]
     ends = {"axis": ".first", "axis2": ".second"}.get(tag, "?")
@@ -226,6 +228,6 @@ def _part(mimic: Node, parts: list[str], tag: str) -> str:
 
 
 def _number(node: Node, key: str, default: float) -> float:
-    """Return the number in an inner element, or the default if it is absent."""
+    """Return the number in an inner element, or a default value."""
     inner = node.child(key)
     return default if inner is None else inner.number("", "-")

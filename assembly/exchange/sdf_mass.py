@@ -1,10 +1,10 @@
-"""Masses and moments of inertia of SDF links: explicit, default or from shapes.
+"""Masses and moments of inertia of SDF links.
 
 Sources:
-    sdformat.org, specification 1.12, ``<inertial>``: a link without this element, or
-    without a mass in it, has 1 kg; moments that are not written are 1 kg m^2. With
-    ``auto``, densities of the collision shapes are used, 1000 kg/m^3 by default; a
-    given mass is kept, and the moments are scaled to it.
+    sdformat.org, specification 1.12, ``<inertial>``.  The default mass is 1 kg, and the
+    default moments of inertia are 1 kg m^2.  With ``auto``, they are computed from the
+    collision shapes with a default density of 1000 kg/m^3.  If the element contains a
+    mass, the computed moments are scaled to this mass.
 """
 
 import numpy as np
@@ -20,10 +20,10 @@ from forcefit.assembly.model.inertia import (
     joined_bodies,
 )
 
-_DEFAULT_MASS = 1.0  # [kg] default of the format
-_DEFAULT_INERTIA = np.eye(3)  # [kg m^2] default of the format
-_DEFAULT_DENSITY = 1000.0  # [kg/m^3] default of the format
-# keys of a shape's sizes, and the number of values of each
+_DEFAULT_MASS = 1.0  # [kg] default value of the format
+_DEFAULT_INERTIA = np.eye(3)  # [kg m^2] default value of the format
+_DEFAULT_DENSITY = 1000.0  # [kg/m^3] default value of the format
+# elements that contain the dimensions of a shape, and their number of values
 _SIZES = {"box": {"size": 3}, "sphere": {"radius": 1}, "ellipsoid": {"radii": 3},
           "cylinder": {"radius": 1, "length": 1},
           "capsule": {"radius": 1, "length": 1},
@@ -31,7 +31,7 @@ _SIZES = {"box": {"size": 3}, "sphere": {"radius": 1}, "ellipsoid": {"radii": 3}
 
 
 def link_body(frames: Frames, name: str, named: Named) -> tuple[Body, str]:
-    """Return the body of a link, and the assumption if the file contains no mass.
+    """Return the body of a link, and a description of assumptions on its mass.
 
     Args:
         frames: frames of the model.
@@ -39,7 +39,8 @@ def link_body(frames: Frames, name: str, named: Named) -> tuple[Body, str]:
         named: the link.
 
     Returns:
-        The body, and the assumption as text; empty if the file contains the mass.
+        The body, and the assumptions, which are empty if the file contains its mass and
+        moments of inertia.
 
     Raises:
         BadInput: a mass or a size is not positive.
@@ -70,7 +71,7 @@ def link_body(frames: Frames, name: str, named: Named) -> tuple[Body, str]:
 
 
 def _moments(inertial: Node) -> NDArray | None:
-    """Return the written inertia (3, 3) [kg m^2] in its pose's axes; None if absent."""
+    """Return the inertia matrix in an element, (3, 3) [kg m^2], or None."""
     inertia = inertial.child("inertia")
     if inertia is None:
         return None
@@ -83,7 +84,7 @@ def _moments(inertial: Node) -> NDArray | None:
 
 
 def _of_shapes(frames: Frames, named: Named, inertial: Node) -> MassProperties:
-    """Return the mass properties of all collision shapes of a link together."""
+    """Return the combined mass properties of the collision shapes of a link."""
     density = _density(inertial, _DEFAULT_DENSITY)
     parts = []
     for collision in named.node.children("collision"):
@@ -98,7 +99,7 @@ def _of_shapes(frames: Frames, named: Named, inertial: Node) -> MassProperties:
             )  # fmt: skip
         T = _placed(frames, named, collision)
         sizes = _sizes(shape)
-        # the centre of a cone is at a quarter of its length from its base
+        # a cone's centre of mass is at a quarter of its length from its base
         above = -sizes[1] / 4 if shape.tag == "cone" else 0.0
         centre = T[:3, :3] @ [0.0, 0.0, above] + T[:3, 3]
         mass = _density(collision, density) * volume(shape.tag, sizes)
@@ -108,7 +109,7 @@ def _of_shapes(frames: Frames, named: Named, inertial: Node) -> MassProperties:
 
 
 def _sizes(shape: Node) -> list[float]:
-    """Return a shape's sizes [m], all positive."""
+    """Return the dimensions of a shape [m], which must be positive."""
     sizes: list[float] = []
     for key, count in _SIZES[shape.tag].items():
         inner = shape.child(key)
@@ -121,7 +122,7 @@ def _sizes(shape: Node) -> list[float]:
 
 
 def _density(node: Node, default: float) -> float:
-    """Return the density [kg/m^3] of an element, or the default density."""
+    """Return the density in an element [kg/m^3], or a default value."""
     inner = node.child("density")
     if inner is None:
         return default
@@ -132,7 +133,7 @@ def _density(node: Node, default: float) -> float:
 
 
 def _placed(frames: Frames, named: Named, collision: Node) -> NDArray:
-    """Return the (4, 4) pose of a collision shape in its link."""
+    """Return the pose of a collision shape relative to its link, (4, 4)."""
     pose = collision.child("pose")
     if pose is None:
         return np.eye(4)

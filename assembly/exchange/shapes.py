@@ -6,17 +6,18 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-_SHELL = 1e-6  # [m] thickness of the shell of an ellipsoid
+_SHELL = 1e-6  # [m] thickness of an ellipsoidal shell
 
 
 def volume(shape: str, sizes: Sequence[float]) -> float:
     """Return the volume of a solid shape.
 
     Args:
-        shape: ``box`` (three edges), ``sphere`` (radius), ``ellipsoid`` (three
-            half axes), ``cylinder``, ``capsule`` (without its caps) or ``cone``
-            (radius, length).
-        sizes: [m] sizes of the shape.
+        shape: ``box``, ``sphere``, ``ellipsoid``, ``cylinder``, ``capsule`` or
+            ``cone``.
+        sizes: dimensions of the shape [m]: three edges of a box, radius of a sphere,
+            three half axes of an ellipsoid, or radius and length of the other shapes.
+            The length of a capsule does not include its caps.
 
     Returns:
         Volume [m^3].
@@ -36,8 +37,8 @@ def area(shape: str, sizes: Sequence[float]) -> float:
     """Return the surface area of a shape.
 
     Args:
-        shape: ``box``, ``sphere``, ``cylinder`` or ``capsule``, see :func:`volume`.
-        sizes: [m] sizes of the shape.
+        shape: ``box``, ``sphere``, ``cylinder`` or ``capsule``.
+        sizes: dimensions of the shape [m]; see :func:`volume`.
 
     Returns:
         Area [m^2].
@@ -53,14 +54,14 @@ def area(shape: str, sizes: Sequence[float]) -> float:
 
 
 def moments(shape: str, sizes: Sequence[float]) -> NDArray:
-    """Return the moments of inertia of a solid body about its centre.
+    """Return the moments of inertia of a solid body about its centre of mass.
 
     Args:
-        shape: see :func:`volume`; cylinders, capsules and cones are along z.
-        sizes: [m] sizes of the shape.
+        shape: see :func:`volume`.  The axis of cylinders, capsules and cones is z.
+        sizes: dimensions of the shape [m]; see :func:`volume`.
 
     Returns:
-        (3,) [m^2] moments about x, y and z for 1 kg.
+        Moments about x, y and z divided by the mass, (3,) [m^2].
     """
     if shape == "box":
         return _across(np.square(sizes)) / 12
@@ -72,7 +73,7 @@ def moments(shape: str, sizes: Sequence[float]) -> NDArray:
     bar = _round(r2 / 4 + length**2 / 12, r2 / 2)
     if shape == "cylinder":
         return bar
-    # the hemispheres have their centres 3/8 of the radius beyond the cylinder's ends
+    # the centre of mass of a hemisphere is at 3/8 of its radius from its base
     far = length**2 / 4 + 3 / 8 * sizes[0] * length
     ends = _round(0.4 * r2 + far, 0.4 * r2)
     return np.asarray(
@@ -81,19 +82,19 @@ def moments(shape: str, sizes: Sequence[float]) -> NDArray:
 
 
 def shell_moments(shape: str, sizes: Sequence[float]) -> NDArray:
-    """Return the moments of inertia of a thin shell about its centre.
+    """Return the moments of inertia of a thin shell about its centre of mass.
 
     Args:
-        shape: as for :func:`moments`, except ``cone``. As in MuJoCo, the outer half
-            axes of an ellipsoid's shell are 1 um longer than the inner ones.
-        sizes: [m] sizes of the shape.
+        shape: as for :func:`moments`, except ``cone``.  As in MuJoCo, the outer half
+            axes of an ellipsoidal shell exceed the inner half axes by 1 um.
+        sizes: dimensions of the shape [m]; see :func:`volume`.
 
     Returns:
-        (3,) [m^2] moments about x, y and z for 1 kg.
+        Moments about x, y and z divided by the mass, (3,) [m^2].
     """
     if shape == "box":
         squares, areas = np.square(sizes), math.prod(sizes) / np.array(sizes)
-        # two opposite faces: plates at half an edge from the centre
+        # each pair of opposite faces consists of plates at half an edge from the centre
         faces = [_across(squares / 12 + squares / 6 * pair) for pair in np.eye(3)]
         return np.asarray(np.average(faces, axis=0, weights=areas))
     if shape == "sphere":
@@ -101,7 +102,7 @@ def shell_moments(shape: str, sizes: Sequence[float]) -> NDArray:
     if shape == "ellipsoid":
         a, b, c = axes = np.array(sizes)
         volume = (a * b + b * c + c * a + (a + b + c) * _SHELL + _SHELL**2) * _SHELL
-        outside = np.prod(axes + _SHELL) / volume  # outer volume over shell volume
+        outside = np.prod(axes + _SHELL) / volume  # ratio of outer and shell volume
         thicker = outside * (2 * axes + _SHELL) * _SHELL
         return (_across(axes**2) + _across(thicker)) / 5
     r2, length = sizes[0] ** 2, sizes[1]
@@ -115,7 +116,7 @@ def shell_moments(shape: str, sizes: Sequence[float]) -> NDArray:
 
 
 def _across(squares: NDArray) -> NDArray:
-    """Return, for each of three values, the sum of the other two."""
+    """Return the sum of the other two values for each of three values."""
     return np.asarray(np.sum(squares) - squares)
 
 

@@ -1,4 +1,4 @@
-"""Joint springs: those unloaded at home are converted, all others are reported."""
+"""Conversion of joint springs that are unloaded in the home pose."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -6,18 +6,19 @@ from numpy.typing import NDArray
 from forcefit.assembly.exchange.mechanism import Joint, Mechanism
 from forcefit.assembly.exchange.xml_file import counted
 
-_AT_REST = 1e-9  # [rad or m] largest distance from home of an unloaded spring
-_OWN = {"revolute": 2, "prismatic": 5}  # index of the joint's motion in a screw
+_AT_REST = 1e-9  # [rad or m] largest deflection of an unloaded spring
+_OWN = {"revolute": 2, "prismatic": 5}  # screw component of the joint motion
 
 
 def springs_at_rest(mechanism: Mechanism) -> dict[str, NDArray]:
-    """Return the stiffness of passive joints whose springs are unloaded at home.
+    """Return the stiffness of passive joints with springs that are unloaded at home.
 
     Args:
-        mechanism: mechanism at home.
+        mechanism: mechanism in the home pose.
 
     Returns:
-        (6, 6) [N m/rad .. N/m] by joint, rigid except along the joint's motion.
+        Stiffness by joint name, (6, 6) [N m/rad .. N/m].  It is infinite in all
+        directions except that of the joint motion.
     """
     matrices = {}
     for joint in mechanism.joints:
@@ -32,10 +33,10 @@ def other_springs(mechanism: Mechanism) -> tuple[str, ...]:
     """Return descriptions of springs that are not converted.
 
     Args:
-        mechanism: mechanism at home.
+        mechanism: mechanism in the home pose.
 
     Returns:
-        One line for springs at drives, one line for springs under load at home.
+        A line about springs at drives and a line about springs that are loaded.
     """
     springs = [joint for joint in mechanism.joints if _is_spring(joint)]
     driven = [joint.name for joint in springs if joint.actuated]
@@ -54,5 +55,5 @@ def _is_spring(joint: Joint) -> bool:
 
 
 def _at_rest(joint: Joint) -> bool:
-    """Return whether the spring of a joint is unloaded at home."""
+    """Return whether the spring of a joint is unloaded in the home pose."""
     return abs(joint.position - joint.rest) < _AT_REST

@@ -5,8 +5,7 @@ from collections.abc import Container, Mapping
 from forcefit.assembly.exchange.xml_file import Node
 from forcefit.inputs.errors import quoted
 
-# words in names of elements that refer to bodies without constraining or moving them;
-# plugins, which are programs, are reported by name
+# words in the tags of elements that do not constrain bodies
 _HARMLESS = ("collision", "collide", "material", "transmission", "control", "sensor",
              "plugin", "gripper", "visual", "group", "state")  # fmt: skip
 
@@ -16,7 +15,7 @@ def refuse_ties(node: Node, owners: Mapping[str, str]) -> None:
 
     Args:
         node: element that is not converted.
-        owners: bodies by their own names and by the names of frames on them.
+        owners: names of bodies, by their names and the names of their frames.
 
     Raises:
         BadInput: the element refers to two bodies, and its kind may connect them.
@@ -26,9 +25,9 @@ def refuse_ties(node: Node, owners: Mapping[str, str]) -> None:
     named = node.names_in(owners)
     if len({owners[name] for name in named}) > 1:
         raise node.bad(
-            "", f"found an element between {quoted(named[0])} and "
-            f"{quoted(named[1])} that may connect them and is not converted; "
-            "expected joints: declare a joint or a loop, or remove the element"
+            "", f"found an element that may connect {quoted(named[0])} and "
+            f"{quoted(named[1])} and cannot be converted, expected a joint or a loop; "
+            "declare a joint or a loop, or remove the element"
         )  # fmt: skip
 
 
@@ -38,18 +37,18 @@ def _is_harmless(node: Node) -> bool:
 
 
 def may_tie(node: Node, names: Container[str]) -> str:
-    """Return a warning for an omitted element that may connect bodies, or "".
+    """Return a warning if an omitted element may connect bodies, or an empty text.
 
     Args:
         node: element that is not converted.
         names: names of joints and bodies.
 
     Returns:
-        Words to be appended to the element's name.
+        Text that is appended to the name of the element.
     """
     unknown = node.tag == "plugin" or not _is_harmless(node)
     if unknown and len(node.names_in(names)) > 1:
         return ", not converted, though it may connect or move the bodies that it names"
-    if node.tag == "springStiffness":  # Gazebo's spring at a URDF joint
+    if node.tag == "springStiffness":  # spring of a URDF joint in Gazebo
         return ", not converted, though it may carry load"
     return ""

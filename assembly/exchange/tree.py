@@ -1,4 +1,4 @@
-"""Poses of the frames of a tree of joints, each about or along its z axis."""
+"""Forward kinematics of a tree of joints, which move about or along their z axes."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,18 +11,20 @@ def place_frames(
     q: NDArray,
     leads: NDArray | float = 0.0,
 ) -> tuple[NDArray, NDArray]:
-    """Return the poses of all frames, before and after the motion of their joint.
+    """Return the poses of all frames before and after the motion of their joints.
 
     Args:
-        parents: (n,) index of each parent, which precedes its children; -1 for the
-            base.
-        kinds: (n,) kind of each joint: 0 fixed, 1 revolute or helical, 2 prismatic.
-        fixed: (n, 4, 4) poses of the frames in their parents.
-        q: (n,) [rad or m] coordinates.
-        leads: (n,) [m/rad] translation per angle of helical joints; 0 for others.
+        parents: index of the parent of each joint, (n,); -1 for the base.  Parents
+            precede their children.
+        kinds: type of each joint, (n,): 0 fixed, 1 revolute or helical, 2 prismatic.
+        fixed: poses of the frames relative to their parents, (n, 4, 4).
+        q: coordinates, (n,) [rad or m].
+        leads: translation per angle of helical joints, (n,) [m/rad]; 0 for other
+            joints.
 
     Returns:
-        (n, 4, 4) poses before and (n, 4, 4) poses after the motion, in base axes.
+        Poses relative to the base before the motion, (n, 4, 4), and after the motion,
+        (n, 4, 4).
     """
     angle = np.where(kinds == 1, q, 0.0)
     motion = np.zeros((len(q), 4, 4))

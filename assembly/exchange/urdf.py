@@ -1,8 +1,8 @@
 """Import of URDF, with loops and drives from a separate file.
 
 Sources:
-    ROS wiki, urdf/XML/joint and urdf/XML/link: a child link has the frame of its joint
-    after the motion; the default axis is x; rpy are rotations about fixed axes.
+    ROS wiki, urdf/XML/joint and urdf/XML/link.  The frame of a child link is the moved
+    frame of its joint.  The default axis is x.  ``rpy`` are rotations about fixed axes.
 """
 
 from collections.abc import Iterator, Mapping
@@ -43,18 +43,19 @@ def read_urdf(path: Path | str, loops: LoopsFile | None = None) -> Mechanism:
         loops: loops file of the robot; None for an open chain.
 
     Returns:
-        Mechanism.  Its drives are those listed in the loops file; by default, the
-        joints with a transmission; and without any transmission or loop, all joints.
+        Mechanism.  Its drives are listed in the loops file.  If they are not listed,
+        joints with a transmission are driven.  Without transmissions and loops, all
+        joints are driven.
 
     Raises:
-        BadInput: the file violates a rule of the format, or a joint type is unknown.
+        BadInput: the file does not comply with the format, or a joint type is unknown.
     """
     root = read_xml(path, "robot")
     for node in root.descendants():
         if node.tag.startswith("xacro:"):
             raise node.bad(
                 "",
-                "found a macro, expected the URDF without macros that the "
+                "found a macro, expected a URDF without macros, which the "
                 "program xacro writes",
             )
     bodies: dict[str, Body] = {}
@@ -91,7 +92,7 @@ def read_urdf(path: Path | str, loops: LoopsFile | None = None) -> Mechanism:
 
 
 def _add(node: Node, parts: dict[str, list[str]], several: list[Joint]) -> None:
-    """Add the parts of a joint; reject a name that already exists."""
+    """Add the names of the elementary joints of a joint, whose name must be unique."""
     name = node.text("name")
     if name in parts:
         raise node.bad("name", "found this name twice; expected unique names")
@@ -99,7 +100,7 @@ def _add(node: Node, parts: dict[str, list[str]], several: list[Joint]) -> None:
 
 
 def _body(node: Node) -> Body:
-    """Return a link with its mass and moments of inertia."""
+    """Return the body of a link with its mass and moments of inertia."""
     name, inertial = node.text("name"), node.child("inertial")
     mass = None if inertial is None else inertial.child("mass")
     if inertial is None or mass is None:
@@ -116,7 +117,7 @@ def _body(node: Node) -> Body:
 
 
 def _joints(node: Node) -> tuple[list[Joint], list[Body]]:
-    """Return the one-freedom joints of a URDF joint, and the bodies between them."""
+    """Return the elementary joints of a URDF joint, and the bodies between them."""
     ends = []
     for tag in ("parent", "child"):
         end = node.child(tag)
@@ -140,22 +141,22 @@ def _limits(node: Node) -> tuple[float, float] | None:
     if limit is None or node.text("type") in {"fixed", "continuous"}:
         return None
     ends = (limit.element.get("lower"), limit.element.get("upper"))
-    # in URDF an absent limit means 0; files without limits omit both limits
+    # the default value of one missing limit is 0
     lower, upper = ("0" if end is None else end for end in ends)
     return None if ends == (None, None) else limit.limits(lower, upper)
 
 
 def _is_reversed(limit: Node) -> bool:
-    """Return whether the lower limit exceeds the upper one, so that it is omitted."""
+    """Return whether the lower limit of a joint exceeds the upper limit."""
     lower, upper = (limit.optional(end) or "0" for end in ("lower", "upper"))
     try:
         return float(lower) > float(upper)
-    except ValueError:  # of a joint whose limits are not read
+    except ValueError:  # the limits of some joint types are not read
         return False
 
 
 def _couplings(nodes: list[Node], joints: dict[str, Joint]) -> Iterator[Coupling]:
-    """Yield the couplings of joints that follow another joint (``<mimic>``)."""
+    """Yield the couplings between joints (``<mimic>``)."""
     for node in nodes:
         mimic = node.child("mimic")
         if mimic is None:
@@ -174,10 +175,10 @@ def _couplings(nodes: list[Node], joints: dict[str, Joint]) -> Iterator[Coupling
 def _left_out(
     root: Node, joints: list[Node], bodies: Mapping[str, Body]
 ) -> tuple[str, ...]:
-    """Return descriptions of URDF parts that a robot of frames cannot represent."""
+    """Return descriptions of URDF elements that are not converted."""
     links = list(root.children("link"))
     owners = {name: name for name in bodies}
-    # frames on links, an extension of Drake
+    # Drake permits frames that are attached to links
     owners |= {f.optional("name"): f.optional("link") for f in root.children("frame")}
     named = {*bodies, *(joint.text("name") for joint in joints)}
     extra: dict[str, list[str]] = {}

@@ -1,9 +1,11 @@
 """Degrees of freedom and poses of URDF joints.
 
 Sources:
-    ROS wiki, urdf/XML/joint: the default axis is x; rpy are rotations about fixed axes.
-    Drake, multibody/parsing: a universal ``drake:joint`` rotates about x, then y; a
-    planar one translates along x and y.
+    ROS wiki, urdf/XML/joint.  The default axis is x.  ``rpy`` are rotations about fixed
+    axes.
+
+    Drake, multibody/parsing.  A ``drake:joint`` of type ``universal`` rotates about x,
+    then y, and one of type ``planar`` translates along x and y.
 """
 
 import numpy as np
@@ -25,16 +27,16 @@ _ZERO = np.zeros(3)
 
 
 def joint_freedoms(node: Node) -> list[tuple[str, str, NDArray]]:
-    """Return name, kind and axis per degree of freedom of a joint, or of a fixed joint.
+    """Return the elementary joints of a URDF joint.
 
     Args:
-        node: element of a joint; a prefix marks a joint of Drake, with Drake's axes.
+        node: element of a joint.  A tag with a prefix denotes a joint of Drake.
 
     Returns:
-        The degrees of freedom, in the order in which they move the child.
+        Name suffix, kind and axis (3,) of each elementary joint, in order.
 
     Raises:
-        BadInput: the type is unknown, or an axis has no direction.
+        BadInput: the type is unknown, or an axis has zero length.
     """
     own_axes = ":" in node.tag
     kind = node.choice("type", _KINDS_OF_DRAKE if own_axes else _KINDS, "")
@@ -62,7 +64,7 @@ def joint_freedoms(node: Node) -> list[tuple[str, str, NDArray]]:
 
 
 def pose_of(origin: Node) -> NDArray:
-    """Return the (4, 4) pose of an element from ``xyz`` and ``rpy`` or a quaternion."""
+    """Return the pose of an element, (4, 4), from ``xyz`` and its orientation."""
     shift = origin.numbers("xyz", 3, "m", _ZERO)
     if not origin.has("quat_xyzw"):
         turn = from_roll_pitch_yaw(origin.numbers("rpy", 3, "rad", _ZERO))
@@ -74,6 +76,6 @@ def pose_of(origin: Node) -> NDArray:
 
 
 def _axis(node: Node, tag: str, default: NDArray) -> NDArray:
-    """Return the unit direction (3,) in an inner element of a joint."""
+    """Return the unit vector in an inner element of a joint, (3,)."""
     axis = node.child(tag)
     return default if axis is None else axis.unit_vector("xyz", default)

@@ -1,9 +1,10 @@
-"""Loops that a URDF itself contains: ``<loop_joint>``, and joints in ``<gazebo>``.
+"""Loops in a URDF, which are defined by ``<loop_joint>`` or joints in ``<gazebo>``.
 
 Sources:
-    Isaac Sim, URDF importer, and Drake before 2018: ``loop_joint`` places a joint at
-    ``link1`` and at ``link2``.  Gazebo: the content of ``<gazebo>`` is SDF and is added
-    to the model in the frame of the URDF's root.
+    Isaac Sim, URDF importer, and Drake before 2018.  A ``loop_joint`` connects a frame
+    on ``link1`` to a frame on ``link2``.
+
+    Gazebo.  The content of ``<gazebo>`` is SDF in the frame of the root link.
 """
 
 from collections.abc import Iterator
@@ -34,27 +35,26 @@ Closing = tuple[str, list[Joint], list[Body], Loop]
 def with_closing_joints(
     mechanism: Mechanism, root: Node, parts: dict[str, list[str]]
 ) -> Mechanism:
-    """Return the mechanism with the loops that the URDF contains.
+    """Add the loops in a URDF to its mechanism.
 
     Args:
-        mechanism: mechanism of the file's links and joints.
+        mechanism: mechanism of the links and joints in the file.
         root: root element of the file.
-        parts: names of the elementary joints by the name of the whole joint; the
-            parts of closing joints are added.
+        parts: names of the elementary joints, by the name of the joint.  The joints
+            that close loops are added.
 
     Returns:
         The mechanism with its loops.
 
     Raises:
-        BadInput: a closing joint names a link that does not exist, or the same link
-            twice.
+        BadInput: a joint refers to a link that does not exist, or twice to one link.
     """
     bodies, joints = dict(mechanism.bodies), list(mechanism.joints)
     loops = list(mechanism.loops)
     for node, (name, several, between, loop) in _closing(mechanism, root):
         if name in parts or any(name == one.name for one in loops):
             raise node.bad("name", "found this name twice; expected unique names")
-        if several:  # for a common point, there is no joint with a coordinate
+        if several:  # a ball joint in a loop does not have coordinates
             parts[name] = [joint.name for joint in several]
         joints += several
         bodies |= {body.name: body for body in between}
@@ -63,7 +63,7 @@ def with_closing_joints(
 
 
 def _closing(mechanism: Mechanism, root: Node) -> Iterator[tuple[Node, Closing]]:
-    """Yield the closing joints: ``<loop_joint>`` and joints in ``<gazebo>``."""
+    """Yield the joints that close loops, together with their elements."""
     for node in root.children():
         if node.tag.split(":")[-1] == "loop_joint":
             yield node, _loop_joint(mechanism, node)
@@ -80,7 +80,7 @@ def _closing(mechanism: Mechanism, root: Node) -> Iterator[tuple[Node, Closing]]
 
 
 def _loop_joint(mechanism: Mechanism, node: Node) -> Closing:
-    """Return a joint between two places, or a common point for a ball joint."""
+    """Return the joint and the loop closure of a ``<loop_joint>``."""
     name = node.text("name")
     (first, A), (second, B) = (_place(mechanism, node, tag) for tag in _ENDS)
     if first == second:
@@ -102,10 +102,10 @@ _ENDS = ("link1", "link2")
 
 
 def _place(mechanism: Mechanism, node: Node, tag: str) -> tuple[str, NDArray]:
-    """Return the link of a place, and the (4, 4) pose of the place in the link."""
+    """Return a link of a ``<loop_joint>``, and the joint pose on this link, (4, 4)."""
     end = node.child(tag)
     if end is None:
-        raise node.bad(tag, "missing; expected a link and a place in it")
+        raise node.bad(tag, "missing; expected a link and a pose relative to it")
     name = end.text("link")
     if name not in mechanism.bodies:
         hint = nearest(name, mechanism.bodies)
@@ -114,7 +114,7 @@ def _place(mechanism: Mechanism, node: Node, tag: str) -> tuple[str, NDArray]:
 
 
 def _gazebo_joint(mechanism: Mechanism, frames: Frames, node: Node) -> Closing:
-    """Return an SDF joint between links of the URDF, at zero coordinates."""
+    """Return the joint and the loop closure of an SDF joint between URDF links."""
     name = node.text("name")
     named = frames.named[name] = Named(node, "")
     parent, child = (

@@ -1,4 +1,4 @@
-"""Export of a URDF and its loops file, with numbers at full precision."""
+"""Export of a URDF and its loops file, with numbers in full precision."""
 
 from xml.sax.saxutils import quoteattr
 
@@ -15,11 +15,10 @@ def urdf_text(mechanism: Mechanism) -> str:
     """Return the text of a URDF.
 
     Args:
-        mechanism: mechanism in which each child has its joint's frame (``after`` is the
-            identity), as for robots of frames.
+        mechanism: mechanism in which ``after`` is the identity for all joints.
 
     Returns:
-        The text, without loops, drives and home, which :func:`loops_of` returns.
+        The text, without loops, drives and home pose; see :func:`loops_of`.
     """
     lines = [XML_MARK, f"<robot name={quoteattr(mechanism.name)}>"]
     for body in mechanism.bodies.values():
@@ -30,7 +29,7 @@ def urdf_text(mechanism: Mechanism) -> str:
 
 
 def loops_of(mechanism: Mechanism) -> LoopsFile:
-    """Return the content of the loops file of a mechanism's URDF."""
+    """Return the content of the loops file, with loops, drives and home pose."""
     moving = [joint for joint in mechanism.joints if joint.kind != "fixed"]
     return LoopsFile(
         pairs=tuple((loop.first, loop.second) for loop in mechanism.loops),
@@ -42,12 +41,12 @@ def loops_of(mechanism: Mechanism) -> LoopsFile:
 
 
 def numbers(values: NDArray | tuple[float, ...]) -> str:
-    """Return numbers as text with all digits, separated by blanks."""
+    """Return numbers as text in full precision, separated by blanks."""
     return " ".join(repr(float(value)) for value in values)
 
 
 def _link(body: Body) -> list[str]:
-    """Return ``<link>`` as lines, with mass and moments of inertia if there are any."""
+    """Return the lines of a ``<link>`` element."""
     name = quoteattr(body.name)
     if not body.mass and not body.inertia.any():
         return [f"  <link name={name}/>"]
@@ -67,7 +66,7 @@ def _link(body: Body) -> list[str]:
 
 
 def _joint(joint: Joint) -> list[str]:
-    """Return ``<joint>`` as lines; a revolute joint without limits is continuous."""
+    """Return the lines of a ``<joint>`` element."""
     kind = joint.kind
     if kind == "revolute" and joint.limits is None:
         kind = "continuous"
@@ -81,7 +80,7 @@ def _joint(joint: Joint) -> list[str]:
     ]
     if joint.kind != "fixed":
         lines.append(f'    <axis xyz="{numbers(joint.axis)}"/>')
-    if kind in {"revolute", "prismatic"}:  # the format requires limits here
+    if kind in {"revolute", "prismatic"}:  # these joint types require limits
         lower, upper = joint.limits or (-1e3, 1e3)
         lines.append(
             f'    <limit lower="{lower!r}" upper="{upper!r}" effort="1e6" '

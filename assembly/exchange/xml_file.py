@@ -1,4 +1,4 @@
-"""XML reader, which rejects entities and external files."""
+"""Reader for XML files, which rejects entities and external files."""
 
 import codecs
 import re
@@ -15,15 +15,15 @@ from forcefit.inputs.errors import BadInput, describe, nearest, one_line, quoted
 from forcefit.inputs.table import read_bytes, read_text
 from forcefit.stiffness.screws import transform
 
-_DEEPEST = 200  # largest depth of nested elements
-# comments, which contain "--" in some files, and misplaced declarations
+_DEEPEST = 200  # maximum depth of nested elements
+# comments that contain "--" and misplaced declarations, both of which expat rejects
 _SKIPPED = re.compile(
     r"<!\[CDATA\[.*?(?:\]\]>|\Z)|<!--.*?(?:-->|\Z)|<\?xml\s[^<>]*>", re.S
 )
 
 _DECLARED = re.compile(rb"""<\?xml\s[^<>]*?encoding\s*=\s*["']([A-Za-z][\w.-]*)["']""")
-_WHOLE = ("model", "world")  # elements of SDF that contain all links and joints
-_ENDLESS = 1e3  # [rad or m] larger limits count as no limits
+_WHOLE = ("model", "world")  # SDF elements that contain links and joints
+_ENDLESS = 1e3  # [rad or m] larger limits are ignored
 
 
 @dataclass(frozen=True)
@@ -33,8 +33,8 @@ class Node:
     Attributes:
         element: element of :mod:`xml.etree.ElementTree`.
         file: name of the file.
-        within: nearest outer element with a name, and the elements between; empty if
-            there is none; None for the root, whose name is in no message.
+        within: path from the nearest outer element with a name, for messages; empty
+            without such an element; None for the root.
     """
 
     element: Any
@@ -48,34 +48,30 @@ class Node:
 
     @property
     def place(self) -> str:
-        """Tag and ``name`` of the element, for messages.
-
-        Without a name, the place of the outer element comes first, such as
-        ``joint "elbow".origin``.
-        """
+        """Position of the element for messages, such as ``joint "elbow".origin``."""
         name = self.element.get("name")
         if name is not None:
             return f"{self.tag} {quoted(name)}"
         return f"{self.within}.{self.tag}" if self.within else self.tag
 
     def bad(self, key: str, message: str) -> BadInput:
-        """Return the error for an attribute, which the caller raises."""
+        """Return an error about an attribute of the element."""
         place = f"{self.place}.{key}" if key else self.place
         return BadInput(f"{self.file}: {place}: {message}")
 
     def children(self, *tags: str) -> Iterator["Node"]:
-        """Yield the inner elements with the given tags; all if none is given."""
+        """Yield the inner elements with the given tags, or all inner elements."""
         for element in self.element:
             if not tags or element.tag in tags:
                 yield Node(element, self.file, self._within_children())
 
     def descendants(self) -> Iterator["Node"]:
-        """Yield this element and all inner elements, at any depth."""
+        """Yield the element itself and all inner elements at any depth."""
         for element in self.element.iter():
             yield Node(element, self.file)
 
     def _within_children(self) -> str:
-        """Return ``within`` of the inner elements."""
+        """Return the attribute ``within`` of the inner elements."""
         if self.within is None or self.tag in _WHOLE:
             return ""
         return self.place if self.within or self.has("name") else ""
@@ -86,7 +82,7 @@ class Node:
         return (self.element.text or "").strip()
 
     def names_in(self, valid: Container[str]) -> list[str]:
-        """Return the valid names that occur in attributes and texts, in order."""
+        """Return the valid names that occur in the element and its inner elements."""
         found: dict[str, None] = {}
         for node in self.descendants():
             words = [*node.element.attrib.values(), node.content]
@@ -94,7 +90,7 @@ class Node:
         return list(found)
 
     def child(self, tag: str) -> "Node | None":
-        """Return the first inner element with a tag; None if there is none."""
+        """Return the first inner element with a tag, or None."""
         return next(self.children(tag), None)
 
     def has(self, key: str) -> bool:
@@ -102,7 +98,7 @@ class Node:
         return self.element.get(key) is not None
 
     def optional(self, key: str) -> str:
-        """Return the text of an attribute without surrounding blanks, or ""."""
+        """Return the text of an attribute; an empty text if it is absent."""
         return str(self.element.get(key, "")).strip()
 
     def text(self, key: str, default: str | None = None) -> str:
@@ -110,7 +106,7 @@ class Node:
 
         Args:
             key: name of the attribute.
-            default: value if the attribute is absent; None to raise an error then.
+            default: default value; None if the attribute is required.
 
         Returns:
             The text without surrounding blanks.
@@ -124,7 +120,7 @@ class Node:
         return str(value).strip()
 
     def choice(self, key: str, valid: tuple[str, ...], default: str) -> str:
-        """Return the value of an attribute, which must be one of a few words."""
+        """Return the value of an attribute, which must be one of the valid words."""
         value = self.text(key, default)
         if value not in valid:
             names = " | ".join(valid)
@@ -136,16 +132,16 @@ class Node:
     def numbers(
         self, key: str, count: int, unit: str, default: NDArray | None = None
     ) -> NDArray:
-        """Return the finite numbers of an attribute, separated by blanks.
+        """Return the finite numbers in an attribute.
 
         Args:
-            key: name of the attribute; empty for the element's own text.
+            key: name of the attribute; empty for the text of the element.
             count: number of values.
             unit: unit for the error message.
-            default: values if the attribute is absent; None to raise an error then.
+            default: default values; None if the attribute is required.
 
         Returns:
-            (count,) numbers.
+            Numbers, (count,).
 
         Raises:
             BadInput: the attribute is absent and has no default, the number of values
@@ -166,23 +162,23 @@ class Node:
         return values
 
     def number(self, key: str, unit: str, default: float | None = None) -> float:
-        """Return one finite number of an attribute; see :meth:`numbers`."""
+        """Return the finite number in an attribute; see :meth:`numbers`."""
         given = None if default is None else np.array([default])
         return float(self.numbers(key, 1, unit, given)[0])
 
     def limits(
         self, lower: str | None, upper: str | None, unit: float = 1.0
     ) -> tuple[float, float] | None:
-        """Return the smallest and largest coordinate of a joint from two texts.
+        """Return the smallest and largest coordinate of a joint.
 
         Args:
-            lower: lower limit of any size, possibly infinite; None if absent.
-            upper: upper limit of any size, possibly infinite; None if absent.
-            unit: factor by which both are multiplied.
+            lower: text of the lower limit; None if absent.
+            upper: text of the upper limit; None if absent.
+            unit: factor by which both limits are multiplied.
 
         Returns:
-            Both limits [rad or m], 1e6 for an absent or a larger one; None if there is
-            no effective limit, or if the range is empty.
+            Both limits [rad or m]; an absent limit is -1e6 or 1e6.  None if the range
+            is empty or both limits are too large to be effective.
 
         Raises:
             BadInput: a text is not a number.
@@ -200,19 +196,19 @@ class Node:
         return (ends[0], ends[1]) if binds and ends[0] < ends[1] else None
 
     def unit_vector(self, key: str, default: NDArray | None = None) -> NDArray:
-        """Return the direction (3,) of an attribute, normalised to length 1."""
+        """Return the vector in an attribute, normalised to length 1, (3,)."""
         vector = self.numbers(key, 3, "-", default)
         length = float(np.linalg.norm(vector))
         if length < 1e-9:
             raise self.bad(
                 key, f"found {describe(vector.tolist())}, expected a nonzero vector"
             )
-        # a vector whose length is 1 except for rounding is not changed
+        # unit vectors are not changed by rounding
         return vector if abs(length - 1.0) < 1e-15 else vector / length
 
 
 def read_xml(path: Path | str, *roots: str) -> Node:
-    """Return the root element of an XML file, as tolerantly as other readers.
+    """Return the root element of an XML file.
 
     Args:
         path: path of the file.
@@ -244,9 +240,9 @@ def read_xml(path: Path | str, *roots: str) -> Node:
 
 
 def _encoding(content: bytes) -> str:
-    """Return the encoding that a byte order mark or the XML declaration states.
+    """Return the encoding according to the byte order mark or the XML declaration.
 
-    The encoding is UTF-8 if none is stated, or if the stated one is unknown.
+    The default encoding is UTF-8, which also replaces an unknown encoding.
 
     Sources:
         W3C, XML 1.0, 4.3.3 and appendix F.
@@ -260,23 +256,23 @@ def _encoding(content: bytes) -> str:
         codecs.decode(b"", known)
     except LookupError:
         return "utf-8-sig"
-    # a declaration that is readable as ASCII rules out UTF-16
+    # the encoding is not UTF-16, because the declaration is readable as ASCII
     return "utf-8-sig" if known.startswith("utf") else known
 
 
 def _parsed(text: str, path: Path | str) -> Any:
-    """Parse a text and return its root; reject entities and document types."""
+    """Parse an XML text without entities and document types, and return its root."""
     from xml.etree.ElementTree import TreeBuilder
     from xml.parsers.expat import ExpatError, ParserCreate
 
     def refuse(*_: object) -> int:
         raise ValueError(
-            "found a document type or an entity, expected neither: they could "
-            "load other files; remove them"
+            "found a document type or an entity, which could load other files; "
+            "expected neither; remove them"
         )
 
     builder = TreeBuilder()
-    parser = ParserCreate()  # without a separator, tags keep their prefixes
+    parser = ParserCreate()  # without namespaces, so that tags include prefixes
     parser.buffer_text = True
     parser.StartElementHandler = builder.start
     parser.EndElementHandler = builder.end
@@ -286,7 +282,7 @@ def _parsed(text: str, path: Path | str) -> Any:
     parser.ExternalEntityRefHandler = refuse
     try:
         parser.Parse(text, True)
-    except ExpatError as error:  # the message ends with line and column
+    except ExpatError as error:  # the message contains line and column
         reason = one_line(str(error), 200)
         raise BadInput(f"{path}: not valid XML: {reason}") from None
     except ValueError as error:
@@ -295,20 +291,20 @@ def _parsed(text: str, path: Path | str) -> Any:
 
 
 def _blank_lines(match: re.Match[str]) -> str:
-    """Return the line breaks of skipped text, so that line numbers remain correct."""
+    """Return the line breaks in removed text, so that line numbers are preserved."""
     text = match[0]
     return text if text.startswith("<![CDATA[") else "\n" * text.count("\n")
 
 
 def placed(translation: NDArray, rotation: NDArray) -> NDArray:
-    """Return the read-only (4, 4) transform of a translation and a rotation."""
+    """Return the read-only transform of a translation and a rotation, (4, 4)."""
     T = transform(translation, rotation)
     T.setflags(write=False)
     return T
 
 
 def counted(what: str, names: list[str]) -> tuple[str, ...]:
-    """Return a text line with the number and first names of omitted items, if any."""
+    """Return a line with the number of items and the first names, or no line."""
     if not names:
         return ()
     named = [name for name in names if name]

@@ -111,7 +111,7 @@ def test_conversion_without_mujoco_reports_that_nothing_was_compared(tmp_path):
     """MuJoCo is a second reader; the conversion itself does not need it."""
     status, out, err = run_without(tmp_path, "mujoco", "convert", "arm6", "-o", "b.xml")
     assert (status, err) == (0, "")
-    assert "b.xml was compared with no other program: MuJoCo is not installed" in out
+    assert "b.xml was not compared with another program: MuJoCo is not installed" in out
     assert (tmp_path / "b.xml").is_file()
 
 

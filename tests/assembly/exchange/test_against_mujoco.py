@@ -34,7 +34,7 @@ def largest_gap(model, mechanism, rng):
 
 
 @pytest.mark.parametrize("name", ["irsbot2", "delta", "hexapod", "arm6"])
-def test_written_mjcf_has_the_same_kinematics_in_mujoco(name, tmp_path, rng):
+def test_kinematics_of_exported_mjcf_agree_with_mujoco(name, tmp_path, rng):
     path = tmp_path / "robot.xml"
     convert(name, path)
     model = mujoco.MjModel.from_xml_path(str(path))
@@ -42,11 +42,12 @@ def test_written_mjcf_has_the_same_kinematics_in_mujoco(name, tmp_path, rng):
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, 0)
     mujoco.mj_forward(model, data)
-    assert np.abs(data.efc_pos).max(initial=0.0) < 1e-12  # the welds hold at home
+    # the weld constraints are satisfied in the home pose
+    assert np.abs(data.efc_pos).max(initial=0.0) < 1e-12
 
 
 @pytest.mark.parametrize("name", ["cassie_like", "robot_delta", "wl16_like"])
-def test_urdf_kinematics_equal_those_of_mujoco(name, rng):
+def test_kinematics_of_imported_urdf_agree_with_mujoco(name, rng):
     path = example(name)
     text = re.sub(r"<(visual|collision)>.*?</\1>", "", path.read_text(), flags=re.S)
     ours = '<mujoco><compiler fusestatic="false" balanceinertia="true"/></mujoco>'

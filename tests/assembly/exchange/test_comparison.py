@@ -1,4 +1,4 @@
-"""Failures of the MuJoCo process, which must not stop a conversion."""
+"""Conversion of robots if MuJoCo fails or is not installed."""
 
 import importlib.util
 
@@ -23,7 +23,7 @@ def path(tmp_path):
     ("import os; os.abort()", "MuJoCo terminated without a result"),
     ("import time; time.sleep(60)", "MuJoCo took longer than 0.5 s"),
 ])  # fmt: skip
-def test_failed_or_hanging_mujoco_process_is_reported_as_the_reason(
+def test_comparison_reports_failure_of_the_mujoco_process(
     worker, reason, path, monkeypatch
 ):
     pytest.importorskip("mujoco", reason="MuJoCo is not installed")
@@ -34,20 +34,18 @@ def test_failed_or_hanging_mujoco_process_is_reported_as_the_reason(
     assert answer.agrees
 
 
-def test_conversion_without_mujoco_reports_the_missing_comparison(
+def test_conversion_without_mujoco_reports_missing_comparison(
     path, tmp_path, monkeypatch
 ):
     monkeypatch.setattr(importlib.util, "find_spec", lambda _: None)
     answer = convert(path, tmp_path / "robot.toml")
     (told,) = answer.comparisons
     assert told.why_not == "MuJoCo is not installed"
-    line = "robot.xml was compared with no other program: MuJoCo is not installed"
+    line = "robot.xml was not compared with another program: MuJoCo is not installed"
     assert line in answer.text()
 
 
-def test_convert_command_exits_with_1_if_mujoco_differs(
-    run, path, tmp_path, monkeypatch
-):
+def test_convert_command_returns_1_if_mujoco_differs(run, path, tmp_path, monkeypatch):
     other = comparison.Comparison("MuJoCo", "robot.xml", "", 1, 1, 0, 0.3, "body a")
     monkeypatch.setattr("forcefit.assembly.exchange.foreign.compare", lambda *_: other)
     status, out, _ = run("convert", path, "-o", tmp_path / "robot.toml")

@@ -21,7 +21,7 @@ NAMES = ("5bar_linkage", "5bar_linkage_iso3d", "5bar_linkage_iso6d", "cassie_lik
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_example_robots_convert_and_close(name, tmp_path):
+def test_conversion_of_example_robots_closes_their_loops(name, tmp_path):
     answer = convert(example(name), tmp_path / "robot.toml")
     assert answer.difference < 1e-12
     assert answer.open_after < 1e-9
@@ -30,8 +30,8 @@ def test_example_robots_convert_and_close(name, tmp_path):
 
 
 @pytest.mark.slow
-def test_kangaroo_closes_with_the_points_of_its_later_loop_file(tmp_path):
-    """In that file (kangaroo_like_2legs) loops 3, 4 and 5 are 6d, all others 3d."""
+def test_conversion_of_kangaroo_with_correct_loop_types_closes_its_loops(tmp_path):
+    """The types are those of the later loops file kangaroo_like_2legs."""
     points = [f"closedloop{i}_A" for i in (0, 2, 6, 7, 8, 9, 10, 11)]
     answer = convert(example("kangaroo_like"), tmp_path / "robot.toml", points=points)
     assert answer.taken == ()
@@ -54,7 +54,7 @@ SPATIAL_LOOP = """<robot name="bent"><link name="base"/><link name="a"/><link na
 
 
 def bent_loop(folder, types):
-    """Return three planar bars that end at a tilted frame, so that only points meet."""
+    """Write a planar chain with a loop to a tilted frame, which cannot close as 6d."""
     path = folder / "robot.urdf"
     path.write_text(SPATIAL_LOOP)
     loops = f"closed_loop: [[end, goal]]\n{types}name_mot: [one]\n"
@@ -63,7 +63,7 @@ def bent_loop(folder, types):
 
 
 @pytest.mark.parametrize("types", ["", "type: ['6d']\n"])
-def test_loop_of_the_default_type_is_closed_in_a_point(types, tmp_path):
+def test_loop_of_default_type_is_closed_at_a_point(types, tmp_path):
     path = bent_loop(tmp_path, types)
     answer = convert(path, tmp_path / "robot.toml")
     assert answer.open_after < 1e-9
@@ -74,7 +74,7 @@ def test_loop_of_the_default_type_is_closed_in_a_point(types, tmp_path):
         convert(path, tmp_path / "robot.toml", points=())
 
 
-def test_points_option_accepts_only_names_of_loops_in_the_file(run, tmp_path):
+def test_points_option_rejects_unknown_loop_names(run, tmp_path):
     path = bent_loop(tmp_path, "type: ['3d']\n")
     target = tmp_path / "robot.toml"
     status, _, error = run("convert", path, "-o", target, "--points", "gaol")
@@ -90,7 +90,7 @@ def test_points_option_accepts_only_names_of_loops_in_the_file(run, tmp_path):
     assert "taken:" not in out
 
 
-# of the robots that take long, the ending with which a quick run tries them
+# file suffix in a quick test run, for robots with a long run time
 QUICK = {"hexapod": "urdf", "delta": "xml", "orthoglide": "", "irsbot2": ""}
 
 
@@ -100,10 +100,10 @@ QUICK = {"hexapod": "urdf", "delta": "xml", "orthoglide": "", "irsbot2": ""}
                   else pytest.mark.slow)
      for name in BUILT_IN for ending in ("urdf", "xml")],
 )  # fmt: skip
-def test_frames_of_built_in_robots_are_equal_after_conversion_and_back(
+def test_frames_of_built_in_robots_are_equal_after_two_conversions(
     name, ending, tmp_path
 ):
-    """Drives, platform and frames are compared at home and in other postures."""
+    """The comparison includes the home posture and other drive coordinates."""
     there, back = tmp_path / f"robot.{ending}", tmp_path / "back.toml"
     assert convert(name, there).difference < 1e-12
     assert convert(there, back).difference < 1e-12
@@ -115,7 +115,7 @@ def test_frames_of_built_in_robots_are_equal_after_conversion_and_back(
     )
     for joints in (None, drives):
         old, new = place_robot(robot, joints=joints), place_robot(again, joints=joints)
-        # rods may spin about themselves; followed to 1e-10 of the robot's size
+        # the platform is compared because rods can rotate about their own axes
         assert new.platform == pytest.approx(old.platform, abs=1e-9)
     rows = [again.index(frame.name) for frame in robot.frames]
     home = home_posture(again).transforms[rows]
@@ -123,7 +123,7 @@ def test_frames_of_built_in_robots_are_equal_after_conversion_and_back(
 
 
 def weight_on_the_ground(robot):
-    """Return the total weight (6,) [N m, N] at the base origin."""
+    """Return the total weight wrench at the base origin, (6,) [N m, N]."""
     posture = home_posture(robot)
     bodies, carried = weights(posture, [1.0, 2.0, 3.0])
     wrenches = bodies + carried
@@ -132,8 +132,8 @@ def weight_on_the_ground(robot):
 
 
 @pytest.mark.parametrize("ending", ["urdf", "xml"])
-def test_masses_are_equal_after_conversion_and_back(ending, tmp_path):
-    """Beams with a density become masses with the same weight and centre."""
+def test_total_weight_is_equal_after_two_conversions(ending, tmp_path):
+    """The total weight is equal, because beams with a density become masses."""
     there, back = tmp_path / f"robot.{ending}", tmp_path / "back.toml"
     convert("arm6", there)
     convert(there, back)
@@ -144,10 +144,8 @@ def test_masses_are_equal_after_conversion_and_back(ending, tmp_path):
 
 
 @pytest.mark.parametrize("ending", ["urdf", "xml"])
-def test_conversion_includes_declared_errors_of_lengths_in_the_geometry(
-    ending, tmp_path
-):
-    """The loop of a four-bar with a longer crank and rocker must be closed again."""
+def test_converted_geometry_includes_geometric_errors(ending, tmp_path):
+    """The loop of a four-bar linkage closes with a longer crank and rocker."""
     robot = BUILT_IN["four_bar"]()
     source = tmp_path / "robot.toml"
     errors = np.zeros((len(robot.frames), 6))
@@ -169,8 +167,8 @@ def test_conversion_includes_declared_errors_of_lengths_in_the_geometry(
     assert places["end_rocker"] == pytest.approx(places["end_coupler"], abs=1e-9)
 
 
-def test_loops_that_rigid_bodies_cannot_close_are_reported(tmp_path):
-    """The paper's robot is overconstrained: a longer link leaves its loops open."""
+def test_conversion_reports_loops_that_rigid_bodies_cannot_close(tmp_path):
+    """The loops of the overconstrained IRSBot-2 do not close with a longer link."""
     robot = BUILT_IN["irsbot2"]()
     errors = np.zeros((len(robot.frames), 6))
     errors[robot.index("leg1.link_a")] = [1e-3, 0, 0, 1e-3, 0, 0]
@@ -205,7 +203,7 @@ def test_overlay_adds_platform_clearances_and_links_to_a_urdf(tmp_path):
     ("[[link]]\n", 'unknown key "link"'),
     ('platform = "efector"\n', 'did you mean "effector"?'),
 ])  # fmt: skip
-def test_invalid_overlay_is_refused_with_its_message(run, text, message, tmp_path):
+def test_invalid_overlay_is_rejected(run, text, message, tmp_path):
     overlay = tmp_path / "overlay.toml"
     overlay.write_text(text)
     status, out, err = run(
@@ -218,7 +216,7 @@ def test_invalid_overlay_is_refused_with_its_message(run, text, message, tmp_pat
     assert not (tmp_path / "robot.toml").exists()
 
 
-def test_compound_joints_become_single_joints_and_mimic_joints_become_drives(tmp_path):
+def test_ball_and_mimic_joints_become_single_joints_and_drives(tmp_path):
     """A ball joint becomes three revolute joints, and a mimic joint becomes a drive."""
     source = tmp_path / "robot.urdf"
     joint = (
@@ -245,13 +243,13 @@ def test_compound_joints_become_single_joints_and_mimic_joints_become_drives(tmp
         line.startswith("mimic: second = 2 * first + 0.1") for line in answer.left_out
     )
     assert "element gazebo: 1" in answer.left_out
-    # y minus turned is the axis of "first": a quarter turn brings z below x
+    # a rotation by 90 degrees about -y maps z to -x
     place = place_robot(robot, joints={"first": np.pi / 2})
     R = place.transforms[robot.index("e")][:3, :3]
     assert R @ [0, 0, 1] == pytest.approx([-1, 0, 0], abs=1e-12)
 
 
-def test_convert_command_reports_files_and_largest_difference(run, tmp_path):
+def test_convert_command_prints_files_and_largest_difference(run, tmp_path):
     target = tmp_path / "robot.toml"
     status, out, _ = run("convert", "delta", "-o", tmp_path / "d.urdf", "--json", "-")
     table = json.loads(out)
@@ -265,8 +263,8 @@ def test_convert_command_reports_files_and_largest_difference(run, tmp_path):
 
 
 @pytest.mark.parametrize("given", ["rocker", "tip"])
-def test_platform_named_by_an_overlay_is_not_reported_as_missing(given, tmp_path):
-    """One body has its own frame; the other one gets a frame because it is named."""
+def test_platform_of_an_overlay_is_not_reported_as_missing(given, tmp_path):
+    """The platform is the last body in the chain or an intermediate body."""
     text = (
         '<robot name="r"><link name="a"/><link name="rocker"/><link name="tip"/>'
         '<joint name="j" type="revolute"><parent link="a"/><child link="rocker"/>'
@@ -283,7 +281,7 @@ def test_platform_named_by_an_overlay_is_not_reported_as_missing(given, tmp_path
 
 
 def test_platform_with_the_name_of_its_joint_is_found(tmp_path):
-    """In MJCF, both often have the same name; only the body can be the platform."""
+    """In MJCF, a body and its joint often have the same name."""
     source, overlay = tmp_path / "robot.xml", tmp_path / "overlay.toml"
     source.write_text(
         '<mujoco><worldbody><body name="wrist"><joint name="wrist"/>'
@@ -294,8 +292,8 @@ def test_platform_with_the_name_of_its_joint_is_found(tmp_path):
     assert answer.robot.platform == "wrist.link"
 
 
-def test_file_of_more_than_2000_joints_is_refused(tmp_path):
-    """The same limit as for a robot file; a long chain is refused within seconds."""
+def test_file_with_more_than_2000_joints_is_rejected(tmp_path):
+    """The maximum number is the same as for robot files."""
     steps = "".join(
         f'<link name="l{i + 1}"/><joint name="j{i}" type="continuous">'
         f'<parent link="l{i}"/><child link="l{i + 1}"/></joint>'

@@ -1,4 +1,4 @@
-"""Import and export of joint limits; infinite limits are omitted."""
+"""Import and export of joint limits."""
 
 from dataclasses import replace
 
@@ -23,7 +23,7 @@ MJCF = """<mujoco><compiler angle="{unit}"/><worldbody><body name="b">
 
 
 def limits(tmp_path, name, text):
-    """Return the joint limits of the robot imported from a file."""
+    """Return the joint limits of a robot after import from a file."""
     source = tmp_path / name
     source.write_text(text)
     convert(source, tmp_path / "out.toml")
@@ -44,15 +44,13 @@ RANGES = [
 
 
 @pytest.mark.parametrize(("name", "text", "expected"), RANGES)
-def test_ranges_of_urdf_and_mjcf_become_limits_in_radians(
-    tmp_path, name, text, expected
-):
+def test_imported_joint_limits_are_in_radians(tmp_path, name, text, expected):
     found = limits(tmp_path, name, text)
     assert found["slide"] == (-0.1, 0.3)
     assert found["turn"] == (None if expected is None else pytest.approx(expected))
 
 
-def test_infinite_range_of_a_urdf_joint_sets_no_limits(tmp_path):
+def test_infinite_urdf_range_is_imported_without_limits(tmp_path):
     text = URDF.format(turn="", slide='lower="-1e16" upper="inf"')
     assert limits(tmp_path, "arm.urdf", text) == {"turn": None, "slide": None}
 
@@ -68,22 +66,20 @@ SDF = """<sdf version="1.9"><model name="m"><link name="a"/><link name="b">
 
 @pytest.mark.parametrize("kind", ["universal", "revolute2"])
 @pytest.mark.parametrize("held", ["a", "b"])
-def test_sdf_ranges_of_a_universal_joint_become_limits_of_each_turn(
-    tmp_path, kind, held
-):
-    """The coordinates do not depend on the side from which the joint is reached."""
+def test_both_axes_of_an_sdf_universal_joint_have_limits(tmp_path, kind, held):
+    """The limits do not depend on which of the two links is fixed."""
     text = SDF.format(first="world", second=held, kind=kind)
     found = limits(tmp_path, "m.sdf", text)
     assert found == {"cross.first": (-0.3, 0.4), "cross.second": (-0.5, 0.6)}
 
 
-def test_springs_of_a_universal_joint_become_stiffness_about_each_axis(tmp_path):
-    """Each spring acts about the z axis of its frame; all other entries are rigid."""
+def test_both_axes_of_an_sdf_universal_joint_have_stiffness(tmp_path):
+    """The stiffness is infinite in all directions except about the joint axis."""
     text = SDF.format(first="world", second="a", kind="universal")
     for tag, k in (("axis", 5), ("axis2", 7)):
         spring = f"<dynamics><spring_stiffness>{k}</spring_stiffness></dynamics>"
         text = text.replace(f"</{tag}>", f"{spring}</{tag}>")
-    # a slide beyond it is the drive
+    # a prismatic joint is driven, so that the universal joint is passive
     slide = (
         '<link name="c"/><joint name="slide" type="prismatic"><parent>b</parent>'
         "<child>c</child><axis><xyz>1 0 0</xyz></axis></joint></model>"
@@ -99,7 +95,7 @@ def test_springs_of_a_universal_joint_become_stiffness_about_each_axis(tmp_path)
 
 
 @pytest.mark.parametrize("ending", ["urdf", "xml"])
-def test_limits_are_equal_after_conversion_and_back(tmp_path, ending):
+def test_joint_limits_are_equal_after_two_conversions(tmp_path, ending):
     robot = load_robot("orthoglide")
     frames = tuple(
         replace(f, limits=(-0.5, -0.1)) if f.actuated else f for f in robot.frames

@@ -18,7 +18,7 @@ M = '<inertial pos="0.1 0 0.05" mass="1" diaginertia="0.01 0.01 0.01"/>'
 
 
 def file_of(folder, text, name="robot.xml"):
-    """Write an MJCF file, in which ``[M]`` is replaced by a mass."""
+    """Write an MJCF file after replacing ``[M]`` by an ``inertial`` element."""
     path = folder / name
     path.write_text(f"<mujoco>{text.replace('[M]', M)}</mujoco>")
     return path
@@ -126,8 +126,8 @@ KINDS = {
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_every_kind_of_mjcf_equals_mujoco(kind, tmp_path):
-    """Bodies, masses and closure errors are equal in random postures."""
+def test_imported_mjcf_agrees_with_mujoco(kind, tmp_path):
+    """Body poses, masses and loop mismatches are compared in random postures."""
     path = file_of(tmp_path, KINDS[kind])
     answer = compare(read_mjcf(path), path)
     assert answer.why_not == ""
@@ -137,8 +137,8 @@ def test_every_kind_of_mjcf_equals_mujoco(kind, tmp_path):
     assert answer.loops == model.neq
 
 
-def test_comparison_names_the_first_difference_from_mujoco(tmp_path):
-    """A joint, a mass or the place of a loop is changed to provoke a difference."""
+def test_comparison_reports_location_of_largest_difference(tmp_path):
+    """A joint axis, mass, moment of inertia or loop is changed."""
     path = file_of(tmp_path, KINDS["welds"])
     right = read_mjcf(path)
     joint = replace(right.joints[0], axis=np.array([0.0, 1.0, 0.0]))
@@ -157,7 +157,7 @@ def test_comparison_names_the_first_difference_from_mujoco(tmp_path):
         assert answer.where == where
 
 
-def test_attached_mjcf_model_keeps_its_angle_units_and_names(tmp_path):
+def test_attached_mjcf_model_agrees_with_mujoco(tmp_path):
     file_of(tmp_path, """<compiler angle="radian" eulerseq="zyx"/><default>
         <joint axis="1 0 0"/><default class="d"><site pos="1 1 1"/></default></default>
         <worldbody><body name="x" pos="0 0 1" euler="0.5 0 0.1"><geom size="0.1"/>
@@ -181,7 +181,7 @@ def test_attached_mjcf_model_keeps_its_angle_units_and_names(tmp_path):
     assert drives == ["L_k", "R_k"]
 
 
-def test_copies_of_an_attached_model_have_its_loops_and_drives(tmp_path):
+def test_copies_of_attached_mjcf_model_have_loops_and_drives(tmp_path):
     file_of(tmp_path, """<worldbody><body name="x" pos="0 0 1"><geom size="0.1"/>
         <joint name="j"/><body name="y" pos="0 1 0"><geom size="0.1"/><joint name="k"/>
         </body></body></worldbody><equality><connect name="c" body1="y" body2="x"
@@ -200,7 +200,7 @@ def test_copies_of_an_attached_model_have_its_loops_and_drives(tmp_path):
     assert drives == ["p_k-0", "p_k-1"]
 
 
-def test_included_files_are_read_and_missing_or_recursive_files_are_refused(tmp_path):
+def test_mjcf_include_is_read_or_rejected(tmp_path):
     (tmp_path / "parts").mkdir()
     inner = '<mujocoinclude><body name="b" pos="0 1 0"><joint/><geom size="0.1"/>'
     (tmp_path / "parts" / "b.xml").write_text(f"{inner}</body></mujocoinclude>")
@@ -217,10 +217,10 @@ def test_included_files_are_read_and_missing_or_recursive_files_are_refused(tmp_
         read_mjcf(path)
 
 
-def test_free_body_turned_at_home_has_one_degree_of_freedom(run, tmp_path):
-    """A loop turns the body by 90 degrees about y, where serial rotations are singular.
+def test_rotated_free_body_has_one_degree_of_freedom(run, tmp_path):
+    """Serial rotations are singular if a loop rotates the body by 90 degrees about y.
 
-    A slide and a weld leave one degree of freedom without overconstraint.
+    A body that is welded to a prismatic joint has one degree of freedom.
     """
     path = file_of(tmp_path, """<worldbody><body name="p">[M]<freejoint/>
         <site name="s"/></body><body name="l">[M]<joint name="d" type="slide"/>
@@ -240,12 +240,12 @@ def test_unconstrained_free_joint_is_reported(tmp_path):
     text = """<worldbody><body name="p">[M]<freejoint name="f"/><body name="q">[M]
         <joint/></body></body></worldbody>"""
     answer = convert(file_of(tmp_path, text), tmp_path / "robot.toml")
-    assert "free joints that no loop ties to the ground: 1 (f)" in answer.taken
+    assert "free joints without a loop to the ground: 1 (f)" in answer.taken
     assert len([f for f in answer.robot.frames if f.joint != "fixed"]) == 7
 
 
-def test_settotalmass_scales_all_masses(tmp_path):
-    """1 and 3 kg are scaled to 10 kg; not compared, as MuJoCo warns about this key."""
+def test_mjcf_settotalmass_scales_all_masses(tmp_path):
+    """Masses of 1 and 3 kg are scaled to a total of 10 kg."""
     text = """<compiler settotalmass="10"/><worldbody><body name="a">[M]<joint/>
         <body name="b"><inertial pos="0 0 1" mass="3" diaginertia="1 1 1"/><joint/>
         </body></body></worldbody>"""
@@ -254,10 +254,10 @@ def test_settotalmass_scales_all_masses(tmp_path):
     assert [bodies[k].inertia[0, 0] for k in "ab"] == pytest.approx([0.025, 2.5])
 
 
-def test_legs_of_a_free_platform_carry_equal_shares_of_the_load(run, tmp_path):
-    """Three legs inclined by 30 degrees carry 90 N, that is, 30 N / cos 30 deg each.
+def test_forces_in_three_inclined_legs_are_equal(run, tmp_path):
+    """A load of 90 N on three legs at 30 degrees is 30 N / cos 30 deg in each leg.
 
-    Parallel robots are often written as a free body to which the legs are connected.
+    The platform is a free body to which the legs are connected.
     """
     legs, ties, drives = "", "", ""
     for i in range(3):
@@ -265,7 +265,7 @@ def test_legs_of_a_free_platform_carry_equal_shares_of_the_load(run, tmp_path):
         place = f'pos="{c} {s} 0" zaxis="{-c / 2} {-s / 2} {np.sqrt(0.75)}"'
         legs += f"""<body {place}>[M]<joint axis="{-s} {c} 0"/><body name="rod{i}">[M]
             <joint name="s{i}" type="slide"/></body></body>"""
-        # on a circle of 0.5 m about the platform's middle, 1 m along the rod
+        # each rod is connected to the centre of the platform at a distance of 1 m
         ties += f'<connect body1="rod{i}" body2="p" anchor="0 0 1"/>'
         drives += f'<position joint="s{i}"/>'
     path = file_of(tmp_path, f"""<worldbody><body name="p" pos="0 0 0.8660254">[M]
@@ -284,8 +284,8 @@ def test_legs_of_a_free_platform_carry_equal_shares_of_the_load(run, tmp_path):
     assert np.abs(forces) == pytest.approx(3 * [30 / np.cos(np.pi / 6)], rel=1e-6)
 
 
-def test_coupled_joints_follow_polynomials_also_in_chains(tmp_path):
-    """b = 0.1 + 2 (a - rest) + 0.5 (a - rest)^2, c = 3 b, by hand at a = 0.7."""
+def test_coupled_joints_satisfy_their_polynomials_at_home(tmp_path):
+    """At a = 0.7: b = 0.1 + 2 (a - 0.2) + 0.5 (a - 0.2)^2 and c = 0.3 + 3 b."""
     path = file_of(tmp_path, """<compiler angle="radian"/><worldbody><body name="A">[M]
         <joint name="a" ref="0.2"/><body name="B">[M]<joint name="b"/><body name="C">
         [M]<joint name="c" ref="0.3"/></body></body></body></worldbody><equality>
@@ -302,8 +302,8 @@ def test_coupled_joints_follow_polynomials_also_in_chains(tmp_path):
     assert lines[0].startswith("mimic: b = 0.1 + 2 * x^1 + 0.5 * x^2, x = a - 0.2 be")
 
 
-def test_driven_joint_of_a_coupled_pair_becomes_the_leader(tmp_path):
-    """The driven joint is commanded, and the second joint follows."""
+def test_driven_joint_of_a_coupled_pair_is_the_leader(tmp_path):
+    """The MJCF constraint is inverted, because its follower is driven."""
     path = file_of(tmp_path, """<compiler angle="radian"/><worldbody><body name="A">[M]
         <joint name="a"/><body name="B">[M]<joint name="b"/></body></body></worldbody>
         <equality><joint joint1="b" joint2="a" polycoef="0.1 2 0 0 0"/></equality>

@@ -23,7 +23,7 @@ J = np.array([[0.02, 0.001, -0.002], [0.001, 0.03, 0.003], [-0.002, 0.003, 0.04]
 
 
 def turned(roll, pitch, yaw):
-    """Turns about fixed x, then y, then z."""
+    """Return the rotation about fixed x, then y, then z, (3, 3)."""
     x, y, z = np.eye(3)
     return (
         rotation_matrix(yaw * z)
@@ -38,8 +38,8 @@ def file_of(folder, text, name):
     return path
 
 
-def test_urdf_moments_are_in_the_axes_of_the_origin(tmp_path):
-    """The link's frame is that of the joint, whose z is its axis."""
+def test_urdf_inertia_is_in_axes_of_its_origin_element(tmp_path):
+    """The inertia matrix in link axes is R J R^T."""
     R = turned(0.3, -0.4, 1.2)
     path = file_of(tmp_path, URDF, "r.urdf")
     np.testing.assert_allclose(read_urdf(path).bodies["b"].inertia, R @ J @ R.T)
@@ -50,7 +50,7 @@ def test_urdf_moments_are_in_the_axes_of_the_origin(tmp_path):
     np.testing.assert_allclose(frame.inertia, R @ J @ R.T, atol=1e-16)
 
 
-def test_sdf_moments_are_in_the_axes_of_the_pose_and_default_to_the_unit(tmp_path):
+def test_sdf_inertia_is_in_axes_of_its_pose_element(tmp_path):
     inertia = "".join(
         f"<{key}>{value}</{key}>"
         for key, value in (("ixx", 0.02), ("iyy", 0.03), ("izz", 0.04),
@@ -74,7 +74,7 @@ def test_sdf_moments_are_in_the_axes_of_the_pose_and_default_to_the_unit(tmp_pat
     assert "no moments of inertia: 1 kg m^2, the format's default: 1 (c)" in taken
 
 
-SHAPES = {  # principal moments of 1 kg, textbooks
+SHAPES = {  # textbook formulas of principal moments for a mass of 1 kg
     "<box><size>0.3 0.2 0.1</size></box>": np.array([0.05, 0.1, 0.13]) / 12,
     "<sphere><radius>0.1</radius></sphere>": np.full(3, 0.4 * 0.01),
     "<cylinder><radius>0.1</radius><length>0.3</length></cylinder>":
@@ -87,8 +87,8 @@ SHAPES = {  # principal moments of 1 kg, textbooks
 
 
 @pytest.mark.parametrize("shape", SHAPES)
-def test_automatic_moments_of_inertia_of_a_shape_equal_the_textbook(shape, tmp_path):
-    """Of 5 kg, turned by a quarter about x: y and z are exchanged."""
+def test_sdf_automatic_inertia_of_a_shape_equals_textbook_formula(shape, tmp_path):
+    """The mass is 5 kg, and a rotation by 90 degrees about x exchanges y and z."""
     pose = f"<pose>0.2 0 0 {np.pi / 2} 0 0</pose>"
     text = f"""<sdf version="1.12"><model name="m"><link name="a"><inertial auto="true">
         <mass>5</mass></inertial><collision name="c">{pose}
@@ -103,7 +103,7 @@ def test_automatic_moments_of_inertia_of_a_shape_equal_the_textbook(shape, tmp_p
 def test_impossible_moments_of_inertia_are_omitted_and_reported(tmp_path):
     text = URDF.replace('izz="0.04"', 'izz="0.4"')
     answer = convert(file_of(tmp_path, text, "r.urdf"), tmp_path / "r.toml")
-    assert "moments of inertia that no body has: 1 (b)" in answer.left_out
+    assert "physically impossible moments of inertia: 1 (b)" in answer.left_out
     frame = read_robot(tmp_path / "r.toml").frame("b")
     assert (frame.mass, frame.inertia.any()) == (2.0, False)
 
@@ -125,8 +125,8 @@ stiffness="5000"/><geom type="capsule" fromto="0 0 0 0.2 0.1 0" size="0.03"/>
 </mujoco>"""
 
 
-def test_frequencies_of_an_imported_chain_equal_those_of_mujocos_mass_matrix(tmp_path):
-    """MuJoCo's joint-space inertia at rest, with the springs of the joints."""
+def test_frequencies_of_imported_chain_agree_with_mujoco_mass_matrix(tmp_path):
+    """The frequencies follow from MuJoCo's mass matrix and the joint springs."""
     mujoco = pytest.importorskip("mujoco", reason="MuJoCo is not installed")
     path = file_of(tmp_path, SPRINGS, "r.xml")
     model = mujoco.MjModel.from_xml_path(str(path))
@@ -135,7 +135,7 @@ def test_frequencies_of_an_imported_chain_equal_those_of_mujocos_mass_matrix(tmp
     M = np.zeros((model.nv, model.nv))
     for row, unit in zip(M, np.eye(model.nv), strict=True):
         mujoco.mj_mulM(model, data, row, unit)
-    K = np.diag(model.jnt_stiffness[1:])  # the drive holds its joint
+    K = np.diag(model.jnt_stiffness[1:])  # without the first joint, which is driven
     squares = np.linalg.eigvals(np.linalg.solve(M[1:, 1:], K))
     expected = np.sort(np.sqrt(squares)) / (2 * np.pi)
     found = natural_modes(home_posture(load_robot(path))).frequencies
@@ -143,8 +143,8 @@ def test_frequencies_of_an_imported_chain_equal_those_of_mujocos_mass_matrix(tmp
 
 
 @pytest.mark.parametrize("ending", ["xml", "urdf"])
-def test_written_moments_of_inertia_are_read_back(ending, tmp_path):
-    """Fixed frames of a moving one form one link, by the parallel axis theorem."""
+def test_frequencies_are_equal_after_export_and_import(ending, tmp_path):
+    """The natural frequencies of the arm are equal before and after the export."""
     robot, rng = load_robot("arm6"), np.random.default_rng(5)
     frames = []
     for f in robot.frames:

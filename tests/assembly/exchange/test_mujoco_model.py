@@ -12,7 +12,7 @@ from tests.assembly.exchange.test_mjcf import KINDS, file_of
 
 mujoco = pytest.importorskip("mujoco", reason="MuJoCo is not installed")
 
-# a crank of 0.1 m, a coupler of 0.3 m and a rocker of 0.3 m on a base of 0.3 m
+# link lengths: crank 0.1 m; coupler, rocker and base 0.3 m
 FOUR_BAR = """<compiler angle="radian"/><default><geom type="capsule" size="0.01"/>
     </default><worldbody>
     <body name="crank" euler="0 0 0.9"><joint name="drive" range="-3 3"/>
@@ -27,8 +27,8 @@ FOUR_BAR = """<compiler angle="radian"/><default><geom type="capsule" size="0.01
 
 
 @pytest.mark.parametrize("kind", sorted(KINDS))
-def test_motions_of_a_compiled_mujoco_model_equal_those_in_mujoco(kind, tmp_path):
-    """The poses and masses of MuJoCo's own reading of the original file."""
+def test_robot_from_compiled_mujoco_model_agrees_with_mujoco(kind, tmp_path):
+    """The model is converted to a file, and the robot is compared with the model."""
     path = file_of(tmp_path, KINDS[kind])
     model = mujoco.MjModel.from_xml_path(str(path))
     (tmp_path / "made.xml").write_text(mjcf_of_model(model))
@@ -38,8 +38,8 @@ def test_motions_of_a_compiled_mujoco_model_equal_those_in_mujoco(kind, tmp_path
     assert answer.bodies == model.nbody - 1
 
 
-def test_mujoco_model_of_a_written_robot_has_the_same_platform(tmp_path):
-    """A written MJCF names the platform in a custom text."""
+def test_mujoco_model_of_exported_robot_has_same_platform(tmp_path):
+    """The platform is stored in a custom text of the MJCF file."""
     path = tmp_path / "delta.xml"
     ff.write_robot(ff.load_robot("delta"), path)
     robot = ff.load_robot(mujoco.MjModel.from_xml_path(str(path)))
@@ -52,7 +52,7 @@ def test_mujoco_model_of_a_written_robot_has_the_same_platform(tmp_path):
 
 
 @pytest.mark.parametrize("kind", ["MjModel", "MjSpec"])
-def test_robot_from_a_mujoco_model_equals_the_robot_from_its_file(kind, tmp_path):
+def test_robot_from_mujoco_model_equals_robot_from_file(kind, tmp_path):
     path = file_of(tmp_path, FOUR_BAR, "four_bar.xml")
     model = getattr(mujoco, kind)
     model = model.from_xml_path(str(path)) if kind == "MjModel" else model.from_file(
@@ -70,13 +70,13 @@ def test_robot_from_a_mujoco_model_equals_the_robot_from_its_file(kind, tmp_path
         np.testing.assert_allclose(own.translation, other.translation, atol=1e-12)
     by_model, by_file = (ff.place_robot(one) for one in (robot, read))
     np.testing.assert_allclose(by_model.transforms, by_file.transforms, atol=1e-9)
-    # the pin is 0.3 m from the pivot and from the elbow
+    # the rocker, from the pivot at x = 0.3 m to the pin, has a length of 0.3 m
     pin = by_model.transforms[robot.index(robot.closures[0][0]), :3, 3]
     assert np.hypot(pin[0] - 0.3, pin[1]) == pytest.approx(0.3)
 
 
-def test_mujoco_model_changed_in_memory_is_read_with_its_changes(tmp_path):
-    """The length of the crank is doubled in memory only."""
+def test_changes_of_a_mujoco_model_are_imported(tmp_path):
+    """The length of the crank is doubled in the model."""
     model = mujoco.MjModel.from_xml_string(f"<mujoco>{FOUR_BAR}</mujoco>")
     model.body_pos[mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, "coupler")] *= 2
     posture = ff.place_robot(ff.load_robot(model))
@@ -84,20 +84,20 @@ def test_mujoco_model_changed_in_memory_is_read_with_its_changes(tmp_path):
     assert np.linalg.norm(elbow) == pytest.approx(0.2)
 
 
-def test_object_that_is_not_a_mujoco_model_is_refused():
+def test_load_robot_rejects_an_object_of_another_type():
     with pytest.raises(
         BadInput, match=r"load_robot: found 3\.0 .* an MjModel, MjSpec or pinocchio"
     ):
         ff.load_robot(3.0)
 
 
-def test_flexible_bodies_are_refused():
+def test_mujoco_model_with_flexible_body_is_rejected():
     spec = mujoco.MjSpec.from_string(
         """<mujoco><worldbody><flexcomp name="f" dim="1"
         type="grid" count="3 1 1" spacing="0.1 0.1 0.1"/></worldbody></mujoco>"""
     )
     with (
-        pytest.warns(UserWarning, match="flex"),  # MuJoCo's own
+        pytest.warns(UserWarning, match="flex"),  # warning from MuJoCo
         pytest.raises(BadInput, match="found a flex .flexible body., expected rigid"),
     ):
         ff.load_robot(spec)

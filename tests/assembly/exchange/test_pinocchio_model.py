@@ -19,7 +19,7 @@ def place(rng):
 
 
 def every_kind():
-    """Return a tree with all types of single-degree-of-freedom joints and masses."""
+    """Return a tree with revolute and prismatic joints of various types."""
     rng, model = np.random.default_rng(4), pinocchio.Model()
     model.name, axis = "tree", np.array([0.6, 0.0, 0.8])
     kinds = (
@@ -50,7 +50,7 @@ def read(model, folder):
 @pytest.mark.parametrize(
     "make", [every_kind, lambda: pinocchio.buildSampleModelManipulator()]
 )
-def test_poses_of_bodies_equal_those_of_pinocchio(make, tmp_path):
+def test_body_poses_agree_with_pinocchio(make, tmp_path):
     model, rng = make(), np.random.default_rng(1)
     mechanism, data = read(model, tmp_path), model.createData()
     row = {joint.name: k for k, joint in enumerate(mechanism.joints)}
@@ -70,7 +70,7 @@ def test_poses_of_bodies_equal_those_of_pinocchio(make, tmp_path):
             )
 
 
-def test_masses_and_joint_limits_equal_those_of_the_pinocchio_model(tmp_path):
+def test_masses_and_joint_limits_agree_with_pinocchio(tmp_path):
     mechanism = read(every_kind(), tmp_path)
     model = every_kind()
     for number in range(6):
@@ -80,15 +80,18 @@ def test_masses_and_joint_limits_equal_those_of_the_pinocchio_model(tmp_path):
         np.testing.assert_allclose(body.inertia, own.inertia, atol=1e-12)
     limits = {joint.name: joint.limits for joint in mechanism.joints}
     assert limits["j0"] == (-1.5, 1.5)
-    assert limits["j4"] is None  # turns without bounds
+    assert limits["j4"] is None  # an unlimited revolute joint
 
 
-def test_arm_from_a_pinocchio_model_equals_the_arm_from_its_urdf(tmp_path):
+def test_robot_from_pinocchio_model_equals_robot_from_urdf(tmp_path):
     ff.write_robot(ff.load_robot("arm6"), tmp_path / "arm6.urdf")
     by_file = ff.load_robot(tmp_path / "arm6.urdf")
     model = pinocchio.buildModelFromUrdf(str(tmp_path / "arm6.urdf"))
     robot = ff.load_robot(model)
-    assert "Model: taken: every joint of one freedom as a drive" in robot.remarks
+    assert (
+        "Model: taken: every joint with one degree of freedom as a drive"
+        in robot.remarks
+    )
     joints = {f.name: 0.2 for f in by_file.frames if f.actuated}
     assert sorted(joints) == sorted(f.name for f in robot.frames if f.actuated)
     np.testing.assert_allclose(
@@ -97,7 +100,7 @@ def test_arm_from_a_pinocchio_model_equals_the_arm_from_its_urdf(tmp_path):
     )  # fmt: skip
 
 
-def test_message_about_a_joint_with_several_degrees_of_freedom_names_the_joint():
+def test_pinocchio_model_with_planar_joint_is_rejected():
     model = pinocchio.Model()
     planar = pinocchio.JointModelPlanar()
     model.addJoint(0, planar, pinocchio.SE3.Identity(), "slab")

@@ -1,4 +1,4 @@
-"""Messages for invalid files of other programs."""
+"""Error messages for invalid files from other programs."""
 
 import pytest
 
@@ -10,7 +10,7 @@ from tests.assembly.exchange.test_urdf import joint as urdf_joint
 
 
 def urdf(kind="revolute", child="b", more="", links=""):
-    """A URDF of two links and a joint, or one with something wrong."""
+    """Return a URDF with two links and a joint, which may be invalid."""
     return (
         f'<robot name="r"><link name="a"/><link name="b"/>{links}<joint name="j" '
         f'type="{kind}"><parent link="a"/><child link="{child}"/>{more}</joint></robot>'
@@ -18,19 +18,19 @@ def urdf(kind="revolute", child="b", more="", links=""):
 
 
 def urdf_with(text):
-    """A URDF of links a, b and c, and a joint of a and b."""
+    """Return a URDF with the links a, b and c and a joint between a and b."""
     links = "".join(f'<link name="{name}"/>' for name in "abc")
     return f'<robot name="r">{links}{urdf_joint("j", "a", "b", Z)}{text}</robot>'
 
 
 def mjcf(text):
-    """An MJCF, ``[M]`` in it being a mass."""
+    """Return an MJCF file, with ``[M]`` replaced by an ``inertial`` element."""
     mass = '<inertial pos="0.1 0 0.05" mass="1" diaginertia="0.01 0.01 0.01"/>'
     return f"<mujoco>{text.replace('[M]', mass)}</mujoco>"
 
 
 def sdf(text):
-    """An SDF of an arm whose base is fixed, and more."""
+    """Return an SDF file with a fixed base and additional elements."""
     return f'<sdf version="1.9"><model name="m">{ARM}{text}</model></sdf>'
 
 
@@ -97,15 +97,15 @@ REFUSED = {
         "not valid XML: no element found"),
     ("urdf", "an entity"): (
         '<!DOCTYPE r [<!ENTITY x SYSTEM "file:///etc/passwd">]><robot>&x;</robot>',
-        "not valid XML: found a document type or an entity, expected neither: they "
-        "could load other files; remove them"),
+        "not valid XML: found a document type or an entity, which could load other "
+        "files; expected neither; remove them"),
     ("urdf", "elements in elements"): (f"<robot>{'<a>' * 300}{'</a>' * 300}</robot>",
         "found elements nested more than 200 deep"),
     ("urdf", "a macro"): (urdf_with('<xacro:macro name="m"/>' + K),
-        'xacro:macro "m": found a macro, expected the URDF without macros'),
+        'xacro:macro "m": found a macro, expected a URDF without macros'),
     ("urdf", "a constraint in gazebo"): (urdf_with(f"{K}<gazebo>{TIE}</gazebo>"),
-        'constraint: found an element between "a" and "c" that may connect '
-        "them and is not converted; expected joints: declare a joint or a loop"),
+        'constraint: found an element that may connect "a" and "c" and cannot be '
+        "converted, expected a joint or a loop; declare a joint or a loop"),
     ("urdf", "a gearbox in gazebo"): (
         urdf_with(K + '<gazebo><joint name="l" type="gearbox"><parent>a</parent>'
                   "<child>c</child></joint></gazebo>"),
@@ -199,8 +199,8 @@ REFUSED = {
         'joint "j".child: found "base", which is also its parent; expected a '
         "different link"),
     ("sdf", "a bushing"): (sdf(A + BUSHING.format("base", "a")),
-        'drake:linear_bushing_rpy: found an element between "base" and "a" that may '
-        "connect them and is not converted; expected joints: declare a joint"),
+        'drake:linear_bushing_rpy: found an element that may connect "base" and "a" '
+        "and cannot be converted, expected a joint or a loop; declare a joint"),
     ("sdf", "a mesh without a mass"): (
         sdf(A.replace("/>", '><inertial auto="true"/><collision name="c"><geometry>'
                       "<mesh/></geometry></collision></link>", 1)),
@@ -211,10 +211,8 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("case", REFUSED, ids=": ".join)
-def test_invalid_file_of_another_program_is_refused_with_one_message(
-    case, run, tmp_path
-):
-    """A table of loops is read together with a valid URDF."""
+def test_invalid_urdf_mjcf_sdf_and_yaml_files_are_rejected(case, run, tmp_path):
+    """An invalid loops file is read together with a valid URDF."""
     ending, (text, message) = case[0], REFUSED[case]
     source = tmp_path / ("robot.urdf" if ending == "yaml" else f"robot.{ending}")
     source.write_text(urdf())

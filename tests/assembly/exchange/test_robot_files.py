@@ -1,4 +1,4 @@
-"""Use of files of other programs in place of robot files."""
+"""Use of files from other programs instead of robot files."""
 
 import json
 
@@ -12,7 +12,7 @@ from tests.assembly.exchange.test_sdf import four_bar, pin
 from tests.examples_for_tests import example
 
 
-def test_writing_an_unsupported_file_ending_is_refused(tmp_path):
+def test_write_robot_rejects_an_unsupported_suffix(tmp_path):
     for name in ("arm.sdf", "arm.txt", "arm"):
         with pytest.raises(BadInput, match=r"expected \.toml or \.urdf or \.xml"):
             ff.write_robot(BUILT_IN["arm6"](), tmp_path / name)
@@ -22,8 +22,8 @@ def test_writing_an_unsupported_file_ending_is_refused(tmp_path):
 @pytest.mark.parametrize(
     ("name", "text"), [("arm.urdf", "<robot/>"), ("arm.toml", "# mine\nname = 'arm'\n")]
 )
-def test_write_robot_refuses_to_overwrite_an_existing_user_file(tmp_path, name, text):
-    """The file may contain comments, which a robot cannot store."""
+def test_write_robot_does_not_overwrite_a_user_file(tmp_path, name, text):
+    """A file that the user wrote may contain comments."""
     (tmp_path / name).write_text(text)
     with pytest.raises(BadInput, match="not overwritten"):
         ff.write_robot(BUILT_IN["arm6"](), tmp_path / name)
@@ -31,10 +31,8 @@ def test_write_robot_refuses_to_overwrite_an_existing_user_file(tmp_path, name, 
     assert (tmp_path / name).read_text() == text
 
 
-def test_command_with_a_urdf_has_the_same_result_as_with_the_converted_file(
-    run, tmp_path
-):
-    """Mobility and zone margin are equal."""
+def test_results_of_urdf_and_converted_robot_file_are_equal(run, tmp_path):
+    """The mobility and the zone margin are equal."""
     source = example("5bar_linkage")
     ff.convert(source, tmp_path / "robot.toml")
     answers = []
@@ -46,7 +44,7 @@ def test_command_with_a_urdf_has_the_same_result_as_with_the_converted_file(
     assert answers[0]["zone"] == answers[1]["zone"]
 
 
-def test_command_with_an_sdf_reports_its_assumptions(run, tmp_path):
+def test_command_reports_assumptions_about_an_sdf_file(run, tmp_path):
     path = tmp_path / "bar.sdf"
     path.write_text(four_bar())
     status, out, _ = run("assembly", "solve", path)
@@ -57,11 +55,11 @@ def test_command_with_an_sdf_reports_its_assumptions(run, tmp_path):
     assert len(robot.closures) == 1
 
 
-def test_xml_with_an_unknown_ending_is_refused_with_the_valid_endings(run, tmp_path):
+def test_xml_file_with_unknown_suffix_is_rejected(run, tmp_path):
     path = tmp_path / "bar.mjcf"
     path.write_text("\ufeff\n<mujoco><worldbody/></mujoco>", encoding="utf-8")
     status, out, err = run("assembly", "solve", path)
     assert (status, out) == (2, "")
     assert (
-        "bar.mjcf: found XML, expected a robot file, or the ending .urdf, .xml" in err
+        "bar.mjcf: found XML, expected a robot file, or the suffix .urdf, .xml" in err
     )

@@ -1,4 +1,4 @@
-"""Import of SDF: a four-bar linkage compared with the law of cosines, and screws."""
+"""Import of SDF files with a four-bar linkage or a screw joint."""
 
 import numpy as np
 import pytest
@@ -8,12 +8,15 @@ from forcefit.assembly.files.robot_file import read_robot
 from forcefit.assembly.kinematics.posture import place_robot
 from forcefit.inputs.table import BadInput
 
-# crank 0.1, coupler 0.3, rocker 0.25, ground 0.3 [m]; at home the crank lies along x
+# link lengths of the four-bar linkage [m]; the crank is parallel to x at home
 GROUND, CRANK, COUPLER, ROCKER = 0.3, 0.1, 0.3, 0.25
 
 
 def pin(crank_angle):
-    """Where coupler and rocker meet above the ground link, by the law of cosines."""
+    """Return the position of the joint between coupler and rocker.
+
+    It follows from the law of cosines.
+    """
     a = CRANK * np.array([np.cos(crank_angle), np.sin(crank_angle)])
     b = np.array([GROUND, 0.0])
     between = np.linalg.norm(b - a)
@@ -24,7 +27,10 @@ def pin(crank_angle):
 
 
 def four_bar(extra=""):
-    """Text of the SDF; its rocker's joint is written from the rocker to the world."""
+    """Return the SDF text of a four-bar linkage.
+
+    The parent of the joint between rocker and world is the rocker.
+    """
     x, y = pin(0.0)
     tilt = np.arctan2(y, x - CRANK)
     return f"""<sdf version="1.9"><model name="four_bar">
@@ -47,7 +53,7 @@ def four_bar(extra=""):
 
 
 def converted(tmp_path, text):
-    """The robot of an SDF whose crank is driven."""
+    """Return the conversion of an SDF text and the robot, whose crank is driven."""
     source = tmp_path / "robot.sdf"
     source.write_text(text)
     loops = tmp_path / "loops.yaml"
@@ -56,7 +62,7 @@ def converted(tmp_path, text):
     return answer, read_robot(tmp_path / "robot.toml")
 
 
-def test_sdf_four_bar_equals_the_law_of_cosines(tmp_path):
+def test_sdf_four_bar_linkage_agrees_with_law_of_cosines(tmp_path):
     answer, robot = converted(tmp_path, four_bar())
     assert answer.open_before < 1e-12
     assert len(robot.closures) == 1
@@ -71,7 +77,7 @@ def test_sdf_four_bar_equals_the_law_of_cosines(tmp_path):
 
 
 def spindle(pitch, backwards=False, kind="screw", nut="", slide=""):
-    """Text of the SDF of a spindle that turns in a nut, which a slide guides."""
+    """Return the SDF text of a spindle with a nut, which a prismatic joint guides."""
     ends = ("nut", "spindle") if backwards else ("spindle", "nut")
     return f"""<sdf version="1.10"><model name="press">
 <link name="spindle"/>
@@ -86,7 +92,7 @@ def spindle(pitch, backwards=False, kind="screw", nut="", slide=""):
 
 
 def press(tmp_path, text):
-    """The robot of a press whose spindle is driven, and what was left out."""
+    """Return the conversion of an SDF text and the robot, whose spindle is driven."""
     source = tmp_path / "press.sdf"
     source.write_text(text)
     loops = tmp_path / "loops.yaml"
@@ -101,7 +107,7 @@ RIGHT = "<screw_thread_pitch>0.01</screw_thread_pitch>"  # [m per turn]
 @pytest.mark.parametrize(("pitch", "expected"), [
     (RIGHT, 0.01),
     ("<screw_thread_pitch>-0.01</screw_thread_pitch>", -0.01),
-    # [rad/m], positive for a left-hand thread
+    # this pitch is in rad/m and positive for a left-hand thread
     (f"<thread_pitch>{-2 * np.pi / 0.01}</thread_pitch>", 0.01),
     (f"<thread_pitch>5</thread_pitch>{RIGHT}", 0.01),
 ])  # fmt: skip
@@ -109,9 +115,9 @@ RIGHT = "<screw_thread_pitch>0.01</screw_thread_pitch>"  # [m per turn]
 def test_right_hand_thread_of_an_sdf_file_lowers_the_nut(
     tmp_path, pitch, expected, backwards
 ):
-    """A nut that does not turn sinks by the pitch when its spindle turns by +360 deg.
+    """A rotation of the spindle by +360 degrees lowers the nut by the pitch.
 
-    The order of parent and child does not change the hand of a thread.
+    The order of parent and child does not change the direction.
     """
     _, robot = press(tmp_path, spindle(pitch, backwards))
     for angle in (0.3, -2.0):
@@ -122,8 +128,8 @@ def test_right_hand_thread_of_an_sdf_file_lowers_the_nut(
         assert T[:3, :3] == pytest.approx(np.eye(3), abs=1e-12)
 
 
-def test_home_of_a_screw_that_follows_its_slide_is_solved(tmp_path):
-    """Slide s = 0.02 m + 1 m/rad drive, and s = -lead drive: one angle fulfils both."""
+def test_home_pose_satisfies_screw_and_mimic_equations(tmp_path):
+    """The drive angle q satisfies s = 0.02 m + 1 m/rad q and s = -lead q."""
     rule = (
         '<mimic joint="drive"><multiplier>1</multiplier><offset>0.02</offset></mimic>'
     )
@@ -133,14 +139,14 @@ def test_home_of_a_screw_that_follows_its_slide_is_solved(tmp_path):
     assert found == pytest.approx(-0.02 / (1 + lead), abs=1e-9)
 
 
-def test_range_and_spring_of_a_screw_joint_are_reported_as_omitted(tmp_path):
+def test_import_reports_omitted_range_and_spring_of_a_screw_joint(tmp_path):
     nut = "<limit><lower>-1</lower><upper>1</upper></limit>"
     nut += "<dynamics><spring_stiffness>3</spring_stiffness></dynamics>"
     answer, robot = press(tmp_path, spindle(RIGHT, nut=nut))
     assert robot.frame("thread").limits is None
     left_out = " ".join(answer.left_out)
     assert (
-        "joint axis limit of a screw, whose unit the format does not state" in left_out
+        "joint axis limit of a screw, whose unit the format does not define" in left_out
     )
     assert "joint axis dynamics, not converted, though it may carry load" in left_out
 
@@ -150,7 +156,7 @@ def test_range_and_spring_of_a_screw_joint_are_reported_as_omitted(tmp_path):
     ("<thread_pitch>0</thread_pitch>", "found 0, expected a thread of 1e-09 to 1 m"),
     ("<screw_thread_pitch>2</screw_thread_pitch>", "found 2, expected a thread"),
 ])  # fmt: skip
-def test_screw_of_an_sdf_without_a_pitch_is_refused(tmp_path, pitch, message):
+def test_sdf_screw_joint_with_invalid_pitch_is_rejected(tmp_path, pitch, message):
     with pytest.raises(BadInput, match=message):
         press(tmp_path, spindle(pitch))
     assert not (tmp_path / "press.toml").exists()

@@ -1,4 +1,4 @@
-"""SDF frames, nested models, old versions and default masses."""
+"""Frames, nested models, old versions and default masses in SDF files."""
 
 import numpy as np
 import pytest
@@ -24,7 +24,7 @@ def joint(name, parent, child, inside="", kind="revolute"):
 
 
 def axis_in_world(mechanism, name):
-    """Direction of a joint with all coordinates at home."""
+    """Return the direction of a joint axis in world axes in the home pose."""
     one = next(joint for joint in mechanism.joints if joint.name == name)
     poses = body_poses(mechanism, mechanism.home)
     return (poses[one.parent] @ one.placement)[:3, :3] @ one.axis
@@ -37,7 +37,7 @@ Z_UP = "<axis><xyz>0 0 1</xyz>{}</axis>"
 @pytest.mark.parametrize(
     ("version", "inside", "expected"),
     [
-        # a quarter turn about y takes the joint's z to x
+        # the link is rotated by 90 degrees about y, which maps z to x
         ("1.4", Z_UP.format(""), [0, 0, 1]),
         ("1.4", Z_UP.format(
             "<use_parent_model_frame>0</use_parent_model_frame>"), [1, 0, 0]),
@@ -46,12 +46,12 @@ Z_UP = "<axis><xyz>0 0 1</xyz>{}</axis>"
             "<use_parent_model_frame>true</use_parent_model_frame>"), [0, 0, 1]),
         ("1.9", '<axis><xyz expressed_in="__model__">0 0 1</xyz></axis>', [0, 0, 1]),
         ("1.9", '<axis><xyz expressed_in="">0 0 1</xyz></axis>', [1, 0, 0]),
-        # the version numbers 1.10 and 1.12 are later than 1.4, although 1.10 < 1.4
+        # versions 1.10 and 1.12 are later than 1.4
         ("1.10", Z_UP.format(""), [1, 0, 0]),
         ("1.12", Z_UP.format(""), [1, 0, 0]),
     ],
 )  # fmt: skip
-def test_sdf_version_decides_the_frame_of_a_joint_axis(
+def test_frame_of_a_joint_axis_depends_on_sdf_version(
     version, inside, expected, tmp_path
 ):
     text = ARM + TILTED + joint("turn", "base", "arm", inside)
@@ -59,9 +59,12 @@ def test_sdf_version_decides_the_frame_of_a_joint_axis(
     assert found == pytest.approx(expected, abs=1e-15)
 
 
-def test_poses_are_resolved_through_nested_models_and_frames(tmp_path):
-    """A model at (1, 2, 3) turned by 90 degrees about z; inside it, 1 m on, another
-    whose frame "grip" is placed, half a metre above its own origin."""
+def test_poses_in_nested_sdf_models_equal_hand_calculation(tmp_path):
+    """The outer model is at (1, 2, 3), rotated by 90 degrees about z.
+
+    The nested model is placed by its frame "grip", which is 0.5 m above its origin, at
+    a frame 1 m from the origin of the outer model.
+    """
     text = """<pose degrees="true">1 2 3 0 0 90</pose>
         <frame name="shelf"><pose>1 0 0 0 0 0</pose></frame><link name="base"/>
         <model name="hand" placement_frame="grip"><pose relative_to="shelf"/>
@@ -74,19 +77,21 @@ def test_poses_are_resolved_through_nested_models_and_frames(tmp_path):
     mechanism = model(tmp_path, text)
     poses = body_poses(mechanism, mechanism.home)
     assert poses["base"][:3, 3] == pytest.approx([1, 2, 3])
-    # grip stands on the shelf, at (1, 2, 3) + turned (1, 0, 0)
+    # "grip" coincides with "shelf" at (1, 2, 3) + (0, 1, 0)
     assert poses["hand::tip"][:3, 3] == pytest.approx([1, 3, 3])
     assert poses["hand::palm"][:3, 3] == pytest.approx([1, 3.2, 2.5])
     assert axis_in_world(mechanism, "hand::finger") == pytest.approx([0, 1, 0])
     wrist = next(one for one in mechanism.joints if one.name == "wrist")
-    # the shelf is of base; grip of the hand's first link
+    # "shelf" is attached to "base", "grip" to the first link of the hand
     assert (wrist.parent, wrist.child) == ("base", "hand::palm")
     assert mechanism.root == WORLD
 
 
-def test_included_model_is_read_by_its_own_sdf_version(tmp_path):
-    """A hand of version 1.4, whose axis is given in the hand, turned by 90 degrees
-    about x; the same robot written out, in which the axis says so itself."""
+def test_included_model_is_read_according_to_its_sdf_version(tmp_path):
+    """In version 1.4 of the included model, the joint axis is in the model frame.
+
+    The included model is rotated by 90 degrees about x.
+    """
     hand = (
         f"""<link name="palm"/>{TILTED}{joint("j", "palm", "arm", Z_UP.format(""))}"""
     )
@@ -105,7 +110,7 @@ def test_included_model_is_read_by_its_own_sdf_version(tmp_path):
     assert poses["grip::arm"][:3, 3] == pytest.approx([0.3, 0, 1])
 
 
-def test_model_pose_is_resolved_in_a_frame_of_the_world(tmp_path):
+def test_model_pose_relative_to_a_world_frame_is_correct(tmp_path):
     path = tmp_path / "robot.sdf"
     path.write_text(
         f"""<sdf version="1.9"><world name="w"><frame name="table">
@@ -120,7 +125,7 @@ def test_model_pose_is_resolved_in_a_frame_of_the_world(tmp_path):
     assert poses["arm"][:3, 3] == pytest.approx([1, 0, 0.7])
 
 
-def test_static_models_of_a_world_are_reported_as_omitted(tmp_path):
+def test_import_reports_omitted_static_models(tmp_path):
     path = tmp_path / "robot.sdf"
     ground = '<model name="ground"><static>true</static><link name="plane"/></model>'
     arm = joint("j", "base", "arm")
@@ -133,7 +138,7 @@ def test_static_models_of_a_world_are_reported_as_omitted(tmp_path):
     assert "model of the world: 1 (ground)" in mechanism.left_out
 
 
-def test_joint_that_has_the_name_of_a_link_is_renamed(tmp_path):
+def test_joint_with_the_name_of_a_link_is_renamed(tmp_path):
     mechanism = model(
         tmp_path, joint("arm", "base", "arm") + ARM + '<link name="arm"/>'
     )
@@ -150,8 +155,8 @@ SHAPES = {
 
 
 @pytest.mark.parametrize("shape", SHAPES)
-def test_automatic_inertia_equals_volume_times_density(shape, tmp_path):
-    """A steel shape, alone and with a sphere of 1000 kg/m^3 (weighted mean)."""
+def test_sdf_automatic_mass_equals_volume_times_density(shape, tmp_path):
+    """The link consists of a steel shape, or of this shape and a lighter sphere."""
     collision = """<collision name="c"><pose>0.2 0 0 0 0 0</pose>{}<geometry>{}
         </geometry></collision>"""
     steel = collision.format("<density>7850</density>", shape)
@@ -169,8 +174,8 @@ def test_automatic_inertia_equals_volume_times_density(shape, tmp_path):
     assert bodies["two"].centre[0] == pytest.approx(0.2 * mass / (mass + ball))
 
 
-def test_missing_masses_have_the_default_value_of_the_format(tmp_path):
-    """The default is 1 kg; a mass with auto is kept, with the centre of the shapes."""
+def test_sdf_links_without_mass_have_default_mass(tmp_path):
+    """The default mass is 1 kg; with ``auto``, an explicit mass is preserved."""
     text = (
         ARM
         + """<link name="a"><inertial><pose>0 0 1 0 0 0</pose></inertial></link>
@@ -186,8 +191,8 @@ def test_missing_masses_have_the_default_value_of_the_format(tmp_path):
     assert any("no inertial: 1 kg" in line for line in mechanism.taken)
 
 
-def test_mimic_of_the_second_axis_of_a_universal_joint_follows_it(tmp_path):
-    """k = 2 (j - 0.1) + 0.5; the second axis of a universal joint leads, at zero."""
+def test_sdf_mimic_joint_follows_second_axis_of_universal_joint(tmp_path):
+    """The coordinate is k = 2 (j - 0.1) + 0.5 = 0.3, where j = 0 is the second axis."""
     mimic = """<mimic joint="{}" axis="{}"><multiplier>2</multiplier><offset>0.5
         </offset><reference>0.1</reference></mimic>"""
     text = ARM + '<link name="a"/><link name="b"/><link name="c"/>'

@@ -1,4 +1,4 @@
-"""Import of joint springs, whose deflection under a load is known."""
+"""Import of joint springs."""
 
 import json
 
@@ -26,8 +26,8 @@ CASES = {
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_converted_spring_deflects_by_load_over_stiffness(name, run, tmp_path):
-    """10 N along x over 2000 N/m, or 10 N m about z over 2000 N m/rad."""
+def test_deflection_of_imported_spring_is_load_over_stiffness(name, run, tmp_path):
+    """The deflection is 10 N / 2000 N/m or 10 N m / 2000 N m/rad."""
     text, component = CASES[name]
     (tmp_path / name).write_text(text)
     loops = tmp_path / "loops.yaml"
@@ -51,7 +51,7 @@ def test_converted_spring_deflects_by_load_over_stiffness(name, run, tmp_path):
     (MJCF.format('axis="1 0 0"').replace('name="drive"', 'name="drive" stiffness="5"'),
      "springs parallel to drives: 1 (drive)"),
 ])  # fmt: skip
-def test_spring_that_is_not_converted_is_reported(text, line, tmp_path):
+def test_import_reports_springs_that_are_not_converted(text, line, tmp_path):
     path = tmp_path / "robot.xml"
     path.write_text(text)
     assert line in convert(path, tmp_path / "robot.toml").left_out

@@ -1,4 +1,4 @@
-"""Import of URDF: XML variants, loops in the file and mimic joints."""
+"""Import of URDF files with XML variants, loops and mimic joints."""
 
 import json
 
@@ -20,7 +20,7 @@ def joint(name, parent, child, inside="", kind="continuous", tag="joint"):
 
 
 def file_of(folder, text, links="", attributes=""):
-    """A URDF of links named by single letters."""
+    """Write a URDF with links that are named by single letters."""
     path = folder / "robot.urdf"
     given = "".join(f'<link name="{name}"/>' for name in links)
     path.write_text(f'<robot name="r" {attributes}>{given}{text}</robot>')
@@ -49,21 +49,21 @@ def test_urdf_variants_that_other_readers_accept_are_read(
     ("declared", "encoding"),
     [("UTF-16", "utf-16"), ("ISO-8859-1", "latin-1"), ("windows-1252", "cp1252")],
 )
-def test_urdf_is_read_in_the_encoding_that_it_declares(declared, encoding, tmp_path):
+def test_urdf_is_read_in_its_declared_encoding(declared, encoding, tmp_path):
     path = file_of(tmp_path, joint("Gelenk_für_a", "a", "b", Z), "ab")
     text = f"<?xml version='1.0' encoding='{declared}'?>\r\n{path.read_text()}"
     path.write_bytes(text.encode(encoding))
     assert [one.name for one in read_urdf(path).joints] == ["Gelenk_für_a"]
 
 
-def test_urdf_with_bytes_of_another_encoding_is_refused(tmp_path):
+def test_urdf_with_undeclared_encoding_is_rejected(tmp_path):
     path = file_of(tmp_path, joint("Gelenk_für_a", "a", "b", Z), "ab")
     path.write_bytes(path.read_text().encode("latin-1"))
     with pytest.raises(BadInput, match="is not UTF-8; expected a text file in UTF-8"):
         read_urdf(path)
 
 
-def test_range_whose_lower_end_exceeds_the_upper_is_listed_as_omitted(tmp_path):
+def test_import_reports_joint_range_with_reversed_limits(tmp_path):
     limit = '<limit lower="1" upper="-1"/>'
     path = file_of(tmp_path, joint("j", "a", "b", Z + limit, "revolute"), "ab")
     mechanism = read_urdf(path)
@@ -73,7 +73,7 @@ def test_range_whose_lower_end_exceeds_the_upper_is_listed_as_omitted(tmp_path):
 
 @pytest.mark.parametrize("name", ["base", "base.joint", "b", "world"])
 def test_joint_named_base_is_renamed(name, tmp_path):
-    """The frame has the name of the joint, except "base", which is the fixed frame."""
+    """The name "base" is reserved for the fixed frame."""
     text = joint("base", "a", "b", '<origin xyz="0 0 0.1"/>' + Z)
     text += joint("base.joint", "b", "c", '<origin xyz="0 0 0.2"/>' + Z)
     text = text.replace('name="base.joint"', f'name="{name}.x"')
@@ -89,7 +89,7 @@ def test_joint_named_base_is_renamed(name, tmp_path):
 
 
 def four_bar(closing, folder):
-    """Parallelogram of cranks of 0.2 m, 0.4 m apart, its coupler closed by a joint."""
+    """Write a parallelogram with cranks of 0.2 m and a coupler of 0.4 m."""
     text = joint("p", "a", "b", Z) + joint("r", "a", "d", f'<origin xyz="0.4 0 0"/>{Z}')
     text += joint("q", "b", "c", f'<origin xyz="0 0.2 0"/>{Z}')
     return file_of(folder, text + closing, "abcd")
@@ -97,7 +97,8 @@ def four_bar(closing, folder):
 
 LINKS = '<link1 link="c" xyz="0.4 0 0"/><link2 link="d" xyz="0 0.2 0" rpy="0 0 0"/>'
 CLOSING = {
-    # redundant constraints by Gruebler's count: 1 - (18 - 3 x 5) + what it takes
+    # the last number of each entry is that of redundant constraints by Gruebler's
+    # formula: 1 - (18 - 3 * 5) + number of constraints of the joint
     "spherical": (f'<loop_joint name="l" type="spherical">{LINKS}</loop_joint>', 1),
     "ball": (f'<drake:loop_joint name="l" type="ball">{LINKS}</drake:loop_joint>', 1),
     "continuous": (
@@ -117,13 +118,13 @@ CLOSING = {
 
 
 @pytest.mark.parametrize("kind", CLOSING)
-def test_loop_in_the_urdf_leaves_one_degree_of_freedom(kind, run, tmp_path):
-    """Each kind of loop leaves one freedom, and the coupler only translates."""
+def test_parallelogram_with_a_urdf_loop_has_one_degree_of_freedom(kind, run, tmp_path):
+    """The coupler of the parallelogram translates without rotation."""
     closing, redundant = CLOSING[kind]
     path = four_bar(closing, tmp_path)
     (tmp_path / "robot.yaml").write_text("closed_loop: []\nname_mot: [p]\n")
     answer = convert(path, tmp_path / "out.toml")
-    assert answer.robot.platform == "c"  # no part of the closing joint
+    assert answer.robot.platform == "c"  # not a body of the closing joint
     assert answer.open_before < 1e-12
     status, _, _ = run("assembly", "solve", tmp_path / "out.toml",
                        "--json", tmp_path / "o.json")  # fmt: skip
@@ -141,8 +142,8 @@ def test_loop_in_the_urdf_leaves_one_degree_of_freedom(kind, run, tmp_path):
     ("", [1, 0, 0]),
     ("<use_parent_model_frame>1</use_parent_model_frame>", [0, 0, 1]),
 ])  # fmt: skip
-def test_gazebo_joint_axis_is_given_in_the_child_or_the_model(flag, expected, tmp_path):
-    """The child is turned by 90 degrees about y, which takes its z to x."""
+def test_gazebo_joint_axis_is_in_child_or_model_frame(flag, expected, tmp_path):
+    """The child is rotated by 90 degrees about y, which maps its z axis to x."""
     turned = f'<origin xyz="0 0 1" rpy="0 {np.pi / 2} 0"/>'
     text = joint("j", "a", "b", turned + Z) + joint("k", "a", "c", Z)
     text += f"""<gazebo><joint name="l" type="revolute"><parent>c</parent>
@@ -155,8 +156,8 @@ def test_gazebo_joint_axis_is_given_in_the_child_or_the_model(flag, expected, tm
     assert mechanism.loops[0].second == "b"
 
 
-def test_drake_joints_become_single_joints_with_their_axes(tmp_path):
-    """A universal turns about x, then y; a planar slides in x and y."""
+def test_axes_of_drake_joints_are_correct(tmp_path):
+    """The axes of a universal joint are x and y; a planar joint moves along x and y."""
     text = joint("u", "a", "b", "", "universal", "drake:joint")
     text += joint("s", "b", "c", "", "planar", "d:joint")
     text += joint("w", "c", "d", "", "ball", "drake:joint")
@@ -167,8 +168,8 @@ def test_drake_joints_become_single_joints_with_their_axes(tmp_path):
                     "w.rx": x, "w.ry": y, "w.rz": z}  # fmt: skip
 
 
-def test_quaternion_origin_is_read_in_xyzw_order(tmp_path):
-    """90 degrees about z, in URDF 1.2's order x y z w."""
+def test_urdf_quaternion_has_order_xyzw(tmp_path):
+    """The rotation is 90 degrees about z."""
     h = np.sqrt(0.5)
     text = joint("j", "a", "b", f'<origin xyz="1 0 0" quat_xyzw="0 0 {h} {h}"/>')
     mechanism = read_urdf(file_of(tmp_path, text, "ab"))
@@ -181,8 +182,8 @@ def follower(name, parent, child, leader, factor, offset):
     return joint(name, parent, child, inside)
 
 
-def test_chained_mimic_joints_follow_their_leaders_at_home(tmp_path):
-    """z = 2 y + 0.1, y = x + 0.5, written before their leaders; x = 0.3 at home."""
+def test_chained_mimic_joints_satisfy_their_equations_at_home(tmp_path):
+    """The couplings are z = 2 y + 0.1 and y = x + 0.5, with x = 0.3 at home."""
     text = follower("z", "c", "d", "y", 2, 0.1) + follower("y", "b", "c", "x", 1, 0.5)
     path = file_of(tmp_path, text + joint("x", "a", "b", Z), "abcd")
     (tmp_path / "robot.yaml").write_text("closed_loop: []\nhome: {x: 0.3}\n")
@@ -197,11 +198,10 @@ def test_chained_mimic_joints_follow_their_leaders_at_home(tmp_path):
         convert(path, tmp_path / "out.toml")
 
 
-def test_mimic_joints_follow_during_the_search_for_a_home_pose(tmp_path):
-    """A crank and a follower of minus its angle: their tips meet where x is equal.
+def test_computed_home_pose_satisfies_mimic_equation(tmp_path):
+    """A crank at angle q and a follower at angle pi - q, both 1 m long, are 1 m apart.
 
-    Crank 1 m about (0, 0), follower 1 m about (1, 0) at -q + offset; with offset pi
-    the tips (cos q, sin q) and (1 - cos q, sin q) meet at q = 60 degrees.
+    Their tips (cos q, sin q) and (1 - cos q, sin q) coincide at q = 60 degrees.
     """
     text = joint("x", "a", "b", Z) + follower("y", "a", "c", "x", -1, np.pi)
     text = text.replace('<child link="c"/>', '<child link="c"/><origin xyz="1 0 0"/>')
@@ -223,7 +223,7 @@ def test_mimic_joints_follow_during_the_search_for_a_home_pose(tmp_path):
 
 
 @pytest.mark.parametrize("axes", ["XY", "YX", "YZ", "ZY", "ZX", "XZ"])
-def test_universal_joint_of_any_axis_order_becomes_two_turns(axes, tmp_path):
+def test_universal_joint_becomes_two_revolute_joints(axes, tmp_path):
     path = file_of(tmp_path, joint("j", "a", "b", Z), "ab")
     (tmp_path / "robot.yaml").write_text(
         f"closed_loop: []\njoint_name: [j]\njoint_type: [UJOINT_{axes}]\n"
@@ -232,7 +232,7 @@ def test_universal_joint_of_any_axis_order_becomes_two_turns(axes, tmp_path):
     robot = read_robot(tmp_path / "out.toml")
     turns = [frame.name for frame in robot.frames if frame.joint == "revolute"]
     assert turns == [f"j.r{axis.lower()}" for axis in axes]
-    # the second axis is carried by the first
+    # the first rotation moves the axis of the second
     turned = place_robot(robot, joints={turns[0]: 0.5, turns[1]: 0.8})
     first, second = (np.eye(3)["XYZ".index(axis)] for axis in axes)
     expected = rotation_matrix(0.5 * first) @ rotation_matrix(0.8 * second)
@@ -240,7 +240,7 @@ def test_universal_joint_of_any_axis_order_becomes_two_turns(axes, tmp_path):
     assert found == pytest.approx(expected, abs=1e-12)
 
 
-def test_plugins_and_springs_of_gazebo_are_reported(tmp_path):
+def test_import_reports_gazebo_plugins_and_springs(tmp_path):
     text = joint("j", "a", "b", Z) + joint("k", "b", "c", Z)
     text += """<gazebo><plugin name="p"><joint>j</joint><mimicJoint>k</mimicJoint>
         </plugin><plugin name="q"><joint>j</joint></plugin></gazebo>
