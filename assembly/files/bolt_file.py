@@ -27,8 +27,9 @@ def read_locked_at(
         clearance: clearance specified in the table.
 
     Returns:
-        Without ``locked_at``, the clearance and None.  Otherwise None, because a bolted
-        joint has no clearance, and the pose together with the clearance before bolting.
+        The clearance and None if the table does not contain ``locked_at``.  Otherwise
+        None, because a bolted joint has no clearance, and the pose together with the
+        clearance before bolting.
 
     Raises:
         BadInput: the joint is not fixed or has no clearance, or the pose is invalid.
@@ -55,7 +56,7 @@ def read_locked_at(
 
 
 def _numbers(table: Table, key: str, names: tuple[str, ...] | None) -> dict[str, float]:
-    """Return the coordinates in an inner table by name; empty if it is absent."""
+    """Return the coordinates in an inner table, or an empty dictionary."""
     if not table.has(key):
         return {}
     inner = table.table(key)
@@ -72,11 +73,11 @@ def bolt_without_units(table: Table, kinds: Mapping[str, str]) -> None:
     """Convert texts such as ``"30 deg"`` in ``locked_at`` to numbers in m or rad.
 
     Args:
-        table: table of a drawn joint, which is modified in place.
+        table: table of a joint in a file of format 2, which is modified in place.
         kinds: type of each joint, by name.
 
     Raises:
-        BadInput: a text is not a number with a unit that suits its coordinate.
+        BadInput: a text is not a number with a unit of length or angle as required.
     """
     if not isinstance(table.content.get("locked_at"), dict):
         return
@@ -90,7 +91,7 @@ def bolt_without_units(table: Table, kinds: Mapping[str, str]) -> None:
 
 
 def _slides(kinds: Mapping[str, str], name: str) -> bool:
-    """Return whether a joint coordinate is a length."""
+    """Return whether the coordinate of a joint is a length."""
     return kinds.get(name) == "prismatic"
 
 
@@ -101,7 +102,7 @@ def bolt_table(bolt: LockedAt) -> Any:
         bolt: pose at which the joint is bolted, and its clearance before bolting.
 
     Returns:
-        Plain values in the file format.
+        Table or text in the file format.
     """
     given = {"pose": bolt.pose, "joints": bolt.joints}
     table: dict[str, Any] = {k: dict(v) for k, v in given.items() if v}

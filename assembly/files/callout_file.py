@@ -1,6 +1,6 @@
-"""Reading of ``[[tolerance]]`` tables, the feature tolerances in robot files.
+"""Reading of ``[[tolerance]]`` tables, which define tolerance callouts in robot files.
 
-Features are frames in a file with frames, and joints of a body in a file with bodies.
+A feature is a frame in a file of format 1, and a joint of a body in a file of format 2.
 See ``docs/drawing_tolerances.md``.
 """
 
@@ -42,16 +42,16 @@ from forcefit.inputs.table import BadInput, Table, describe, nearest, quoted
 
 _ZONES = (*LOCATIONS, *ORIENTATIONS, "length", "general")
 _LARGEST_CP = 5.0
-# largest cosine of the angle between directions that count as perpendicular
+# largest accepted cosine of the angle between perpendicular directions
 _ACROSS = 1e-3
 _NOT_ACROSS = "found a direction that is not perpendicular to the axis, expected 90 deg"
-# number of lengths in "extent", by shape of the feature
+# number of lengths in the key ``extent``, by shape of the feature
 _SIZES = {"axis": 1, "plane": 2, "point": 0}
 _EXTENTS = {
     "axis": 'the length of the bore, such as "20 mm"',
     "plane": 'two sizes of the face, such as ["40 mm", "30 mm"], or "diameter"',
 }
-# tolerance keys that are not allowed for features of each shape
+# keys that are not permitted, by shape of the feature
 _EXCLUDED = {
     "axis": ("profile",),
     "plane": ("coaxiality",),
@@ -67,7 +67,7 @@ def read_frame_callouts(root: Table, frames: list[str]) -> tuple[Callout, ...]:
         frames: names of the frames.
 
     Returns:
-        Callouts in file order, which have not been checked against the geometry.
+        Callouts in the order of the file.  They are not checked against the geometry.
 
     Raises:
         BadInput: the file violates a rule of the format.
@@ -96,7 +96,7 @@ def read_frame_callouts(root: Table, frames: list[str]) -> tuple[Callout, ...]:
 def read_drawn_callouts(
     copied: Copy, bodies: list[DrawnBody], joints: list[DrawnJoint]
 ) -> Iterator[DrawnCallout]:
-    """Yield the callouts of the bodies in a copy of a leg, and those of the base.
+    """Yield the callouts of the bodies in a copy of a leg, or outside legs.
 
     Args:
         copied: copy of a leg, or the bodies outside legs.
@@ -104,7 +104,7 @@ def read_drawn_callouts(
         joints: all joints of the robot.
 
     Yields:
-        Callouts whose features and datums are joints; directions are in base axes at
+        Callouts whose features and datums are joints.  Directions are in base axes in
         the home pose.
 
     Raises:
@@ -124,7 +124,7 @@ def read_drawn_callouts(
 def _drawn(
     table: Table, copied: Copy, body: str, joints: list[DrawnJoint]
 ) -> DrawnCallout | None:
-    """Return the callouts of a body feature, or None if it has only form tolerances."""
+    """Read the callout of a body feature, or None for a form tolerance alone."""
     here = {j.name: j for j in joints if body in (j.first, j.second)}
     short = body.removeprefix(copied.prefix)
 
@@ -143,7 +143,7 @@ def _drawn(
     form = read_form(table, shape)
     if form and not any(table.has(word) for word in _ZONES):
         for key in [k for k in table.content if k not in ("feature", "name", *FORMS)]:
-            fault = "found this key for a feature with only a form tolerance"
+            fault = "found this key for a feature that has only a form tolerance"
             raise table.bad(key, f"{fault}, expected none")
         return None
     datums = joint_datums(table, feature.name, find)
@@ -163,8 +163,8 @@ def _check_direction(
 ) -> None:
     """Check that a direction is perpendicular to the axis of a bore."""
     if feature.kind == "planar":
-        fault = "found a direction for a face; its sides are along the joint's x and y"
-        raise table.bad("direction", f"{fault}; expected none")
+        fault = "found a direction for a face, whose sides are parallel to x and y"
+        raise table.bad("direction", f"{fault} of the joint; expected none")
     second = feature.kind == "universal" and body == feature.second
     axis = feature.axis2 if second else feature.axis
     if abs(float(np.dot(direction, axis))) > _ACROSS:
@@ -175,7 +175,7 @@ def _callout(
     table: Table, name: str, feature: str, datums: tuple[Datum, ...], shape: str,
     after: bool, axis: Vector | None,
 ) -> Callout:  # fmt: skip
-    """Read the keys of a callout that are common to both file formats."""
+    """Read the keys of a callout that both file formats have in common."""
     if len({replace(d, hole="", hole_of="", extent=0.0) for d in datums}) < len(datums):
         names = [datum.frame for datum in datums]
         raise table.bad("datums", f"found {names}, expected each datum once")
@@ -212,7 +212,7 @@ def _callout(
 
 
 def _widths(table: Table, shape: str) -> tuple[dict[str, float], str]:
-    """Return the zone widths and the size of the hole at maximum material."""
+    """Return the zone widths and the size of a hole with maximum material condition."""
     widths: dict[str, float] = {}
     used = False
     hole = table.text("hole", "") if table.has("hole") else ""
@@ -238,7 +238,7 @@ def _widths(table: Table, shape: str) -> tuple[dict[str, float], str]:
 
 
 def _check_widths(table: Table, widths: dict[str, float]) -> None:
-    """Check that orientation zones are smaller than the location zone."""
+    """Check that orientation zones are narrower than the location zone."""
     located = [widths[w] for w in LOCATIONS if w in widths]
     for word in ORIENTATIONS:
         if word in widths and located and not widths[word] < min(located):
@@ -248,7 +248,7 @@ def _check_widths(table: Table, widths: dict[str, float]) -> None:
 
 
 def _check_form(table: Table, form: float, widths: Mapping[str, float]) -> None:
-    """Check that the form zone is the smallest zone of the feature."""
+    """Check that the form zone is narrower than all other zones of the feature."""
     least = min(widths.values(), default=1.0)
     if form and not form < least:
         word = next(word for word in FORMS if table.has(word))
@@ -258,7 +258,7 @@ def _check_form(table: Table, form: float, widths: Mapping[str, float]) -> None:
 
 
 def _extent(table: Table, shape: str, widths: dict[str, float]) -> tuple[float, ...]:
-    """Return the length [m] of a bore, or the side lengths [m] of a face."""
+    """Return the length of a bore or the side lengths of a face [m]."""
     if table.has("diameter"):
         return _diameter(table, shape)
     count = _SIZES[shape]
@@ -279,7 +279,7 @@ def _extent(table: Table, shape: str, widths: dict[str, float]) -> tuple[float, 
 
 
 def _diameter(table: Table, shape: str) -> tuple[float, ...]:
-    """Return the diameter [m] of a round face."""
+    """Return the diameter of a round face [m]."""
     if shape != "plane":
         article = "an" if shape == "axis" else "a"
         fault = f"found for a feature that is {article} {shape}, expected none"
@@ -298,7 +298,7 @@ def _diameter(table: Table, shape: str) -> tuple[float, ...]:
 
 
 def _across(table: Table, axis: Vector | None) -> Vector | None:
-    """Return the direction in which the zones are measured, or None."""
+    """Return the direction in which the zone widths are measured, or None."""
     direction = read_direction(table, "direction")
     if direction is not None and axis is not None:
         if abs(float(np.dot(direction, axis))) > _ACROSS:

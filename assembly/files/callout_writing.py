@@ -1,4 +1,4 @@
-"""Writing of callouts as ``[[tolerance]]`` tables in files with frames."""
+"""Writing of callouts as ``[[tolerance]]`` tables in files of format 1."""
 
 from typing import Any
 
@@ -7,7 +7,7 @@ from forcefit.assembly.files.datum_file import ORIGIN, Z_AXIS
 
 
 def callout_table(callout: Callout) -> dict[str, Any]:
-    """Return the content of a ``[[tolerance]]`` table, omitting default values."""
+    """Return the content of a ``[[tolerance]]`` table without default values."""
     table: dict[str, Any] = {"feature": callout.feature}
     if callout.name != callout.feature:
         table["name"] = callout.name

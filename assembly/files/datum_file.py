@@ -16,7 +16,7 @@ Parsed = TypeVar("Parsed")
 Vector = tuple[float, float, float]
 Z_AXIS = (0.0, 0.0, 1.0)
 ORIGIN = (0.0, 0.0, 0.0)
-# joint types whose feature on a body is a single hole
+# joint types whose feature on a body is one hole
 _HOLES = ("revolute", "cylindrical")
 
 
@@ -24,7 +24,7 @@ def frame_datums(table: Table, frames: list[str]) -> tuple[Datum, ...]:
     """Return the datums of a feature in a file with frames.
 
     Raises:
-        BadInput: the table violates a rule of the format.
+        BadInput: a datum is invalid.
     """
     datums = tuple(_datum(table, value, frames) for value in _datum_list(table))
     for number, datum in enumerate(datums):
@@ -44,15 +44,15 @@ def joint_datums(
     Args:
         table: table with the tolerances of the feature.
         feature: full name of the joint that is the feature.
-        find: function that returns the joint for a name in the file; its second
-            argument is the key that contains the name.
+        find: function that returns the joint for a name in the file.  Its second
+            argument is the key that contains the name, for error messages.
 
     Returns:
-        Datums, identified by their joints.  The text ``"B (M)"`` denotes datum B at
-        maximum material.
+        Datums, which are joints.  The text ``"B (M)"`` denotes datum B with maximum
+        material condition.
 
     Raises:
-        BadInput: the table violates a rule of the format.
+        BadInput: a datum is invalid.
     """
     datums = []
     hole, extent = table.text("datum_hole", ""), 0.0
@@ -75,7 +75,7 @@ def joint_datums(
             _check_shifting(table, value, joint.kind, hole)
             if number == 0 and not extent:
                 fault = f"found {quoted(value)} as datum A, which can tilt in the hole"
-                expected = 'expected "datum_extent" too, the length of this hole'
+                expected = 'expected also "datum_extent", the length of this hole'
                 raise table.bad("datums", f"{fault}; {expected}")
         datums.append(
             Datum(
@@ -95,20 +95,20 @@ def joint_datums(
 
 
 def _check_shifting(table: Table, value: str, kind: str, hole: str) -> None:
-    """Check that a datum with (M) is a hole with a given size."""
+    """Check that a datum with maximum material condition is a hole with a size."""
     if kind not in _HOLES:
         fault = f"found {quoted(value)}, a {kind} joint"
         expected = f"expected (M) at a {' or '.join(_HOLES)} joint"
         raise table.bad("datums", f"{fault}; {expected}")
     if not hole:
-        expected = 'expected "datum_hole" too, such as datum_hole = "12 H7"'
+        expected = 'expected also "datum_hole", such as datum_hole = "12 H7"'
         raise table.bad(
             "datums", f"found {quoted(value)} without a hole size, {expected}"
         )
 
 
 def _datum_list(table: Table) -> list:
-    """Return the list of one to three datums in the file."""
+    """Return the list of one to three datums in a table."""
     value = table.require("datums", "names of features, A first")
     if not isinstance(value, list) or not 1 <= len(value) <= 3:
         fault = f"found {describe(value)}, expected a list of one to three names"
@@ -117,7 +117,7 @@ def _datum_list(table: Table) -> list:
 
 
 def _datum(table: Table, value: Any, frames: list[str]) -> Datum:
-    """Read a datum, which is given by a frame name or by a table."""
+    """Read a datum, which is specified by a frame name or a table."""
     if isinstance(value, dict):
         inner = Table(value, table.file, f"{table.place}.datums")
         name = inner.text("frame", expected="the name of a frame")
@@ -137,7 +137,7 @@ def _datum(table: Table, value: Any, frames: list[str]) -> Datum:
 
 
 def _extent(table: Table, key: str) -> float:
-    """Return the length [m] of a datum hole."""
+    """Return the length of a datum hole [m]."""
     length, at_most = parsed_value(table, key, parse_width)
     if at_most:
         raise table.bad(key, "found (M), expected a length without (M)")
@@ -145,7 +145,7 @@ def _extent(table: Table, key: str) -> float:
 
 
 def _hole_of_datum(table: Table, name: str, shape: str) -> tuple[str, str]:
-    """Return the size and the name of a datum hole at maximum material."""
+    """Return the size and name of a datum hole with maximum material condition."""
     if not table.has("hole"):
         return "", ""
     if shape != "axis":
@@ -156,21 +156,21 @@ def _hole_of_datum(table: Table, name: str, shape: str) -> tuple[str, str]:
 
 
 def check_frame(table: Table, key: str, name: str, frames: list[str]) -> None:
-    """Check that a name is the name of a frame."""
+    """Check that a frame with a given name exists."""
     if name not in frames:
         fault = f"found {quoted(name)}, expected the name of a frame"
         raise table.bad(key, fault + nearest(name, frames))
 
 
 def read_point(table: Table) -> Vector:
-    """Return the centre of a feature [m], in the axes of its frame."""
+    """Return the centre of a feature in the axes of its frame, (3,) [m]."""
     default = np.zeros(3)
     x, y, z = table.array("at", (3,), "m", default, largest=LARGEST_LENGTH).tolist()
     return x, y, z
 
 
 def read_direction(table: Table, key: str) -> Vector | None:
-    """Return a unit vector; None if the key is absent."""
+    """Return a unit vector, or None if the key is absent."""
     if not table.has(key):
         return None
     vector = table.array(key, (3,), "direction", largest=LARGEST_LENGTH)
@@ -182,7 +182,7 @@ def read_direction(table: Table, key: str) -> Vector | None:
 
 
 def parsed_value(table: Table, key: str, parse: Callable[[Any], Parsed]) -> Parsed:
-    """Parse the value of a key with a function that rejects invalid values."""
+    """Parse the value of a key by a function that raises an error if it is invalid."""
     try:
         return parse(table.content[key])
     except BadInput as error:

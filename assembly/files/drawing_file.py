@@ -36,7 +36,7 @@ MOST_COPIES = 200  # maximum number of copies of a leg
 
 
 def is_drawing(root: Table) -> bool:
-    """Return whether a robot file consists of bodies and joints."""
+    """Return whether a robot file has format 2 (bodies and joints)."""
     given = set(root.content)
     named = {"body", "joint", "leg"} & given and "frame" not in given
     return root.content.get("format") == 2 or bool(named)
@@ -46,18 +46,17 @@ def read_drawing(root: Table, name: str, description: str) -> Drawing:
     """Read the bodies and joints of a robot file.
 
     Args:
-        root: root table of the file; keys that do not describe bodies and joints are
-            read by the caller.
+        root: root table of the file.  Only the keys of bodies and joints are read.
         name: name of the robot.
         description: description of the robot.
 
     Returns:
-        Drawing with all copies of the legs and full names.
+        Bodies and joints, with full names and all copies of the legs.
 
     Raises:
         BadInput: the file violates a rule of the format.
     """
-    # copied, because texts with units are replaced by numbers
+    # texts with units are replaced by numbers in a copy
     root.content = copy.deepcopy(root.content)
     if root.get("format", 2) == 1:
         raise root.bad("format", "found 1 in a file with bodies and joints, expected 2")
@@ -101,7 +100,7 @@ def read_drawing(root: Table, name: str, description: str) -> Drawing:
 
 
 def _check_lists(table: Table, valid: tuple[str, ...]) -> None:
-    """Raise BadInput for a misspelt list of tables, before its bodies are missed."""
+    """Check that the names of all lists of tables are valid."""
     for key, value in table.content.items():
         listed = isinstance(value, list) and value and isinstance(value[0], dict)
         if listed and key not in valid:
@@ -109,7 +108,7 @@ def _check_lists(table: Table, valid: tuple[str, ...]) -> None:
 
 
 def _copies(root: Table) -> Iterator[Copy]:
-    """Yield all copies of the legs, and the bodies outside legs, in file order."""
+    """Yield the copies of the legs and the bodies outside legs, in file order."""
     order = [key for key in root.content if key in {"leg", "body", "joint"}]
     own = Copy(root, "", np.eye(4))
     legs = root.tables("leg")
@@ -131,7 +130,7 @@ def _copies(root: Table) -> Iterator[Copy]:
 
 
 def _repeated(leg: Table, name: str) -> Iterator[Copy]:
-    """Yield the copies of a leg, the first of which is the leg as written."""
+    """Yield the copies of a leg, which are rotated about an axis."""
     if not leg.has("repeat"):
         yield Copy(leg, f"{name}.", np.eye(4))
         return
@@ -157,7 +156,7 @@ def _joints(
     copied: Copy, names: list[str], forms: dict[str, tuple[str, float]],
     kinds: dict[str, str],
 ) -> Iterator[DrawnJoint]:  # fmt: skip
-    """Yield the joints of a copy, which may also connect to bodies outside the copy."""
+    """Yield the joints of a copy of a leg, or the joints outside legs."""
 
     def find(name: str) -> str | None:
         inner = copied.prefix + name
@@ -179,7 +178,7 @@ def _joints(
 def _between(
     table: Table, find: Callable[[str], str | None], names: list[str]
 ) -> list[str]:
-    """Return the full names of the bodies connected by a joint."""
+    """Return the full names of the two bodies that a joint connects."""
     value = table.require("between", 'two names of bodies, or "base"')
     proper = isinstance(value, list) and all(isinstance(v, str) for v in value)
     if not proper or len(value) != 2:
@@ -207,7 +206,11 @@ def _form_remarks(forms: dict[str, tuple[str, float]]) -> tuple[str, ...]:
         f"{quoted(joint)} by {added * 1e6:.4g} um ({word})"
         for joint, (word, added) in forms.items()
     ]
-    return (f"clearance widened by form: {'; '.join(texts)}",) if texts else ()
+    return (
+        (f"clearances increased by form tolerances: {'; '.join(texts)}",)
+        if texts
+        else ()
+    )
 
 
 def _check_distinct(root: Table, kind: str, names: list[str]) -> None:

@@ -24,17 +24,17 @@ from forcefit.assembly.model.inertia import six_moments
 from forcefit.assembly.model.robot import Robot
 from forcefit.inputs.table import BadInput
 
-# components smaller than this fraction of a point or direction are written as 0
+# components below this fraction of the largest component are written as 0
 _ROUNDING = 1e-15
-_AT_ZERO = 1e-12  # [rad or m] smaller joint coordinates count as 0 and are omitted
+_AT_ZERO = 1e-12  # [rad or m] smaller joint coordinates are omitted
 
 
 def drawing_text(robot: Robot, drawing: Drawing, folder: Path) -> str:
     """Return the text of a robot file with bodies and joints.
 
     Args:
-        robot: robot whose effects, reference point and diagnosis are also written.
-        drawing: drawing of the robot.
+        robot: robot whose effects, reference point and diagnosis are written.
+        drawing: bodies and joints of the robot.
         folder: folder of the output file, to which paths are made relative.
 
     Returns:
@@ -58,7 +58,7 @@ def drawing_text(robot: Robot, drawing: Drawing, folder: Path) -> str:
 
 
 def _point(values: NDArray) -> list[float]:
-    """Return the coordinates of a point, with rounding errors replaced by 0."""
+    """Return the components of a vector, with rounding errors replaced by 0."""
     least = _ROUNDING * max(1.0, float(np.abs(values).max()))
     return [float(v) if abs(v) > least else 0.0 for v in values]
 
@@ -75,7 +75,7 @@ def _body_table(body: DrawnBody, folder: Path) -> dict[str, Any]:
     if body.link is not None and body.ends is not None:
         link = link_table(body.link, folder)
         beam = link["link"].get("beam", {})
-        # the default theory is omitted
+        # the default beam theory is omitted
         if beam.get("theory") == "timoshenko":
             del beam["theory"]
         for key in ("axis", "up"):
@@ -111,7 +111,7 @@ def _joint_table(joint: DrawnJoint) -> dict[str, Any]:
 
 
 def _drive_stiffness(joint: DrawnJoint) -> float | None:
-    """Return the stiffness of a drive if it is the only spring in its joint."""
+    """Return the drive stiffness if all other directions are rigid, or None."""
     K = joint.numbers[0].stiffness
     if K is None or not joint.actuated:
         return None
@@ -122,13 +122,13 @@ def _drive_stiffness(joint: DrawnJoint) -> float | None:
 
 
 def _none(key: str) -> Any:
-    """Return the value of a key that denotes no clearance, stiffness or error."""
+    """Return the value of a key for a bearing without clearance, spring or error."""
     free = [np.inf, np.inf, 0.0, np.inf, np.inf, np.inf]
     return {"clearance": {}, "joint_stiffness": free}.get(key, [0.0] * 6)
 
 
 def _numbers_table(own: JointNumbers) -> dict[str, Any]:
-    """Return the keys for the error, clearance and stiffness of a joint or bearing."""
+    """Return the keys of the error, clearance and stiffness of a joint or bearing."""
     table = joint_table(own.clearance, own.locked_at, own.stiffness)
     if own.error.any():
         table["geometric_error"] = own.error.tolist()

@@ -27,7 +27,7 @@ class Copy:
     Attributes:
         table: table that contains the bodies and joints.
         prefix: prefix of their names, for example ``"leg1."``.
-        T: transform from the leg as written in the table to the copy (4, 4).
+        T: transform from the leg in the table to the copy, (4, 4).
     """
 
     table: Table
@@ -36,7 +36,7 @@ class Copy:
 
 
 def read_bodies(copied: Copy) -> Iterator[DrawnBody]:
-    """Yield the bodies of a copy; the joints at the ends of links are not set yet."""
+    """Yield the bodies of a copy, without the joints at the ends of links."""
     for table in copied.table.tables("body"):
         name = table.text("name", longest=LONGEST_NAME)
         table.place = place_of(copied.table, "body", name)
@@ -60,29 +60,29 @@ def read_bodies(copied: Copy) -> Iterator[DrawnBody]:
                 raise table.bad(
                     key, 'found a joint, but no "link"; expected both or neither'
                 )
-        table.tables("tolerance")  # marked as read; parsed when all joints are known
+        table.tables("tolerance")  # read later, when all joints are known
         table.finish()
         yield turned_body(body, copied.T)
 
 
 def place_of(owner: Table, kind: str, name: str) -> str:
-    """Return the place of a body or joint, with which messages begin."""
+    """Return the position of a body or joint in the file, for error messages."""
     return f"{owner.place + '.' if owner.place else ''}{kind} {quoted(name)}"
 
 
 def with_ends(
     body: DrawnBody, copied: Copy, joints: list[DrawnJoint], point: NDArray | None
 ) -> DrawnBody:
-    """Set the joints at the ends of a body's link.
+    """Set the joints at both ends of the link of a body.
 
     Args:
-        body: body as read from the file.
-        copied: copy of a leg to which the body belongs.
+        body: body that was read from the file.
+        copied: copy of a leg that contains the body.
         joints: all joints of the robot.
-        point: reference point of the platform (3,) [m], if the body is the platform.
+        point: reference point of the platform, (3,) [m]; None for other bodies.
 
     Returns:
-        Body with these joints; a curved beam is replaced by its stiffness matrix and
+        Body with these joints.  A curved beam is replaced by its stiffness matrix and
         mass.
 
     Raises:
@@ -136,7 +136,7 @@ def _ends(
 
 
 def _end(table: Table, key: str, prefix: str, here: list[str]) -> str | None:
-    """Return the full name of the joint at one end of a link, if it is specified."""
+    """Return the full name of the joint at an end of a link, or None."""
     if not table.has(key):
         return None
     name = table.text(key, expected="the name of a joint")
@@ -151,7 +151,7 @@ def _end(table: Table, key: str, prefix: str, here: list[str]) -> str | None:
 def link_remarks(
     bodies: list[DrawnBody], joints: list[DrawnJoint], copies: list[Copy]
 ) -> tuple[str, ...]:
-    """Return a remark on links whose ends are assumed, because none are specified."""
+    """Return a remark on links whose end joints are not specified in the file."""
     stated = {
         copied.prefix + table.content["name"]
         for copied in copies
@@ -163,8 +163,12 @@ def link_remarks(
         count = sum(body.name in (j.first, j.second) for j in joints)
         if body.ends and count > 2 and body.name not in stated:
             ends = " to ".join(quoted(end) for end in body.ends if end)
-            texts.append(f"{quoted(body.name)} {ends}")
-    return (f"links from first to second joint: {', '.join(texts)}",) if texts else ()
+            texts.append(f"{quoted(body.name)} from {ends}")
+    return (
+        (f"links between the first two joints of a body: {', '.join(texts)}",)
+        if texts
+        else ()
+    )
 
 
 def mass_remarks(copies: list[Copy]) -> tuple[str, ...]:
@@ -175,5 +179,5 @@ def mass_remarks(copies: list[Copy]) -> tuple[str, ...]:
         for table in copied.table.tables("body")
         if table.content.get("mass") and "centre" not in table.content
     ]
-    fault = 'masses without "centre" act at [0, 0, 0] of the drawing'
+    fault = 'masses without "centre", which act at the origin of the base'
     return (f"{fault}: {', '.join(names)}",) if names else ()

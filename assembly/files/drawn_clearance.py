@@ -18,7 +18,7 @@ from forcefit.assembly.model.largest import LARGEST_LENGTH
 from forcefit.assembly.model.robot import Clearance
 from forcefit.inputs.table import Table, describe, quoted
 
-# [m] smallest length of a contact; shorter contacts would allow unlimited tilt
+# [m] smallest length of a contact; the tilt increases with decreasing length
 _LEAST_LENGTH = 1e-9
 _ANGLES = ("tilt", "spin")
 _Clearance = tuple[Clearance | None, tuple[Contact, ...]]
@@ -32,7 +32,7 @@ def read_drawn_clearance(table: Table, kind: str) -> _Clearance:
         kind: type of the joint; ``"revolute"`` for a bearing of a universal joint.
 
     Returns:
-        Bounds at the frame of the joint, or None, and the contacts of the joint.
+        Clearance bounds of the joint frame, or None, and the contacts of the joint.
 
     Raises:
         BadInput: the table violates a rule of the format.
@@ -61,7 +61,7 @@ def read_drawn_clearance(table: Table, kind: str) -> _Clearance:
 
 
 def _in_bore(table: Table, kind: str, bounds: Clearance) -> _Clearance:
-    """Return the remaining bounds of a joint and the contacts in its bore."""
+    """Return the axial and spin bounds of a joint, and the contacts in its bore."""
     _refuse_with(table, "length", ("tilt", "ball"))
     _refuse_without_shaft(table, "length", kind)
     half = _length(table, "length") / 2
@@ -71,7 +71,7 @@ def _in_bore(table: Table, kind: str, bounds: Clearance) -> _Clearance:
 
 
 def _in_bearings(table: Table, kind: str, bounds: Clearance) -> _Clearance:
-    """Return the remaining bounds of a joint and the contacts in its two bearings."""
+    """Return the axial and spin bounds of a joint, and the contacts in two bearings."""
     _refuse_with(table, "bearings", ("radial", "tilt", "ball"))
     _refuse_without_shaft(table, "bearings", kind)
     value = table.get("bearings")
@@ -89,7 +89,7 @@ def _in_bearings(table: Table, kind: str, bounds: Clearance) -> _Clearance:
 
 
 def _bearing(table: Table, number: int, content: dict) -> tuple[float, float, str, str]:
-    """Return the position [m], radial gap [m], fit and part name of a bearing."""
+    """Return the position [m], radial clearance [m], fit and name of a bearing."""
     inner = Table(dict(content), table.file, f"{table.place}.bearings[{number}]")
     for key in ("z", "radial"):
         without_units(inner, key, "length")
@@ -100,7 +100,7 @@ def _bearing(table: Table, number: int, content: dict) -> tuple[float, float, st
 
 
 def _gap(table: Table, key: str = "radial") -> tuple[float, str]:
-    """Return the gap [m], which is given directly or by a fit, and the fit if any."""
+    """Return a gap [m], and the fit from which it is computed, or an empty text."""
     fit = fit_of(table)
     if fit is not None:
         if table.has(key):
@@ -110,20 +110,20 @@ def _gap(table: Table, key: str = "radial") -> tuple[float, str]:
 
 
 def _of_shaft(bounds: Clearance) -> Clearance | None:
-    """Return the bounds ``axial`` and ``spin``, or None if neither is given."""
+    """Return the bounds ``axial`` and ``spin``, or None if both are absent."""
     kept = Clearance(axial=bounds.axial, spin=bounds.spin)
     return None if kept == Clearance() else kept
 
 
 def _refuse_without_shaft(table: Table, key: str, kind: str) -> None:
-    """Check that bores and bearings are specified only for joints with a shaft."""
+    """Check that a joint with a bore or bearings has a shaft."""
     if not {0, 1, 3, 4}.isdisjoint(FREE_ROWS[kind]):
         fault = f"found the clearance of a shaft on a {kind} joint"
         raise table.bad(key, f"{fault}, which has no shaft; expected none")
 
 
 def _in_guide(table: Table, kind: str, bounds: Clearance) -> _Clearance:
-    """Return the bound along the axis and the contacts of a guide."""
+    """Return the axial bound and the contacts of a linear guide."""
     _refuse_type(table, "guide", kind, "prismatic")
     _refuse_with(table, "guide", ("radial", "tilt", "spin", "ball"))
     inner = _sizes(table, "guide", ("gap", "length", "width", "height"))
@@ -140,7 +140,7 @@ def _in_guide(table: Table, kind: str, bounds: Clearance) -> _Clearance:
 
 
 def _guide_gaps(inner: Table) -> tuple[float, float]:
-    """Return the gaps c_x and c_y of a guide along x and y [m]."""
+    """Return the gaps of a guide along x and y [m]."""
     if not isinstance(inner.content.get("gap"), list):
         gap = inner.number("gap", "m", least=0.0, largest=LARGEST_LENGTH)
         return gap, gap
@@ -151,7 +151,7 @@ def _guide_gaps(inner: Table) -> tuple[float, float]:
 
 
 def _guide_fits(inner: Table) -> tuple[Fit, Fit] | None:
-    """Return the fits of a guide along x and y, or None if gaps are given instead."""
+    """Return the fits of a guide along x and y, or None if gaps are specified."""
     value = inner.content.get("fit")
     if value is not None and inner.has("gap"):
         raise inner.bad("gap", 'found together with "fit", expected only one of them')
@@ -169,7 +169,7 @@ def _guide_fits(inner: Table) -> tuple[Fit, Fit] | None:
 
 
 def _on_pad(table: Table, kind: str, bounds: Clearance) -> _Clearance:
-    """Return the remaining bounds and the contacts of a pad."""
+    """Return the remaining bounds of a joint and the contacts of its pad."""
     _refuse_type(table, "pad", kind, "planar")
     _refuse_with(table, "pad", ("axial", "tilt", "ball"))
     inner = _sizes(table, "pad", ("gap", "length", "width"))
@@ -185,14 +185,14 @@ _CONTACTS = {
 
 
 def _refuse_type(table: Table, key: str, kind: str, of_kind: str) -> None:
-    """Check that the joint type supports these contacts."""
+    """Check that the contacts are possible for the joint type."""
     if kind != of_kind:
         fault = f"found on a {kind} joint, expected none"
         raise table.bad(key, f"{fault}; only a {of_kind} joint has a {key}")
 
 
 def _refuse_with(table: Table, key: str, others: tuple[str, ...]) -> None:
-    """Check that contacts and bounds do not limit the same motions."""
+    """Check that contacts and bounds do not limit the same motion."""
     for other in others:
         if table.has(other):
             fault = f"found together with {quoted(key)}, which bounds the same motion"
@@ -200,7 +200,7 @@ def _refuse_with(table: Table, key: str, others: tuple[str, ...]) -> None:
 
 
 def _sizes(table: Table, key: str, keys: tuple[str, ...]) -> Table:
-    """Return a table of lengths, with texts such as ``"2 mm"`` converted to numbers."""
+    """Return a table with texts such as ``"2 mm"`` converted to numbers in m."""
     given = table.table(key)
     inner = Table(dict(given.content), given.file, given.place)
     for name in keys:
@@ -209,12 +209,12 @@ def _sizes(table: Table, key: str, keys: tuple[str, ...]) -> Table:
 
 
 def _length(table: Table, key: str) -> float:
-    """Return a length [m] that describes a contact."""
+    """Return a dimension of a contact [m]."""
     return table.number(key, "m", above=_LEAST_LENGTH, largest=LARGEST_LENGTH)
 
 
 def _refuse_free(table: Table, bounds: Clearance | None, kind: str) -> None:
-    """Check that free motions are not bounded in a joint with several of them."""
+    """Check that a joint with several degrees of freedom has no bound on them."""
     free = set(FREE_ROWS[kind])
     for key, rows in zip(BOUNDS, CONES, strict=True):
         given = bounds is not None and getattr(bounds, key) is not None

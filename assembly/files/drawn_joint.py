@@ -23,7 +23,7 @@ from forcefit.assembly.model.largest import LARGEST, LARGEST_LENGTH
 from forcefit.inputs.table import Table
 
 ONE_FREEDOM = ("revolute", "prismatic", "helical")
-_PARALLEL = 1e-3  # largest sine of the angle between axes that count as parallel
+_PARALLEL = 1e-3  # smallest accepted sine of the angle between the two axes
 _KEYS = ("clearance", "joint_stiffness", "geometric_error", "tolerance")
 _ROWS = ("RX", "RY", "RZ", "TX", "TY", "TZ")
 
@@ -38,7 +38,7 @@ def read_drawn_joint(table: Table, name: str, first: str, second: str) -> DrawnJ
         second: name of the second body.
 
     Returns:
-        Joint as written, without the transform to the copy of its leg.
+        Joint without the transform to the copy of its leg.
 
     Raises:
         BadInput: the table violates a rule of the format.
@@ -73,7 +73,7 @@ def read_drawn_joint(table: Table, name: str, first: str, second: str) -> DrawnJ
 
 
 def _axes(table: Table, kind: str) -> tuple[NDArray, NDArray, NDArray]:
-    """Return unit vectors along ``axis``, a perpendicular x axis, and ``axis2``."""
+    """Return unit vectors along ``axis``, the x axis of the joint, and ``axis2``."""
     needs = kind not in {"fixed", "spherical"}
     axis = _direction(table, "axis", needs)
     axis = np.array([0.0, 0.0, 1.0]) if axis is None else axis
@@ -89,7 +89,7 @@ def _axes(table: Table, kind: str) -> tuple[NDArray, NDArray, NDArray]:
 
 
 def _direction(table: Table, key: str, needed: bool) -> NDArray | None:
-    """Return a unit vector (3,), or None if it is absent and not required."""
+    """Return a unit vector, (3,), or None if it is absent and optional."""
     if not needed and not table.has(key):
         return None
     without_units(table, key, "length")
@@ -112,7 +112,7 @@ def _limits(table: Table, unit: str) -> tuple[float, float] | None:
 
 
 def _numbers(table: Table, kind: str, actuated: bool) -> tuple[JointNumbers, ...]:
-    """Read error, clearance and stiffness, for each bearing of a universal joint."""
+    """Read the error, clearance and stiffness of a joint or of both bearings."""
     if kind != "universal":
         return (_one(table, kind, actuated),)
     for key in ("clearance", "geometric_error", "tolerance"):
@@ -126,7 +126,7 @@ def _numbers(table: Table, kind: str, actuated: bool) -> tuple[JointNumbers, ...
 
 
 def _refuse_count(table: Table, key: str) -> None:
-    """Check that a list contains one value for each of the two bearings."""
+    """Check that a list has one value for each of the two bearings."""
     value = table.content.get(key)
     parts = dict if key == "clearance" else list
     if not isinstance(value, list) or not all(isinstance(v, parts) for v in value):
@@ -137,7 +137,7 @@ def _refuse_count(table: Table, key: str) -> None:
 
 
 def _bearing(table: Table, key: str, which: int) -> Any:
-    """Return the value for one bearing, from ``[first, second]`` or a common value."""
+    """Return the value for a bearing from ``[first, second]`` or a common value."""
     value = table.content[key]
     pair = isinstance(value, list) and len(value) == 2
     return value[which] if pair else value
@@ -163,7 +163,7 @@ def _one(table: Table, kind: str, actuated: bool) -> JointNumbers:
 
 
 def _tolerance(table: Table) -> NDArray | None:
-    """Return the standard deviations of the geometric error (6,), or None."""
+    """Return the standard deviations of the geometric error, (6,), or None."""
     if not table.has("tolerance"):
         return None
     sigma = table.array("tolerance", (6,), "rad, m", largest=LARGEST_LENGTH)
@@ -174,7 +174,7 @@ def _tolerance(table: Table) -> NDArray | None:
 
 
 def _stiffness(table: Table, kind: str, actuated: bool) -> NDArray | None:
-    """Return K_B (6, 6) including the drive, 0 along free motions; None if rigid."""
+    """Return the joint stiffness including that of the drive, (6, 6), or None."""
     free = FREE_ROWS[kind]
     if len(free) > 1:
         return _several_free(table, kind)
@@ -194,7 +194,7 @@ def _stiffness(table: Table, kind: str, actuated: bool) -> NDArray | None:
 
 
 def _several_free(table: Table, kind: str) -> NDArray | None:
-    """Return K_B (6, 6) of a joint with several free motions, 0 along each of them."""
+    """Return the stiffness of a joint with several degrees of freedom, (6, 6)."""
     if not table.has("joint_stiffness"):
         return None
     free = list(FREE_ROWS[kind])
@@ -218,7 +218,7 @@ def _several_free(table: Table, kind: str) -> NDArray | None:
 
 
 def copy_rows(value: Any) -> Any:
-    """Copy a list and its inner lists; return other values unchanged."""
+    """Copy a list and its inner lists, or return another value unchanged."""
     if not isinstance(value, list):
         return value
     return [list(row) if isinstance(row, list) else row for row in value]

@@ -19,18 +19,17 @@ _LENGTHS = ("radius", "inner_radius", "width", "height", "length", "wall", "web"
             "flange")  # fmt: skip
 _CURVE = ("curve", "young", "poisson", "density", "theory")
 _KINDS = ("beam", "curve", "stiffness", "mesh", "library", "model")
-# [-] accepted distance of the end of a curve from the joint, relative to the distance
+# [-] largest distance from the end of a curve to the joint, relative to the distance
 # between both joints
 _GAP = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """Link that can be read only when the positions of the joints are known.
+    """Link whose stiffness depends on the positions of its end joints.
 
     Attributes:
-        table: unchecked table of a curved beam, or of a link model from another
-            distribution.
+        table: table of a curved beam or of a link model from another distribution.
     """
 
     table: Table
@@ -43,8 +42,8 @@ def read_drawn_link(body: Table) -> Link | Curve | None:
         body: table of the body, in which texts with units are replaced by numbers.
 
     Returns:
-        Link with directions in base axes at the home pose, a curve, or None for a rigid
-        body.
+        Link with directions in base axes in the home pose, ``Curve``, or None for a
+        rigid body.
 
     Raises:
         BadInput: the table violates a rule of the format.
@@ -67,7 +66,7 @@ def read_drawn_link(body: Table) -> Link | Curve | None:
 
 
 def _refuse_no_kind(link: Table) -> NoReturn:
-    """Raise BadInput for an unknown type of link, and suggest a name if possible."""
+    """Raise an error for an unknown type of link."""
     unknown = [key for key in link.content if key not in (*_CURVE, "pieces", "up")]
     if unknown:
         hint = nearest(unknown[0], _KINDS)
@@ -89,14 +88,14 @@ def curve_link(
     """Compute the stiffness and mass of a curved beam or of a link model.
 
     Args:
-        curve: link as read from the file.
-        start: position of the joint at the start of the link (3,) [m], in file axes.
-        tip: pose of the joint at the end of the link (4, 4), in file axes.
+        curve: curved beam or link model from the file.
+        start: position of the joint at the start of the link, (3,) [m].
+        tip: pose of the joint at the end of the link, (4, 4).
 
     Returns:
-        Stiffness at the tip, in the axes of the tip; mass [kg]; centre of mass (3,)
-        [m]; and moments of inertia about this centre (3, 3) [kg m^2].  Without a
-        density, the mass is 0.
+        Stiffness in the frame of the tip, mass [kg], centre of mass, (3,) [m], and
+        inertia matrix about the centre of mass, (3, 3) [kg m^2].  Without a density,
+        the mass is 0.
 
     Raises:
         BadInput: a segment or a material constant is invalid, or the curve does not end

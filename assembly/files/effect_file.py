@@ -1,4 +1,4 @@
-"""Reading and writing of ``[[effect]]`` tables, the known effects of a robot."""
+"""Reading and writing of ``[[effect]]`` tables, which define known effects."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -20,14 +20,14 @@ def with_effects(robot: Robot, tables: Sequence[Table]) -> Robot:
     """Add the effects in a robot file to the robot.
 
     Args:
-        robot: robot read from the same file, without effects.
+        robot: robot without effects from the same file.
         tables: all ``[[effect]]`` tables.
 
     Returns:
         Robot with effects.
 
     Raises:
-        BadInput: an effect or parameter is unknown, an effect is given twice or at a
+        BadInput: an effect or parameter is unknown, an effect occurs twice or at a
             frame where it cannot act, or a value is not a finite number.
     """
     everywhere: dict[str, Values] = {}
@@ -41,7 +41,7 @@ def with_effects(robot: Robot, tables: Sequence[Table]) -> Robot:
             continue
         try:
             effect = LIBRARY[name]
-        except BadInput as error:  # raised by an effect of another distribution
+        except BadInput as error:  # an effect from another distribution is invalid
             raise table.bad("name", str(error)) from None
         session = table.text("session", longest=200) if table.has("session") else None
         if session is not None and not effect.by_row:
@@ -61,7 +61,7 @@ def with_effects(robot: Robot, tables: Sequence[Table]) -> Robot:
 
 
 def _parameters(table: Table, robot: Robot, effect: str) -> Values:
-    """Read the parameters of an effect from the library."""
+    """Read the parameters of an effect that is defined in the library."""
     allowed = parameter_names(robot, effect)
     inner = table.table("parameters") if table.has("parameters") else None
     table.finish()
@@ -71,7 +71,7 @@ def _parameters(table: Table, robot: Robot, effect: str) -> Values:
             hint = nearest(key, allowed)
             message = f"found {quoted(key)}, which is not a parameter of {effect}"
             raise table.bad("parameters", f"{message}{hint}")
-    # every time constant must be given and positive
+    # time constants are required and positive
     times = {key for key in allowed if LIBRARY[effect].unit(robot, key) == "s"}
     for key in sorted(times - set(given)):
         owner = key.rpartition(".")[0]
@@ -112,7 +112,7 @@ def effect_tables(robot: Robot) -> list[dict[str, Any]]:
 
 
 def parameter_names(robot: Robot, effect: str) -> tuple[str, ...]:
-    """Return the public names of all possible parameters of an effect.
+    """Return the names of all parameters of an effect.
 
     Args:
         robot: robot to which the effect is applied.

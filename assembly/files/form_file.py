@@ -1,8 +1,7 @@
 """Flatness and cylindricity tolerances, which increase joint clearances.
 
-A form deviation neither rotates nor shifts a feature and therefore has no screw.  If a
-face is flat within t, or a bore is cylindrical within t, the gap to the mating part can
-increase by up to t/2.
+A form deviation neither rotates nor displaces a feature.  If the flatness of a face or
+the cylindricity of a bore is t, the gap to the mating part can increase by up to t/2.
 """
 
 from collections.abc import Iterator, Sequence
@@ -23,14 +22,14 @@ _WITH_GAP = {
 
 
 def read_form(table: Table, shape: str) -> float:
-    """Return the width of the form zone of a feature.
+    """Return the width of the form tolerance zone of a feature.
 
     Args:
         table: table with the tolerances of the feature.
         shape: shape of the feature: ``"axis"``, ``"plane"`` or ``"point"``.
 
     Returns:
-        Width of the zone [m]; 0 without a form tolerance.
+        Width of the zone [m], or 0 without a form tolerance.
 
     Raises:
         BadInput: the value is not a width, or the form tolerance does not apply to a
@@ -53,14 +52,14 @@ def read_form(table: Table, shape: str) -> float:
 
 
 def forms_of_joints(copies: Sequence[Copy]) -> dict[str, tuple[str, float]]:
-    """Return the form tolerances of joints, by joint name.
+    """Return the increases of joint clearances due to form tolerances.
 
     Args:
         copies: copies of the legs, and the bodies outside legs.
 
     Returns:
-        For each joint, ``"flatness"`` or ``"cylindricity"``, and the increase of the
-        joint clearance [m], which is half the sum of the zone widths of both features.
+        ``"flatness"`` or ``"cylindricity"`` and the increase of the clearance [m], by
+        joint name.  The increase is half the sum of the zone widths of both features.
 
     Raises:
         BadInput: the text of a width is invalid.
@@ -79,7 +78,7 @@ def forms_of_joints(copies: Sequence[Copy]) -> dict[str, tuple[str, float]]:
 
 
 def _with_form(copies: Sequence[Copy]) -> Iterator[tuple[Copy, Table, str]]:
-    """Yield the tolerance tables that contain a form tolerance, with its key."""
+    """Yield the tolerance tables that contain a form tolerance, and its key."""
     for copied in copies:
         owners = copied.table.tables("body")
         if not copied.prefix:
@@ -90,10 +89,10 @@ def _with_form(copies: Sequence[Copy]) -> Iterator[tuple[Copy, Table, str]]:
 
 
 def widen_clearance(joint: Table, word: str, added: float) -> None:
-    """Increase the gap of a joint due to form tolerances.
+    """Increase the gap in a joint due to form tolerances.
 
     Args:
-        joint: table of the joint, whose content is replaced.
+        joint: table of the joint, which is modified in place.
         word: ``"flatness"`` or ``"cylindricity"``.
         added: increase of the gap [m].
 
@@ -111,7 +110,7 @@ def widen_clearance(joint: Table, word: str, added: float) -> None:
 def _widened(
     joint: Table, given: dict[str, Any], word: str, added: float
 ) -> dict[str, Any] | None:
-    """Return the clearance with an increased gap, or None if there is no gap."""
+    """Return the clearance with an increased gap, or None without a gap."""
     if word == "flatness":
         pad = given.get("pad")
         if not isinstance(pad, dict):
@@ -137,7 +136,7 @@ def _widened(
 def _added(
     joint: Table, given: dict[str, Any], key: str, added: float
 ) -> dict[str, Any]:
-    """Increase a length [m] in a table; invalid values are rejected later."""
+    """Increase a length in a table [m]; invalid values are not changed."""
     inner = Table(dict(given), joint.file, f"{joint.place}.clearance")
     without_units(inner, key, "length")
     value = inner.content.get(key)
@@ -147,7 +146,7 @@ def _added(
 
 
 def _looser(fit: Any, added: float) -> Any:
-    """Increase the clearance of a fit; invalid texts are rejected later."""
+    """Increase the clearance of a fit; invalid values are not changed."""
     try:
         clearance_fit(fit)
     except (BadInput, TypeError):

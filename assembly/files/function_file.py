@@ -1,4 +1,4 @@
-"""Reading and writing of the general effect ``function`` in robot files."""
+"""Reading and writing of the effect ``function`` in robot files."""
 
 import math
 from collections.abc import Mapping
@@ -36,17 +36,17 @@ _KINDS_OF_VARIABLES = (
 
 
 def read_function(table: Table, robot: Robot) -> Function:
-    """Read a general effect.
+    """Read an effect that is defined by a function.
 
     Args:
         table: ``[[effect]]`` table with the name ``function``.
         robot: robot in the same file.
 
     Returns:
-        Validated function.
+        The function.
 
     Raises:
-        BadInput: a place, component, variable, form or parameter is unknown or missing,
+        BadInput: a frame, component, variable, form or parameter is unknown or missing,
             or a formula is invalid or has inconsistent units.
     """
     label = table.text("label", "", longest=200)
@@ -55,7 +55,9 @@ def read_function(table: Table, robot: Robot) -> Function:
     where = table.text("where", expected='a frame, "base", "reading" or "load"')
     places = (*names_of(robot), *PLACES)
     if where not in places:
-        message = f"found {quoted(where)}, expected a frame or a place"
+        message = (
+            f'found {quoted(where)}, expected a frame, "base", "reading" or "load"'
+        )
         raise table.bad("where", f"{message}{nearest(where, places)}")
     if where in robot.joints:
         where = robot.joints[where].main
@@ -103,7 +105,7 @@ def _words(table: Table, key: str, most: int) -> tuple[str, ...]:
 def _numbers(
     table: Table, key: str, least: float = -math.inf
 ) -> Mapping[str, float]:  # fmt: skip
-    """Return the numbers in an inner table by name; empty if it is absent."""
+    """Return the numbers in an inner table, or an empty dictionary."""
     if not table.has(key):
         return {}
     inner = table.table(key)
@@ -111,7 +113,7 @@ def _numbers(
 
 
 def _of_main(variable: str, robot: Robot) -> str:
-    """Replace a joint with several frames in a variable by its main frame."""
+    """Replace the name of a joint in a variable by that of its main frame."""
     kind, _, rest = variable.partition(".")
     name, _, axis = rest.rpartition(".")
     if kind == "wrench" and name in robot.joints:
@@ -120,7 +122,7 @@ def _of_main(variable: str, robot: Robot) -> str:
 
 
 def _check_variable(table: Table, name: str, robot: Robot) -> None:
-    """Check that a variable is one that measurements record."""
+    """Check that a variable is recorded in measurements."""
     kind, _, rest = name.partition(".")
     frames = [frame.name for frame in robot.frames]
     if kind == "q":
@@ -143,7 +145,7 @@ def _check_variable(table: Table, name: str, robot: Robot) -> None:
 
 
 def _check_parameters(table: Table, function: Function, robot: Robot) -> None:
-    """Check for unknown and missing parameters of a form."""
+    """Check that all required parameters of a form, and no others, are specified."""
     for name in function.std:
         if name not in function.parameters:
             hint = nearest(name, function.parameters)
@@ -197,7 +199,7 @@ def _check_parameters(table: Table, function: Function, robot: Robot) -> None:
 
 
 def _check_knots(table: Table, function: Function, component: str) -> None:
-    """Check that a spline has one value per knot, and that its knots are distinct."""
+    """Check that a spline has one value per knot, and that its knots increase."""
     names = columns_of(function, component)
     indices = np.array([column_indices(name) for name in names])
     wanted = math.prod(indices.max(axis=0).tolist()) if names else 2
@@ -215,7 +217,7 @@ def _check_knots(table: Table, function: Function, component: str) -> None:
 
 
 def _check_formula(table: Table, function: Function, robot: Robot) -> None:
-    """Check that a formula has only known names and consistent units."""
+    """Check that the names in a formula are known and its units are consistent."""
     aliases = variable_names(function.variables)
     try:
         tree = parse_formula(function.formula)
@@ -229,7 +231,7 @@ def _check_formula(table: Table, function: Function, robot: Robot) -> None:
                     raise BadInput(f"{message} a parameter{hint}")
             for name in own:
                 if name in aliases or name not in used:
-                    why = "a variable's name" if name in aliases else "not in it"
+                    why = "also a variable" if name in aliases else "not in the formula"
                     raise BadInput(f"parameter {quoted(name)} is {why}")
             units = {
                 name: variable_unit(robot, function.variables[k])
@@ -255,7 +257,7 @@ def function_table(function: Function) -> dict[str, Any]:
         function: function of a robot.
 
     Returns:
-        Keys and plain values, from which :func:`read_function` reads the same function.
+        Keys and values, from which :func:`read_function` reads the same function.
     """
     table: dict[str, Any] = {"name": FUNCTION}
     if function.label:

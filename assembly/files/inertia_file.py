@@ -6,22 +6,22 @@ from numpy.typing import NDArray
 from forcefit.assembly.model.inertia import inertia_fault, inertia_matrix
 from forcefit.inputs.table import Table
 
-_LARGEST = 1e40  # [kg m^2] upper limit, numerically equal to the limit of masses
+_LARGEST = 1e40  # [kg m^2] upper limit of the entries
 
 
 def read_inertia(table: Table) -> NDArray:
-    """Return the moments of inertia of a frame or a body.
+    """Return the inertia matrix of a frame or a body.
 
     Args:
         table: table with an optional key ``inertia``, which contains the matrix entries
             Ixx, Iyy, Izz, Ixy, Ixz, Iyz.
 
     Returns:
-        Moments of inertia (3, 3) [kg m^2]; zero if the key is absent.
+        Inertia matrix, (3, 3) [kg m^2]; zero if the key is absent.
 
     Raises:
-        BadInput: the value does not contain six numbers, or the moments of inertia are
-            not physically possible.
+        BadInput: the value is not a list of six numbers, or the matrix is physically
+            impossible.
     """
     if not table.has("inertia"):
         return np.zeros((3, 3))

@@ -15,12 +15,12 @@ from forcefit.assembly.model.robot import LOCKED, NO_SPIN, Clearance, LockedAt
 from forcefit.inputs.number_arrays import find_fault, number_array
 from forcefit.inputs.table import BadInput, Table
 
-# [rad, m] smallest positive bound; the squares of smaller numbers could underflow
+# [rad, m] smallest positive bound, whose square does not underflow
 _LEAST_CLEARANCE = 1e-30
-# [m] smallest length of a fit; shorter fits would allow unlimited tilt
+# [m] smallest length of a fit; the tilt increases with decreasing length
 _LEAST_LENGTH = 1e-9
-LEAST_PITCH = 1e-9  # [m] smallest accepted pitch of a screw
-LARGEST_PITCH = 1.0  # [m] largest accepted pitch of a screw
+LEAST_PITCH = 1e-9  # [m] smallest accepted pitch of a helical joint
+LARGEST_PITCH = 1.0  # [m] largest accepted pitch of a helical joint
 _CLEARANCE = {"radial": "m", "axial": "m", "tilt": "rad", "spin": "rad", "ball": "m"}
 
 
@@ -28,11 +28,11 @@ def read_pitch(table: Table, joint: str) -> float:
     """Return the ``pitch`` of a helical joint, or 0 for all other joint types.
 
     Args:
-        table: table of a frame or a drawn joint.
+        table: table of a frame or joint.
         joint: type of the joint.
 
     Returns:
-        Translation per turn [m], positive for a right-handed thread.
+        Translation per turn [m], positive for a right-hand thread.
 
     Raises:
         BadInput: the pitch is missing, 0 or above 1 m, or the joint is not helical.
@@ -68,7 +68,7 @@ def read_clearance(table: Table, joint: str) -> Clearance | None:
     end = _fitted_end(inner)
     bounds = read_bounds(inner, joint)
     if end is not None:
-        # this fit determines the rotation bound instead of the radial clearance
+        # the fit determines a bound on the rotation, not the radial clearance
         rotation = end.bounds(bounds.radial or 0.0)
         bounds = replace(bounds, radial=None, **rotation)
     inner.finish()
@@ -76,7 +76,7 @@ def read_clearance(table: Table, joint: str) -> Clearance | None:
 
 
 def read_bounds(table: Table, joint: str) -> Clearance:
-    """Read the bounds in a ``clearance`` table, ignoring all other keys.
+    """Read the clearance bounds in a ``clearance`` table.
 
     Args:
         table: ``clearance`` table.
@@ -87,8 +87,8 @@ def read_bounds(table: Table, joint: str) -> Clearance:
 
     Raises:
         BadInput: a bound is not a number >= 0, is ``inf`` although the joint is not
-            fixed, or is so small that its square underflows; or ``ball`` is given
-            together with a different bound on the same motion.
+            fixed, or is so small that its square underflows, or ``ball`` is specified
+            together with another bound on the same motion.
     """
     bounds = {
         key: _bound(table, key, unit, joint)
@@ -114,7 +114,7 @@ def read_bounds(table: Table, joint: str) -> Clearance:
 
 
 def _bound(table: Table, key: str, unit: str, joint: str) -> float:
-    """Read a bound; ``inf`` is allowed only for fixed joints."""
+    """Read a clearance bound; only a fixed joint may have the bound ``inf``."""
     if joint == "fixed" and table.content[key] == math.inf:
         return float(table.get(key))
     return table.number(key, unit, least=0.0, largest=LARGEST_LENGTH)
@@ -128,7 +128,7 @@ def read_fit(table: Table) -> str:
 
 
 def read_fitted_end(table: Table) -> FittedEnd | None:
-    """Return the data of a fit that determines a rotation bound, or None."""
+    """Return the data of a fit that determines a bound on a rotation, or None."""
     content = table.content.get("clearance")
     if not isinstance(content, dict) or "length" not in content:
         return None
@@ -151,11 +151,10 @@ def _fitted_end(inner: Table) -> FittedEnd | None:
 
 
 def fit_of(inner: Table) -> Fit | None:
-    """Return the fit of a clearance or bearing, or None if there is none.
+    """Return the fit of a clearance or bearing, or None.
 
     Raises:
-        BadInput: the text is not a fit, the fit is an interference fit, or ``radial``
-            is given as well.
+        BadInput: the text is not a clearance fit, or ``radial`` is also specified.
     """
     if not inner.has("fit"):
         return None
@@ -171,17 +170,17 @@ def fit_of(inner: Table) -> Fit | None:
 
 
 def read_joint_stiffness(table: Table, free: int | None = None) -> NDArray | None:
-    """Read K_B as a full matrix with infinite entries only on its diagonal.
+    """Read the stiffness matrix K_B of a joint.
 
     Args:
         table: ``[[frame]]`` table.
-        free: index of the direction in which a passive joint moves, whose row and
-            column may be zero to leave the motion free; None if the joint is not
-            passive.
+        free: index of the motion of a passive joint, whose row and column may be zero;
+            None if the joint is not passive.
 
     Returns:
-        Symmetric positive definite matrix (6, 6) [N m/rad .. N/m], except for zeros in
-        the row and column of a free motion; None if the key is absent.
+        Symmetric matrix, (6, 6) [N m/rad .. N/m]; None if the key is absent.  The
+        matrix is positive definite except for a zero row and column.  Its diagonal
+        entries may be infinite.
 
     Raises:
         BadInput: the value has an invalid shape, is not a stiffness, or contains
@@ -233,18 +232,18 @@ def _has_rows(value: list) -> bool:
 
 
 def definite(table: Table, key: str, K: NDArray) -> NDArray:
-    """Check that a stiffness matrix is positive definite, and symmetrise it.
+    """Check that a stiffness matrix is positive definite, and make it symmetric.
 
     Args:
         table: table with the matrix.
         key: key of the matrix in the table.
-        K: finite stiffness matrix or submatrix (n, n) [N m/rad .. N/m].
+        K: finite stiffness matrix or submatrix, (n, n) [N m/rad .. N/m].
 
     Returns:
-        The matrix (n, n), made exactly symmetric.
+        The symmetric matrix, (n, n).
 
     Raises:
-        BadInput: the matrix is not positive definite; the message states why.
+        BadInput: the matrix is not positive definite.
     """
     if not K.size:
         return K
@@ -261,7 +260,7 @@ def definite(table: Table, key: str, K: NDArray) -> NDArray:
         expected = f"expected between {1 / LARGEST:g} and {LARGEST:g}"
         fault = f"found {diagonal[i]:g} as term [{i + 1}, {i + 1}]"
         raise table.bad(key, f"{fault}, {expected}")
-    # scaled to a unit diagonal, so that rad and m have equal weights
+    # the matrix is scaled to a unit diagonal to be independent of units
     size = np.sqrt(diagonal)
     unit = np.clip(K, -1e150, 1e150) / np.outer(size, size)
     asymmetry = np.abs(unit - unit.T)
@@ -290,10 +289,10 @@ def joint_table(
     Args:
         clearance: operating clearance, or None.
         bolt: pose at which the joint is bolted, with its clearance before bolting.
-        stiffness: K_B (6, 6); a diagonal matrix is written as a list of six numbers.
+        stiffness: K_B, (6, 6).  A diagonal matrix is written as a list of six numbers.
 
     Returns:
-        Keys and plain values, omitting absent data.
+        Keys and values.
     """
     table: dict[str, Any] = {}
     clearance = clearance if bolt is None else bolt.clearance

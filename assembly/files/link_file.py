@@ -21,8 +21,7 @@ from forcefit.inputs.writing import path_from
 from forcefit.stiffness.surface.surface import UNITS
 
 _SMALLEST_LENGTH = 1e-12  # [m] smallest accepted length
-# maximum number of springs in series for a beam; 8 springs are sufficient for a
-# relative error of 1e-4 at a bending angle of 90 degrees
+# maximum number of springs in series that represent a beam
 _MOST_PIECES = 100
 _ONE_SECTION = (
     '"radius" [, "inner_radius"] or "width", "height" or '
@@ -30,7 +29,7 @@ _ONE_SECTION = (
 )
 _KINDS = ("beam", "stiffness", "mesh", "library", "model")
 _MATERIAL = ("young", "poisson", "density")
-# keys of each type of cross section, with their units
+# keys and units, by type of cross section
 _SECTIONS: dict[str, dict[str, str]] = {
     "round": {"radius": "m", "inner_radius": "m"},
     "rectangular": {"width": "m", "height": "m"},
@@ -46,8 +45,8 @@ def read_link(frame: Table, span: NDArray) -> Link | None:
 
     Args:
         frame: table of the frame, whose keys ``link`` and ``up`` are read.
-        span: vector from the parent origin to the frame origin (3,) [m], in the frame
-            axes, which is required for link models from other distributions.
+        span: vector from the parent origin to the frame origin in frame axes, (3,) [m],
+            for link models from other distributions.
 
     Returns:
         Link, or None if the body is rigid.
@@ -60,7 +59,7 @@ def read_link(frame: Table, span: NDArray) -> Link | None:
     link = frame.table("link")
     kinds = [kind for kind in _KINDS if link.has(kind)]
     if not kinds and not set(link.content) <= {*_MATERIAL, "up", "pieces"}:
-        link.finish()  # reports a misspelt key with a suggestion
+        link.finish()  # the error message suggests a key for a misspelt one
     if len(kinds) != 1:
         given = " and ".join(map(quoted, kinds)) or "no type of link"
         names = " | ".join(map(quoted, _KINDS))
@@ -100,7 +99,7 @@ def _beam_link(link: Table) -> BeamLink:
 
 
 def _pieces(link: Table) -> int:
-    """Return the number of springs in series for a beam, 1 by default."""
+    """Return the number of springs in series that represent a beam."""
     count = link.number("pieces", "-", 1.0, least=1.0, below=_MOST_PIECES + 1.0)
     if count != round(count):
         raise link.bad("pieces", f"found {count:g}, expected a whole number")
@@ -115,7 +114,7 @@ def _section(beam: Table) -> dict[str, float]:
     kinds = [kind for kind, keys in keys_of_kind.items() if keys]
     if len(kinds) != 1:
         if not kinds:
-            beam.finish()  # reports a misspelt key with a suggestion
+            beam.finish()  # the error message suggests a key for a misspelt one
         names = (
             " and ".join(quoted(keys_of_kind[kind][0]) for kind in kinds)
             or "no section"
@@ -164,7 +163,7 @@ def _mesh_link(link: Table, frame: Table) -> MeshLink:
 
 
 def _interface(mesh: Table, key: str) -> Any:
-    """Return an interface of a mesh as written, after a syntax check."""
+    """Check the syntax of a mesh interface and return its text or table."""
     from forcefit.stiffness.surface.interface import parse_interface
 
     value = mesh.require(key, 'an interface such as "z=0.452"')
@@ -199,7 +198,7 @@ def _library_link(link: Table) -> LibraryLink:
 
 
 def _material(link: Table) -> dict[str, Any]:
-    """Return Young's modulus, Poisson's ratio and, if given, density."""
+    """Return Young's modulus, Poisson's ratio and the density or None."""
     return {
         "young": _size(link, "young", "Pa"),
         "poisson": link.number("poisson", "-", above=-1.0, below=0.5),
@@ -208,7 +207,7 @@ def _material(link: Table) -> dict[str, Any]:
 
 
 def _size(table: Table, key: str, unit: str) -> float:
-    """Return a positive number within limits that prevent overflow of its powers."""
+    """Return a positive number within limits."""
     length = unit == "m"
     largest = LARGEST_LENGTH if length else LARGEST
     smallest = _SMALLEST_LENGTH if length else 1 / LARGEST
@@ -220,7 +219,7 @@ def _size(table: Table, key: str, unit: str) -> float:
 
 
 def _direction(table: Table, key: str) -> tuple[float, float, float] | None:
-    """Return a direction; None if the key is absent."""
+    """Return a direction vector, or None if the key is absent."""
     if not table.has(key):
         return None
     vector = table.array(key, (3,), "direction", largest=LARGEST_LENGTH)
@@ -234,7 +233,7 @@ def _direction(table: Table, key: str) -> tuple[float, float, float] | None:
 
 
 def _path(table: Table, key: str, path: str) -> Path:
-    """Resolve a path relative to the folder of the robot file."""
+    """Return a path that is relative to the folder of the robot file."""
     if path.strip() in {"", ".", ".."}:
         raise table.bad(key, f"found {describe(path)}, expected the path of a file")
     return Path(table.file).parent / path
@@ -245,11 +244,11 @@ def link_table(link: Link, folder: Path | None = None) -> dict[str, Any]:
 
     Args:
         link: link of a robot.
-        folder: folder of the output file, to which paths are made relative; None to
-            leave paths unchanged.
+        folder: folder of the output file, to which paths are made relative; if None,
+            paths are not changed.
 
     Returns:
-        The ``link`` table, and ``up`` of the frame for a mesh with this direction.
+        The keys ``link`` and, for some meshes, ``up``.
     """
     if isinstance(link, MatrixLink):
         return {"link": {"stiffness": link.stiffness.tolist()}}

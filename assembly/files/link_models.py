@@ -1,14 +1,14 @@
-"""Link models that other distributions provide through entry points.
+"""Link models from other distributions.
 
-A distribution declares a function for a type of link::
+A distribution declares a function for a type of link as an entry point::
 
     [project.entry-points."forcefit.link_models"]
     cone = "their_package:cone"
 
-``cone(span, values)`` returns K_E (6, 6) [N m/rad .. N/m] at the end of the link, in
-the frame axes. ``span`` is the vector from the start of the link to its end (3,) [m],
-in the same axes, and ``values`` contains the numbers and texts specified in the robot
-file.  The function may raise ``BadInput``, whose message is shown to the user.
+``cone(span, values)`` returns the stiffness K_E at the end of the link in frame axes,
+(6, 6) [N m/rad .. N/m]. ``span`` is the vector from the start to the end of the link in
+frame axes, (3,) [m], and ``values`` contains the numbers and texts in the robot file.
+The message of a ``BadInput`` error that the function raises is shown to the user.
 """
 
 from typing import Any
@@ -29,10 +29,10 @@ def model_link(link: Table, span: NDArray) -> MatrixLink:
 
     Args:
         link: table of the link.
-        span: vector from the start of the link to its end (3,) [m], in the frame axes.
+        span: vector from the start to the end of the link in frame axes, (3,) [m].
 
     Returns:
-        Link with the stiffness computed by the model.
+        Link with the computed stiffness.
 
     Raises:
         BadInput: no installed distribution provides this model, it cannot be imported,
@@ -54,18 +54,18 @@ def model_link(link: Table, span: NDArray) -> MatrixLink:
 
 
 def _computed(compute: Any, words: str, span: NDArray, values: dict) -> NDArray:
-    """Compute and check the stiffness (6, 6) of a link model."""
+    """Compute and check the stiffness of a link model, (6, 6)."""
     found = naming_owner(compute, words)(span, values)
     try:
         K = np.asarray(found, dtype=float)
     except (TypeError, ValueError):
         raise BadInput(
-            f"{words} returned no array of numbers, expected a (6, 6) array"
+            f"{words} did not return an array of numbers, expected shape (6, 6)"
         ) from None
     if K.shape != (6, 6) or not np.isfinite(K).all():
         raise BadInput(
-            f"{words} returned an array of shape {K.shape}, expected (6, 6) of finite "
-            "numbers"
+            f"{words} returned an array of shape {K.shape}, expected finite numbers of "
+            "shape (6, 6)"
         )
     check_definite(f"{words}: stiffness", K)
     return K

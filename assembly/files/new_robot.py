@@ -1,7 +1,7 @@
 """Templates for robot files with ``format = 2``, used by ``forcefit new``.
 
-The letters in the name of a template denote the joints of a leg, starting at the base:
-revolute, prismatic, universal, spherical.  The first R or P is driven.
+The letters in the name of a template denote the joints of a leg from the base to the
+platform: revolute, prismatic, universal, spherical.  The first R or P joint is driven.
 """
 
 from collections.abc import Callable, Mapping
@@ -12,7 +12,7 @@ import numpy as np
 from forcefit.inputs.errors import BadInput, nearest, quoted
 
 MOST_LEGS = 12
-Vector = tuple[int, int, int]  # point [mm], or direction of arbitrary length
+Vector = tuple[int, int, int]  # point [mm] or direction vector
 
 
 @dataclass(frozen=True)
@@ -22,9 +22,9 @@ class Kind:
     Attributes:
         about: short description.
         legs: default number of legs.
-        step: the number of legs must be a multiple of this number.
+        step: divisor of the number of legs.
         platform: reference point of the platform [mm].
-        body: function that returns the text of the legs for a given number of legs.
+        body: function that returns the text of the legs for a number of legs.
     """
 
     about: str
@@ -35,7 +35,7 @@ class Kind:
 
 
 def new_robot(name: str, kind: str, legs: int | None = None) -> str:
-    """Return the text of a robot file as a starting point for a new robot.
+    """Return the text of a robot file, which can be changed to describe a new robot.
 
     Args:
         name: name of the robot.
@@ -43,10 +43,10 @@ def new_robot(name: str, kind: str, legs: int | None = None) -> str:
         legs: number of legs; None for the default number.
 
     Returns:
-        Text of a commented file with bodies and joints, which can be solved as it is.
+        Text of a valid file with bodies, joints and comments.
 
     Raises:
-        BadInput: the type is unknown, or does not support this number of legs.
+        BadInput: the type is unknown, or it does not support this number of legs.
     """
     if kind not in KINDS:
         raise BadInput(f"--kind: found {quoted(kind)}{nearest(kind, KINDS)}")
@@ -66,19 +66,19 @@ def new_robot(name: str, kind: str, legs: int | None = None) -> str:
 
 _HEAD = """\
 #:schema robot.schema.json
-# Editors complete this file after: forcefit schema robot > robot.schema.json
+# For completion in text editors, run: forcefit schema robot > robot.schema.json
 #
 #   forcefit assembly solve {name}.toml --load fz=-100
 #   forcefit assembly stiffness {name}.toml
 #   forcefit assembly show {name}.toml --figure {name}.png
 #
-# Points and directions are in the base's axes at home. Lengths are in m, or texts with
-# a unit: "240 mm". All numbers below are to be replaced by those of your robot.
+# Points and directions are in base axes in the home pose. Lengths are in m, or texts
+# with a unit: "240 mm". Replace all numbers below by those of your robot.
 format = 2
 name = "{name}"
 description = "{about}, {legs} legs"
 platform = "platform"
-platform_at = {at}           # its reported point
+platform_at = {at}           # reference point of the platform
 
 [[body]]
 name = "platform"
@@ -90,26 +90,26 @@ _LINK = (
     "link = {{ beam = {{ radius = {radius} }}, young = 2.1e11, poisson = 0.3, "
     "density = 7800 }}"
 )
-_BALL = 'clearance = { ball = "5 um" }    # the gap of the ball in its socket'
+_BALL = 'clearance = { ball = "5 um" }    # gap between ball and socket'
 _BORE = 'clearance = { radial = "5 um", length = "20 mm", axial = "5 um" }'
 _ROTARY = "drive_stiffness = 2e4            # N m/rad"
 _LINEAR = "drive_stiffness = 2e7            # N/m"
 
 
 def _lengths(point: Vector) -> str:
-    """Return the text of a point, in mm."""
+    """Return the text of a point in mm."""
     return "[" + ", ".join(f'"{x} mm"' if x else "0" for x in point) + "]"
 
 
 def _direction(vector: Vector) -> str:
-    """Return the text of a direction, reduced to small integers."""
+    """Return the text of a direction vector with small integer components."""
     x, y, z = (int(v) for v in np.array(vector) // np.gcd.reduce(vector))
     return f"[{x}, {y}, {z}]"
 
 
 def _leg(name: str, count: int, comment: str = "") -> str:
-    """Return the text at the start of a leg, which defines its copies."""
-    comment = comment or f"{name}1, {name}2, ...: copies about the vertical"
+    """Return the text that defines a leg and the number of its copies."""
+    comment = comment or f"copies {name}1, {name}2, ... rotated about z"
     return (
         f'[[leg]]\nname = "{name}"                     # {comment}\n'
         f"repeat = {{ count = {count}, about = [0, 0, 1] }}\n\n"
@@ -117,19 +117,19 @@ def _leg(name: str, count: int, comment: str = "") -> str:
 
 
 def _bodies(*names: str, **radii: str) -> str:
-    """Return the text of the bodies in a leg; bodies with a radius are elastic."""
+    """Return the text of the bodies of a leg; bodies with a radius are elastic."""
     text = ""
     for name in names:
         text += f'[[leg.body]]\nname = "{name}"\n'
         if name in radii:
-            text += "# elastic between its two joints\n"
+            text += "# elastic beam between its two joints\n"
             text += _LINK.format(radius=f'"{radii[name]}"') + "\n"
         text += "\n"
     return text
 
 
 def _joint(name: str, kind: str, between: str, at: Vector, *lines: str) -> str:
-    """Return the text of a joint in a leg; ``between`` contains two names."""
+    """Return the text of a joint between two bodies of a leg."""
     first, second = between.split()
     more = "".join(f"{line}\n" for line in lines)
     return (
@@ -139,7 +139,7 @@ def _joint(name: str, kind: str, between: str, at: Vector, *lines: str) -> str:
 
 
 def _axis(vector: Vector, key: str = "axis", comment: str = "") -> str:
-    """Return a line that specifies a direction."""
+    """Return a line of text that specifies a direction."""
     line = f"{key} = {_direction(vector)}"
     return f"{line:<33}# {comment}" if comment else line
 
@@ -157,7 +157,7 @@ def _cross(a: Vector, b: Vector) -> Vector:
 
 def _pairs(foot: Callable[[int], Vector], end: Callable[[int], Vector], legs: int,
            leg: Callable[[Vector, Vector], str]) -> str:  # fmt: skip
-    """Return the text of pairs of legs that are mirror images of each other."""
+    """Return the text of two legs that are mirror images, and their copies."""
     text = ""
     for name, side in (("left", 1), ("right", -1)):
         text += _leg(name, legs // 2) + leg(foot(side), end(side))
@@ -165,7 +165,7 @@ def _pairs(foot: Callable[[int], Vector], end: Callable[[int], Vector], legs: in
 
 
 def _ups(legs: int) -> str:
-    """Return the legs of a Gough platform."""
+    """Return the text of the legs of a Gough platform."""
 
     def leg(a: Vector, b: Vector) -> str:
         along = _minus(b, a)
@@ -186,7 +186,7 @@ def _ups(legs: int) -> str:
 
 
 def _rus(legs: int) -> str:
-    """Return legs with cranks, which are connected to the platform by rods."""
+    """Return the text of legs with a crank and a rod."""
 
     def leg(a: Vector, b: Vector) -> str:
         elbow = a[0] + 120, a[1], a[2]
@@ -208,7 +208,7 @@ def _rus(legs: int) -> str:
 
 
 def _upu(legs: int) -> str:
-    """Return the legs of Tsai's translational 3-UPU, which has parallel axes."""
+    """Return the text of the legs of Tsai's translational 3-UPU robot."""
     a, b, y = (240, 0, 0), (80, 0, 450), (0, 1, 0)
     along = _minus(b, a)
     inner = _cross(along, y)
@@ -227,7 +227,7 @@ def _upu(legs: int) -> str:
 
 
 def _prs(legs: int) -> str:
-    """Return legs with carriages on vertical rails, hinges and ball joints."""
+    """Return the text of legs with a vertical slide, a hinge and a ball joint."""
     hinge, ball = (400, 0, 0), (250, 0, -700)
     return (
         _leg("leg", legs)
@@ -240,7 +240,7 @@ def _prs(legs: int) -> str:
 
 
 def _rrr(legs: int) -> str:
-    """Return the legs of a planar robot, which moves in the x-y plane."""
+    """Return the text of the legs of a robot that moves in the x-y plane."""
     z = _axis((0, 0, 1))
     return (
         _leg("leg", legs)
@@ -253,7 +253,7 @@ def _rrr(legs: int) -> str:
 
 
 def _delta(legs: int) -> str:
-    """Return arms, each with two parallel rods between ball joints."""
+    """Return the text of arms with two parallel rods between ball joints."""
     elbow, end = (350, 0, -100), (50, 0, -600)
     text = (
         _leg("leg", legs)

@@ -59,7 +59,7 @@ from forcefit.stiffness.screws import rotation_matrix, rotation_vector
 
 Closing = Callable[[Robot], Robot]
 _LONGEST_NAME = 200  # [characters] maximum length of a name
-# maximum number of frames; with more frames, closing the loops would take minutes
+# maximum number of frames, with which closing the loops takes less than minutes
 MOST_FRAMES = 2000
 
 
@@ -68,13 +68,12 @@ def read_robot(path: Path | str, close: Closing | None = None) -> Robot:
 
     Args:
         path: ``.toml`` file in the public format.
-        close: function that closes the loops of the declared robot; None if they are
+        close: function that closes the loops of the robot in the file; None if they are
             already closed.
 
     Returns:
-        Robot whose nominal loops are closed in the home pose.  Link meshes and
-        libraries are not read; see
-        :func:`forcefit.assembly.files.solved_links.solve_links`.
+        Robot with closed nominal loops in the home pose.  Link meshes and libraries are
+        read later by :func:`forcefit.assembly.files.solved_links.solve_links`.
 
     Raises:
         BadInput: the file violates a rule of the format, or a loop is not closed.
@@ -83,15 +82,15 @@ def read_robot(path: Path | str, close: Closing | None = None) -> Robot:
 
 
 def robot_of(root: Table, name: str, close: Closing | None = None) -> Robot:
-    """Return the robot described by the root table of a robot file.
+    """Return the robot that the root table of a robot file describes.
 
     Args:
         root: root table, in which paths are relative to the folder of ``root.file``.
-        name: name of the robot, if the table does not specify one.
-        close: see :func:`read_robot`.
+        name: default name of the robot.
+        close: function that closes the loops; see :func:`read_robot`.
 
     Returns:
-        Robot whose nominal loops are closed in the home pose.
+        Robot with closed nominal loops in the home pose.
 
     Raises:
         BadInput: the table violates a rule of the format, or a loop is not closed.
@@ -100,21 +99,21 @@ def robot_of(root: Table, name: str, close: Closing | None = None) -> Robot:
     try:
         robot = robot if close is None else close(robot)
         home = home_posture(robot)
-        place_callouts(home)  # checks the callouts against the nominal geometry
+        place_callouts(home)  # raises BadInput if callouts do not fit the geometry
         return with_spans(robot, home.coordinates)
     except BadInput as error:
         raise BadInput(f"{root.file}: {error}") from None
 
 
 def declared_robot(root: Table, name: str) -> Robot:
-    """Return the robot as written in a root table, without closing its loops.
+    """Return the robot that a root table describes, without closing its loops.
 
     Args:
         root: root table of a robot file.
-        name: name of the robot, if the table does not specify one.
+        name: default name of the robot.
 
     Returns:
-        Robot whose beam lengths may still be unknown.
+        Robot, in which the lengths of beams may be unknown.
 
     Raises:
         BadInput: the table violates a rule of the format.
@@ -139,7 +138,7 @@ def declared_robot(root: Table, name: str) -> Robot:
 
 
 def _drawn(root: Table, name: str, description: str) -> Robot:
-    """Return the robot described by a file with bodies and joints."""
+    """Return the robot in a file of format 2 (bodies and joints)."""
     drawing = read_drawing(root, name, description)
     root.finish()
     try:
@@ -153,10 +152,10 @@ def _drawn(root: Table, name: str, description: str) -> Robot:
 
 
 def _framed(root: Table, name: str, description: str) -> Robot:
-    """Return the robot described by a file with frames and closures."""
+    """Return the robot in a file of format 1 (frames and closures)."""
     platform = root.text("platform", expected="the name of a frame")
     tables = root.tables("frame"), root.tables("closure")
-    root.tables("tolerance")  # marked as read; parsed when all frames are known
+    root.tables("tolerance")  # read later, when all frames are known
     root.finish()
     if not 0 < len(tables[0]) <= MOST_FRAMES:
         fault = f"found {len(tables[0])}" if tables[0] else "missing"
@@ -183,7 +182,7 @@ def _framed(root: Table, name: str, description: str) -> Robot:
 
 
 def _learned_range(root: Table) -> dict[str, tuple[float, float]]:
-    """Return the range of each variable in the identification data."""
+    """Return the range of each variable in the data for identification."""
     ranges: dict[str, tuple[float, float]] = {}
     if not root.has("learned_range"):
         return ranges
@@ -199,7 +198,7 @@ def _learned_range(root: Table) -> dict[str, tuple[float, float]]:
 
 
 def _reference_point(root: Table) -> tuple[float, float, float] | None:
-    """Return the point at which the robot was identified, or None."""
+    """Return the reference point of the measurements for identification, or None."""
     if not root.has("reference_point"):
         return None
     x, y, z = root.array("reference_point", (3,), "m", largest=LARGEST_LENGTH).tolist()
@@ -207,8 +206,8 @@ def _reference_point(root: Table) -> tuple[float, float, float] | None:
 
 
 def _diagnosis(root: Table) -> dict[str, Any]:
-    """Return the diagnosis recorded in the file, with an absolute covariance path."""
-    # texts, numbers and lists are preserved unchanged
+    """Return the diagnosis in the file, with the absolute path of the covariance."""
+    # texts, numbers and lists are not interpreted
     content: dict[str, Any] = {}
     if root.has("diagnosis"):
         table = root.table("diagnosis")
@@ -228,7 +227,7 @@ def _diagnosis(root: Table) -> dict[str, Any]:
 
 
 def _is_record(value: object) -> bool:
-    """Return whether a value is a string, finite number, boolean or list of these."""
+    """Return whether a value is a text, finite number, boolean, or a list of these."""
     if isinstance(value, list):
         return all(_is_record(one) for one in value)
     if isinstance(value, float):
@@ -238,21 +237,20 @@ def _is_record(value: object) -> bool:
 
 def _remarks(tables: list[Table]) -> tuple[str, ...]:
     """Return a remark on frames with ``dh`` but without ``alpha``."""
-    # other missing parameters are usually meant to be zero, but a forgotten alpha
-    # changes the robot
+    # alpha is rarely zero, in contrast to the other parameters
     dh = {table.content["name"]: table.content.get("dh") for table in tables}
     without_alpha = [
         quoted(name) for name, given in dh.items() if given and "alpha" not in given
     ]
     if not without_alpha:
         return ()
-    return (f"dh without alpha, taken as 0: {', '.join(without_alpha)}",)
+    return (f"dh without alpha, which is set to 0: {', '.join(without_alpha)}",)
 
 
 def _fitted_ends(tables: list[Table]) -> dict[str, FittedEnd]:
-    """Return the fits that determine a rotation bound, by frame.
+    """Return the fits that determine a bound on a rotation, by frame.
 
-    Fits of the same parts must be equal.
+    Fits between the same components must be equal.
     """
     ends: dict[str, FittedEnd] = {}
     fits: dict[str, str] = {}
@@ -261,8 +259,8 @@ def _fitted_ends(tables: list[Table]) -> dict[str, FittedEnd]:
         name = table.content["name"]
         parts = name if end is None else end.parts
         if fit and fits.setdefault(parts, fit) != fit:
-            found = f"found {quoted(fit)} of the parts {quoted(parts)}"
-            expected = f"expected {quoted(fits[parts])} as for an earlier frame"
+            found = f"found {quoted(fit)} for the parts {quoted(parts)}"
+            expected = f"expected {quoted(fits[parts])} as at an earlier frame"
             raise table.table("clearance").bad("fit", f"{found}, {expected}")
         if end is not None:
             ends[name] = end
@@ -270,7 +268,7 @@ def _fitted_ends(tables: list[Table]) -> dict[str, FittedEnd]:
 
 
 def _fit_remarks(robot: Robot) -> tuple[str, ...]:
-    """Return a remark on the mean clearances that are used for fits."""
+    """Return a remark on the mean radial clearances of fits."""
     texts = []
     for name, text in fits_by_parts(robot).items():
         fit = parse_fit(text)
@@ -330,13 +328,13 @@ def _frame(table: Table) -> Frame:
 
 
 def _numbers(table: Table, key: str, count: int, unit: str) -> NDArray:
-    """Return an array of lengths or angles; zeros if the key is absent."""
+    """Return an array of lengths or angles, which is zero by default."""
     zero = np.zeros(count)
     return table.array(key, (count,), unit, zero, largest=LARGEST_LENGTH)
 
 
 def _drive_force(table: Table, passive: bool) -> float:
-    """Return the drive force on a passive joint, 0 by default."""
+    """Return the drive force on a passive joint, which is 0 by default."""
     if table.has("drive_force") and not passive:
         fault = f"found a force on a joint that is not passive; {FORCE_CONTROL}"
         raise table.bad("drive_force", fault)
@@ -366,7 +364,7 @@ def _tolerance(table: Table) -> NDArray | None:
 
 
 def _placement(table: Table) -> tuple[NDArray, NDArray]:
-    """Return the translation and rotation vector, given directly or by ``dh``."""
+    """Return the translation and rotation vector of a frame."""
     given = [key for key in ("translation", "rotation") if table.has(key)]
     if not table.has("dh"):
         return (
@@ -405,7 +403,7 @@ def _closure(table: Table, names: list[str]) -> tuple[str, str]:
 
 
 def _check_known(table: Table, key: str, name: str, names: list[str]) -> None:
-    """Check that a name is the name of a frame."""
+    """Check that a frame with a given name exists."""
     if name == BASE:
         message = (
             'found "base"; expected a frame (add a fixed frame with parent "base")'
@@ -418,7 +416,7 @@ def _check_known(table: Table, key: str, name: str, names: list[str]) -> None:
 
 
 def _check_meeting_frames(robot: Robot) -> None:
-    """Check that frames at which chains meet have rigid joints."""
+    """Check that the frames of closures and of the platform are rigidly connected."""
     meeting = {"platform": [robot.platform]}
     for number, pair in enumerate(robot.closures, 1):
         meeting[f"closure[{number}].frames"] = list(pair)
@@ -440,11 +438,11 @@ def write_robot(robot: Robot, path: Path | str) -> None:
 
     Args:
         robot: robot to write.
-        path: path of the output file, to whose folder relative paths of meshes and
-            libraries refer.
+        path: path of the output file.  Paths of meshes and libraries are made relative
+            to its folder.
 
     Raises:
-        BadInput: the file cannot be written, or a file exists that was not written by
+        BadInput: the file cannot be written, or the existing file was not written by
             this function and may contain comments.
     """
     check_writable(path, ROBOT)
@@ -466,7 +464,7 @@ def robot_table(robot: Robot, folder: Path | None = None) -> dict[str, Any]:
         folder: folder of the output file, to which paths are made relative.
 
     Returns:
-        Plain values, from which :func:`robot_of` reads the same robot.
+        Keys and values, from which :func:`robot_of` reads the same robot.
     """
     table = root_table(robot, folder)
     table["frame"] = [frame_table(frame, folder) for frame in robot.frames]
@@ -483,7 +481,7 @@ def robot_table(robot: Robot, folder: Path | None = None) -> dict[str, Any]:
 
 
 def _write_fit(clearance: dict[str, Any], robot: Robot, name: str) -> None:
-    """Replace the mean clearance at a frame by the fit that defines it."""
+    """Replace the mean clearance at a frame by its fit."""
     end = robot.fitted_ends.get(name)
     del clearance["radial" if end is None else end.bound]
     clearance["fit"] = robot.fits[name]
@@ -493,14 +491,14 @@ def _write_fit(clearance: dict[str, Any], robot: Robot, name: str) -> None:
 
 
 def root_table(robot: Robot, folder: Path | None = None) -> dict[str, Any]:
-    """Return the content of a robot file except for its frames and closures.
+    """Return the content of a robot file without frames and closures.
 
     Args:
         robot: robot to write.
         folder: folder of the output file, to which paths are made relative.
 
     Returns:
-        Plain values.
+        Keys and values.
     """
     table: dict[str, Any] = {"name": robot.name}
     if robot.description:
@@ -519,14 +517,14 @@ def root_table(robot: Robot, folder: Path | None = None) -> dict[str, Any]:
 
 
 def frame_table(frame: Frame, folder: Path | None = None) -> dict[str, Any]:
-    """Return the content of a ``[[frame]]`` table, omitting default values.
+    """Return the content of a ``[[frame]]`` table without default values.
 
     Args:
         frame: frame of a robot.
         folder: folder of the output file, to which paths are made relative.
 
     Returns:
-        Keys and plain values in the file format.
+        Keys and values in the file format.
     """
     table: dict[str, Any] = {"name": frame.name, "parent": frame.parent}
     table["translation"] = frame.translation.tolist()

@@ -24,7 +24,9 @@ from forcefit.stiffness.surface.surface import UNITS
 
 _DIRECTION = number("direction", "1", "axis")
 _POINT = number("point", "m", "axis")
-_INERTIA = number("Ixx, Iyy, Izz, Ixy, Ixz, Iyz at the centre", "kg m^2", "moment")
+_INERTIA = number(
+    "Ixx, Iyy, Izz, Ixy, Ixz, Iyz about the centre of mass", "kg m^2", "moment"
+)
 _INTERFACE = Either((
     text('interface, such as "z=0.452"'),
     record(
@@ -35,8 +37,8 @@ _INTERFACE = Either((
 ))  # fmt: skip
 _BEAM = record(
     theory_=Words(("timoshenko", "euler")), length_=number("length", "m"),
-    axis_=number("axis, this frame's axes", "1", "axis"),
-    up_=number("direction of the height, this frame's axes", "1", "axis"),
+    axis_=number("axis in the axes of this frame", "1", "axis"),
+    up_=number("direction of the height in the axes of this frame", "1", "axis"),
     radius_=number("radius", "m"), inner_radius_=number("inner radius", "m"),
     width_=number("width", "m"), height_=number("height", "m"),
     area_=number("area", "m^2"),
@@ -49,8 +51,8 @@ _BEAM = record(
 _MESH = record(
     surface=text("file of the surface: STL, OBJ, PLY, VTK, MSH or STEP"),
     base=_INTERFACE, tip=_INTERFACE, unit_=Words((*UNITS,)),
-    up_=number("direction that is the frame's up, mesh axes", "1", "axis"),
-    axis_=number("direction from base to tip, this frame's axes", "1", "axis"),
+    up_=number('direction "up" of the frame in mesh axes', "1", "axis"),
+    axis_=number("direction from base to tip in the axes of this frame", "1", "axis"),
     interface_=Words(("rigid", "distributing")),
 )  # fmt: skip
 _STIFFNESS = number("stiffness", "N m/rad .. N/m", "screw", "wrench_component")
@@ -63,8 +65,8 @@ _LINK = record(
     ))),
     young_=number("Young's modulus", "Pa"), poisson_=number("Poisson's ratio"),
     density_=number("density", "kg/m^3"), up_=_DIRECTION,
-    pieces_=number("springs in series of a beam"),
-    parts_=text("solids of other materials", "part"),
+    pieces_=number("number of springs in series for a beam"),
+    parts_=text("solids made of other materials", "part"),
 )  # fmt: skip
 _LOCKED_AT = Either((
     Words(("home",)),
@@ -72,14 +74,14 @@ _LOCKED_AT = Either((
            joints_=Each(number("coordinate of a drive", "rad or m")),
            left_=Words(LEFT)),
 ))  # fmt: skip
-_FIT = text('fit of ISO 286 in place of radial, such as "12 H7/g6"')
+_FIT = text('ISO 286 fit instead of "radial", such as "12 H7/g6"')
 _CLEARANCE = record(
     radial_=number("radial clearance", "m"), axial_=number("axial clearance", "m"),
     tilt_=number("tilt clearance", "rad"), spin_=number("clearance about z", "rad"),
-    ball_=number("clearance of a ball in its socket", "m"),
+    ball_=number("clearance between ball and socket", "m"),
     fit_=_FIT,
-    length_=number("length of the bore, or distance of two bearings", "m"),
-    parts_=text("name of the hole and the shaft of a fit with length"),
+    length_=number("length of the bore, or distance between two bearings", "m"),
+    parts_=text("common name of the hole and shaft of a fit"),
     bound_=Words(("tilt", "spin")),
 )  # fmt: skip
 _FRAME = record(
@@ -92,9 +94,9 @@ _FRAME = record(
         alpha_=number("Denavit-Hartenberg alpha", "rad"),
     ),
     joint_=Words((*JOINTS,)), actuated_=flag("actuated"),
-    pitch_=number("translation of a helical joint in a turn", "m"),
-    position_=number("coordinate at home", "rad or m"),
-    limits_=number("least and largest coordinate", "rad or m", "bound"),
+    pitch_=number("translation of a helical joint per turn", "m"),
+    position_=number("coordinate in the home pose", "rad or m"),
+    limits_=number("minimum and maximum coordinate", "rad or m", "bound"),
     geometric_error_="geometric_error",
     tolerance_=number("standard deviations of the geometric error", "rad, m", "screw"),
     clearance_=_CLEARANCE,
@@ -102,35 +104,37 @@ _FRAME = record(
     joint_stiffness_=Either((
         number("diagonal stiffness", "N m/rad .. N/m", "screw"), _STIFFNESS,
     )),
-    drive_force_=number("force of a drive on a passive joint", "N m or N"),
+    drive_force_=number("drive force on a passive joint", "N m or N"),
     link_=_LINK, up_=_DIRECTION, mass_=number("mass", "kg"),
     centre_of_mass_=number("centre of mass", "m", "axis"), inertia_=_INERTIA,
 )  # fmt: skip
 _WIDTH = Either((number("width", "m"), text('width, such as "0.05 mm"')))
 _CALLOUT = record(
-    feature=text("frame, or joint of the body"), name_=text("name in tables"),
+    feature=text("frame, or joint of the body"), name_=text("name in reports"),
     **{f"{word}_": _WIDTH for word in (*LOCATIONS, *ORIENTATIONS)},
     extent_=Either((_WIDTH, Listed(_WIDTH))), diameter_=_WIDTH,
     hole_=text('size of a hole with (M), such as "12 H7"'),
     direction_=_DIRECTION, length_=text('length, such as "452 +- 0.1 mm"'),
     general_=text('"ISO 2768-mK"'), distribution_=Words((*DISTRIBUTIONS,)),
-    cp_=number("capability of a normal distribution"),
+    cp_=number("process capability index of a normal distribution"),
 )  # fmt: skip
 _OF_FRAME_FEATURE = record(
-    "", _CALLOUT, after_=flag("feature after the joint"), shape_=Words((*SHAPES,)),
+    "", _CALLOUT, after_=flag("feature on the child body of the joint"),
+    shape_=Words((*SHAPES,)),
     axis_=_DIRECTION, at_=_POINT,
     datums=Listed(Either((
         text("frame"),
         record(frame=text("frame"), shape_=Words((*HELD,)), axis_=_DIRECTION,
-               at_=_POINT, hole_=text("size of a hole at maximum material"),
-               hole_of_=text("its fit or joint"),
-               extent_=number("length of this hole as datum A", "m")),
+               at_=_POINT, hole_=text("size of a hole with (M)"),
+               hole_of_=text("fit or joint of the hole"),
+               extent_=number("length of the hole as datum A", "m")),
     ))),
     hole_of_=text("fit or joint of the hole"),
 )  # fmt: skip
 _OF_BODY_FEATURE = record(
-    "", _CALLOUT, datums=text('joints, A first; "B (M)" at maximum material', "joint"),
-    datum_hole_=text('size of the datum with (M), such as "12 H7"'),
+    "", _CALLOUT,
+    datums=text('joints in the order A, B, C; "B (M)" for maximum material', "joint"),
+    datum_hole_=text('size of the datum hole with (M), such as "12 H7"'),
     datum_extent_=_WIDTH,
     flatness_=_WIDTH, cylindricity_=_WIDTH,
 )  # fmt: skip
@@ -145,20 +149,22 @@ _EFFECT = record(
 _COMMON = record(
     name_=text("name of the robot"), description_=text("description"),
     effect_=Listed(_EFFECT),
-    learned_range_=Each(number("least and largest value", "", "bound")),
+    learned_range_=Each(number("minimum and maximum value", "", "bound")),
     reference_point_="reference_point", diagnosis_=Each(Anything()),
-    covariance_=text("file of the covariance"),
+    covariance_=text("path of the covariance file"),
 )  # fmt: skip
 _OF_FRAMES = record(
-    "", _COMMON, format_=Words((1,)), platform=text("name of the platform's frame"),
+    "", _COMMON, format_=Words((1,)), platform=text("name of the platform frame"),
     frame=Listed(_FRAME),
-    closure_=Listed(record(frames=text("two frames that meet", "frame"))),
+    closure_=Listed(record(frames=text("two frames that coincide", "frame"))),
     tolerance_=Listed(_OF_FRAME_FEATURE),
 )  # fmt: skip
-_GAP = number("gap from the middle to one side", "m")
+_GAP = number("gap on each side in the centred position", "m")
 _CONTACTS = record(
     "", _CLEARANCE,
-    bearings_=Listed(record(z=number("height", "m"), radial_=_GAP, fit_=_FIT)),
+    bearings_=Listed(
+        record(z=number("position along z", "m"), radial_=_GAP, fit_=_FIT)
+    ),
     guide_=record(
         gap_=Either((_GAP, number("gaps along x and y", "m", "axis"))),
         fit_=Either((_FIT, Listed(_FIT))),
@@ -170,7 +176,7 @@ _CONTACTS = record(
         width=number("width along y", "m"),
     ),
 )  # fmt: skip
-# each of the two bearings in a universal joint can have its own value
+# a universal joint can have different values for its two bearings
 _OF_JOINT = record(**{
     f"{key}_": Either((one, Listed(one)))
     for key, one in (
@@ -185,7 +191,7 @@ _PIECE = record(
     up_=_DIRECTION, section_=_BEAM, tip_section_=_BEAM,
 )  # fmt: skip
 _BODY = record(
-    name=text("name"), mass_=number("mass in addition to the link's", "kg"),
+    name=text("name"), mass_=number("mass in addition to that of the link", "kg"),
     centre_=_POINT,
     inertia_=_INERTIA,
     link_=record(
@@ -198,19 +204,20 @@ _BODY = record(
 _JOINT = record(
     "", _OF_JOINT, name=text("name"), type=Words((*FREE_ROWS,)),
     between=text("two bodies", "body"), at=_POINT, axis_=_DIRECTION, axis2_=_DIRECTION,
-    pitch_=number("translation of a helical joint in a turn", "m"),
-    actuated_=flag("actuated"), position_=number("coordinate at home", "rad or m"),
-    limits_=number("least and largest coordinate", "rad or m", "bound"),
+    pitch_=number("translation of a helical joint per turn", "m"),
+    actuated_=flag("actuated"),
+    position_=number("coordinate in the home pose", "rad or m"),
+    limits_=number("minimum and maximum coordinate", "rad or m", "bound"),
     drive_stiffness_=number("stiffness of the drive", "N m/rad or N/m"),
     locked_at_=_LOCKED_AT,
 )  # fmt: skip
 _LEG = record(
     name=text("name"),
-    repeat_=record(count=count("copies"), about=_DIRECTION, at_=_POINT),
+    repeat_=record(count=count("number of copies"), about=_DIRECTION, at_=_POINT),
     body_=Listed(_BODY), joint_=Listed(_JOINT),
 )  # fmt: skip
 _OF_BODIES = record(
-    "", _COMMON, format_=Words((2,)), platform=text("name of the platform's body"),
+    "", _COMMON, format_=Words((2,)), platform=text("name of the platform body"),
     platform_at_=_POINT, body_=Listed(_BODY), leg_=Listed(_LEG), joint_=Listed(_JOINT),
     tolerance_=Listed(_OF_BODY_FEATURE),
 )  # fmt: skip

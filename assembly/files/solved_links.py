@@ -1,7 +1,7 @@
-"""Stiffness of links given by a mesh or a library, computed when a robot is loaded.
+"""Stiffness of links that are described by a mesh or a library.
 
-The loaded robot contains all link data that solvers require, so that solvers neither
-read files nor run finite elements.
+The stiffness is computed when a robot is loaded, so that solvers do not read files or
+solve finite-element models.
 """
 
 import hashlib
@@ -26,23 +26,23 @@ if TYPE_CHECKING:
 
 _LOG = logging.getLogger("forcefit.links")
 _CACHE = logging.getLogger("forcefit.cache")
-# links with the same shape and material are solved only once per process
+# solutions in this process, by the key of their shape and material
 _SOLVED: dict[str, MeshSolution] = {}
 
 
 def solve_links(robot: Robot) -> Robot:
-    """Compute the stiffness of all links given by a mesh or a library.
+    """Compute the stiffness of all links that are described by a mesh or a library.
 
     Args:
-        robot: robot read from a file or created in Python.
+        robot: robot from a file or created in Python.
 
     Returns:
-        Robot that solvers can use; the same object if it has no such links.
+        Robot for solvers; the same object if it has no such links.
 
     Raises:
         BadInput: a file is unreadable or unusable, or an interface is invalid.
     """
-    # libraries come first, so that their errors are reported before finite elements run
+    # libraries are read first to report their errors without a long computation
     frames = [
         frame
         for frame in sorted(robot.frames, key=lambda f: isinstance(f.link, MeshLink))
@@ -70,8 +70,8 @@ def solved_link(frame: Frame, accuracy: float = 0.005) -> Link:
 
     Args:
         frame: frame with a mesh or library link.
-        accuracy: required accuracy of the finite elements: error of each entry of K_E
-            relative to sqrt(K_ii K_jj).
+        accuracy: accepted finite-element error of each entry of K_E relative to
+            sqrt(K_ii K_jj).
 
     Returns:
         Link with its stiffness.
@@ -96,7 +96,7 @@ def solved_link(frame: Frame, accuracy: float = 0.005) -> Link:
 
 
 def _from_library(link: LibraryLink) -> LibraryLink:
-    """Return the link with the compliance of its library entry."""
+    """Read the compliance of a link from a library."""
     from forcefit.stiffness.report.library import read_compliance
 
     C = read_compliance(link.library, link.key)
@@ -105,7 +105,7 @@ def _from_library(link: LibraryLink) -> LibraryLink:
 
 
 def _solution(frame: Frame, link: MeshLink, accuracy: float) -> MeshSolution:
-    """Return the finite-element solution of a mesh link, cached in this process."""
+    """Return the finite-element solution of a mesh link, if possible from a cache."""
     from forcefit.stiffness.fem.fea import FemOptions
     from forcefit.stiffness.surface.surface_files import named_solid
 
@@ -126,7 +126,7 @@ def _solution(frame: Frame, link: MeshLink, accuracy: float) -> MeshSolution:
 def _solve(
     frame: Frame, link: MeshLink, digest: str, options: "FemOptions"
 ) -> MeshSolution:
-    """Mesh a link's surface and solve it by finite elements."""
+    """Mesh the surface of a link and solve the finite-element model."""
     from forcefit.stiffness.fem.fea import interface_center, solve_link
     from forcefit.stiffness.fem.material import Material
     from forcefit.stiffness.fem.part_text import parse_part
@@ -138,7 +138,7 @@ def _solve(
     ends = parse_interface(link.base, "base"), parse_interface(link.tip, "tip")
     base = interface_center(surface, ends[0], "base")
     tip = interface_center(surface, ends[1], "tip")
-    # checked before running the finite elements, which take longer
+    # this check is faster than the finite-element solution
     _check_place(frame, link, tip - base)
     material = Material(link.young, link.poisson, link.density or 0.0)
     parts = [parse_part("parts", text) for text in link.parts]
@@ -149,7 +149,7 @@ def _solve(
 
 
 def _as_stored(solved: "MeshedLink") -> "MeshedLink":
-    """Remove the surface from a solution, because only mesh refinement requires it."""
+    """Remove the surface from a solution, which only mesh refinement requires."""
     solid = replace(solved.level.solid, walls={}, surface=None)
     return replace(solved, level=replace(solved.level, solid=solid))
 
@@ -164,7 +164,7 @@ def _digest(path: Path) -> str:
 
 
 def _check_place(frame: Frame, link: MeshLink, mesh_span: NDArray) -> None:
-    """Check that the distance between the interfaces matches that of the origins."""
+    """Check that the vector between interfaces equals that between frame origins."""
     try:
         section_axes(mesh_span, link.up)
     except BadInput as error:
@@ -181,5 +181,5 @@ def _check_place(frame: Frame, link: MeshLink, mesh_span: NDArray) -> None:
 
 
 def _point(p: NDArray) -> str:
-    """Format a point for a message."""
+    """Return the text of a point for a message."""
     return "(" + ", ".join(f"{x:.6g}" for x in p) + ") m"

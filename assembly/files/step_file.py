@@ -1,4 +1,4 @@
-"""Reading of assembly plans, which list assembly steps (``docs/assembly_steps.md``)."""
+"""Reading of assembly plans with assembly steps (``docs/assembly_steps.md``)."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -48,14 +48,14 @@ _NAMES = Listed(Words(_COMPONENTS))
 _POSITION = Each(number("displacement", "rad or m"))
 _STEP = record(
     name_=text("name of the step"),
-    fix_=text("frame that a fixture holds"), join_=_PART,
+    fix_=text("frame that is fixed by a fixture"), join_=_PART,
     clamp_=text("frame that is clamped"), preload_=text("frame that is loaded"),
     release_=Either((text("name of a step"), text("names of steps", "step"))),
     measure_=_PART, adjust_=text("frame whose geometric error is changed"),
     at_=_POSITION, stiffness_=Each(number("stiffness", "N m/rad or N/m")),
-    locked_=Either((flag("bolted as it lies"), _NAMES)),
-    force_limit_=number("largest closing force", "N"),
-    leave_open_=flag("leave the opening that the limit does not close"),
+    locked_=Either((flag("bolted in the current position"), _NAMES)),
+    force_limit_=number("maximum closing force", "N"),
+    leave_open_=flag("permit a gap that remains at the maximum force"),
     load_=Each(number("load", "N m or N")), components_=_NAMES,
     reading_=_PART, of_=_NAMES, increment_=number("increment", "rad or m"),
 )  # fmt: skip
@@ -73,17 +73,17 @@ def assemble_in_steps(
     Args:
         plan: assembly plan, or a TOML file with ``[[step]]`` tables.
         posture: posture in which the robot with n frames is assembled.
-        errors: geometric errors of k machines (k, n, 6) [rad, m]; None to use the
-            errors in the robot file.
-        gravity: gravity in base axes (3,) [m/s^2], which acts from the first step on.
-            Parts that are not held yet do not move under gravity.
+        errors: geometric errors of k machines, (k, n, 6) [rad, m]; None for the errors
+            in the robot file.
+        gravity: gravity in base axes, (3,) [m/s^2], which acts in all steps.  Bodies
+            without a fixture or joint do not move under gravity.
 
     Returns:
         Results of the steps, in order.
 
     Raises:
-        BadInput: the file violates a rule, or the plan does not match the robot.
-        CannotAssemble: the constraints on rigid parts contradict each other.
+        BadInput: the file is invalid, or the plan does not match the robot.
+        CannotAssemble: the constraints on rigid bodies contradict each other.
         FreeMotion: a load acts along a motion without resistance.
         SolverFailed: the clearance solver did not converge.
     """
@@ -92,7 +92,7 @@ def assemble_in_steps(
 
 
 def read_steps(path: Path | str, robot: Robot) -> Plan:
-    """Read an assembly plan and check it against a robot.
+    """Read an assembly plan and check that it matches a robot.
 
     Args:
         path: TOML file with ``[[step]]`` tables.
@@ -102,7 +102,7 @@ def read_steps(path: Path | str, robot: Robot) -> Plan:
         Assembly plan.
 
     Raises:
-        BadInput: the file violates a rule, or the plan does not match the robot.
+        BadInput: the file is invalid, or the plan does not match the robot.
     """
     root = read_toml(path)
     tables = root.tables("step")
@@ -119,7 +119,7 @@ def read_steps(path: Path | str, robot: Robot) -> Plan:
 
 
 def _named(steps: list[Step], tables: list[Table]) -> tuple[Step, ...]:
-    """Append numbers to repeated default names of steps."""
+    """Append numbers to default names of steps that are not unique."""
     count: dict[str, int] = {}
     named = []
     for step, table in zip(steps, tables, strict=True):
@@ -135,7 +135,7 @@ def _step(table: Table, robot: Robot) -> Step:
     given = [kind for kind in KINDS if table.has(kind)]
     if not given:
         for key in _STEP.content:
-            table.has(key)  # so that finish refuses only misspelt keys
+            table.has(key)  # so that ``finish`` rejects only unknown keys
         table.finish()
     if len(given) != 1:
         found = f"found {' and '.join(given)}" if given else "found no type of step"
@@ -148,14 +148,14 @@ def _step(table: Table, robot: Robot) -> Step:
 
 
 def _name(table: Table, kind: str) -> str:
-    """Return the name of a step, by default its type and the parts it acts on."""
+    """Return the name of a step, which is its type and frames by default."""
     value = table.content[kind]
     parts = value if isinstance(value, list) else [value]
     return table.text("name", f"{kind} {' - '.join(map(str, parts))}", longest=400)
 
 
 def _fix(table: Table, name: str, robot: Robot) -> Fix:
-    """Read a step that fixes a frame, by default at its nominal position."""
+    """Read a step that fixes a frame by a fixture."""
     position = _values(table, "at", "rad or m")
     if position is None:
         position = dict.fromkeys(SCREW, 0.0)
@@ -163,7 +163,7 @@ def _fix(table: Table, name: str, robot: Robot) -> Fix:
 
 
 def _clamp(table: Table, name: str, robot: Robot) -> Step:
-    """Read a step that clamps a frame: in place, at a position, or by a force."""
+    """Read a step that clamps a frame at a position or by a force."""
     frame = _frame(table, "clamp", robot)
     if not table.has("load"):
         position = _values(table, "at", "rad or m")
@@ -174,16 +174,14 @@ def _clamp(table: Table, name: str, robot: Robot) -> Step:
 
 
 def _held(table: Table, fix: Fix) -> Fix:
-    """Add the stiffness specified in the table to a fixture."""
+    """Add the stiffness in a table to a fixture."""
     stiffness = _values(table, "stiffness", "N m/rad or N/m") or {}
     for component, value in stiffness.items():
         if not 0 < value <= LARGEST:
             fault = f"found {value:g}, expected a number > 0, at most {LARGEST:g}"
             raise table.bad(f"stiffness.{component.lower()}", fault)
         if fix.position is not None and component not in fix.position:
-            fault = (
-                'found a component that "at" leaves free, expected a fixed component'
-            )
+            fault = 'found a component that is not in "at", expected a fixed component'
             raise table.bad(f"stiffness.{component.lower()}", fault)
     return replace(fix, stiffness=stiffness)
 
@@ -210,12 +208,12 @@ def _join(table: Table, name: str, robot: Robot) -> Join:
 
 
 def _preload(table: Table, name: str, robot: Robot) -> Preload:
-    """Read a step that applies a load, which acts until it is released."""
+    """Read a step that applies a load."""
     return Preload(name, _frame(table, "preload", robot), _wrench(table))
 
 
 def _release(table: Table, name: str, robot: Robot) -> Release:
-    """Read a step that releases fixtures, clamps or loads of previous steps."""
+    """Read a step that releases fixtures, clamps or loads from previous steps."""
     value = table.require("release", "the name of an earlier step, or a list of them")
     names = value if isinstance(value, list) else [value]
     if not names or not all(isinstance(n, str) for n in names):
@@ -231,7 +229,7 @@ def _measure(table: Table, name: str, robot: Robot) -> Measure:
 
 
 def _adjust(table: Table, name: str, robot: Robot) -> Adjust:
-    """Read an adjustment step and the reading that it minimises."""
+    """Read an adjustment step, which minimises a measured deviation."""
     components = _names(table, "components")
     reading = _part(table, "reading", robot)
     of: tuple[str, ...] = SCREW
@@ -257,7 +255,7 @@ _READERS: dict[str, Callable[[Table, str, Robot], Step]] = {
 
 
 def _frame(table: Table, key: str, robot: Robot) -> str:
-    """Return the name of a frame, or of the main frame of a joint."""
+    """Read the name of a frame, or of a joint, which has a main frame."""
     name = table.text(key, expected="the name of a frame")
     names = names_of(robot)
     if name not in names:
@@ -271,11 +269,7 @@ def _frame(table: Table, key: str, robot: Robot) -> str:
 
 
 def _part(table: Table, key: str, robot: Robot) -> tuple[str, str] | str:
-    """Return a frame, or a closure given by two frames in either order.
-
-    For a closure that completes a joint, the joint may be given instead of its last
-    frame, for example ``ball`` instead of ``ball.end``.
-    """
+    """Read a frame, or a closure that is specified by two frames or joints."""
     value = table.require(key, "a frame, or the two frames of a closure")
     if isinstance(value, str):
         return _frame(table, key, robot)
@@ -292,7 +286,7 @@ def _part(table: Table, key: str, robot: Robot) -> tuple[str, str] | str:
 def _names(
     table: Table, key: str, default: tuple[str, ...] | None = None
 ) -> tuple[str, ...]:
-    """Return a list of screw components."""
+    """Read a list of screw components."""
     if default is not None and not table.has(key):
         return default
     expected = f"a list of {', '.join(_COMPONENTS)}"
@@ -304,7 +298,7 @@ def _names(
 
 
 def _values(table: Table, key: str, unit: str) -> dict[str, float] | None:
-    """Return numbers by screw component, or None if the key is absent."""
+    """Read numbers by screw component, or return None if the key is absent."""
     if not table.has(key):
         return None
     inner, values = table.table(key), {}
@@ -324,7 +318,7 @@ def _values(table: Table, key: str, unit: str) -> dict[str, float] | None:
 
 
 def _wrench(table: Table) -> np.ndarray:
-    """Return the wrench (6,) [N m, N] given by ``load``."""
+    """Read the wrench in the key ``load``, (6,) [N m, N]."""
     inner = table.table("load") if table.has("load") else None
     if inner is None:
         raise table.bad("load", "missing; expected a table such as { fz = -50 }")

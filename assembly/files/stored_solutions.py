@@ -1,7 +1,7 @@
 """Cache for the finite-element solutions of mesh links.
 
-A solution is identified by a hash of all data on which its numbers depend.  Files are
-written completely or not at all, and unusable files are ignored.
+A solution is identified by a hash of all data on which it depends.  Invalid files are
+ignored.
 """
 
 import hashlib
@@ -31,29 +31,28 @@ from forcefit.inputs.table import BadInput
 from forcefit.inputs.writing import whole_file
 
 _CACHE = logging.getLogger("forcefit.cache")
-# packages that read surfaces, mesh or solve; rounding may differ between versions
+# packages whose version can change a solution
 _LIBRARIES = ("numpy", "scipy", "pytetwild", "pypardiso", "mkl", "pyvista", "vtk",
               "gmsh", "meshio")  # fmt: skip
-_UNUSED = 90 * 86_400  # [s] unused solutions are deleted after this time
+_UNUSED = 90 * 86_400  # [s] time after which an unused solution is deleted
 
 
 def solution_key(link: MeshLink, digest: str, options: object) -> str:
     """Return the cache key for the solution of a link.
 
     Args:
-        link: link to be solved.  The path of its surface and the orientation of its
-            mesh are ignored, because solutions are expressed in mesh axes.
+        link: link to be solved.  The solution does not depend on the path of its
+            surface and, because it is in mesh axes, on the orientation of its mesh.
         digest: SHA-256 hash of the surface file.
         options: :class:`forcefit.stiffness.fem.fea.FemOptions` of the solution.
 
     Returns:
-        Hash of the link, the options and the program; links with the same key have
-        identical solutions.
+        Hash of the link, the options and the program.
     """
     from forcefit.stiffness.surface.surface_files import named_solid
 
     file, solid = named_solid(link.surface)
-    # only the suffix is relevant, because it determines the reader
+    # the suffix of the file determines its reader
     name = Path(f"{file.suffix.lower()}#{solid}")
     content = replace(link, surface=name, up=None, frame_up=None, axis=None)
     text = "\n".join([digest, repr(content), repr(options), _program()])
@@ -73,8 +72,8 @@ def stored_solution(key: str, solve: Callable[[], MeshSolution]) -> MeshSolution
 
     Args:
         key: result of :func:`solution_key`.
-        solve: function that computes the solution if it is not cached; other processes
-            that require the same solution wait until it returns.
+        solve: function that computes the solution if it is not cached.  Other processes
+            wait until it returns.
 
     Returns:
         Solution, which is bit-identical in both cases.
@@ -98,7 +97,7 @@ def stored_solution(key: str, solve: Callable[[], MeshSolution]) -> MeshSolution
 
 @contextmanager
 def _one_process(mark: Path) -> Generator[None, None, None]:
-    """Let only one process at a time continue, if the disk supports locks."""
+    """Lock a file, if possible, so that only one process computes a solution."""
     with ExitStack() as stack:
         with suppress(OSError):
             stack.enter_context(locked_file(mark))
@@ -110,14 +109,14 @@ def _one_process(mark: Path) -> Generator[None, None, None]:
 
 
 def _read(path: Path, key: str) -> MeshSolution | None:
-    """Read a cached solution; return None if it is absent or invalid."""
+    """Read a cached solution, or return None if it is absent or invalid."""
     try:
         with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as stored:
             content = json.loads(str(stored["content"]))
             if content["key"] != key:
                 return None
             solution = _decoded(content["solution"], stored)
-    except Exception:  # NumPy, zipfile and json raise many kinds of exceptions
+    except Exception:  # NumPy, zipfile and json raise exceptions of various types
         return None
     if not isinstance(solution, MeshSolution):
         return None
@@ -127,7 +126,7 @@ def _read(path: Path, key: str) -> MeshSolution | None:
 
 
 def _write(path: Path, key: str, solution: MeshSolution) -> None:
-    """Write a solution completely or not at all; ignore errors such as a full disk."""
+    """Write a solution; errors such as a full disk are ignored."""
     arrays: list[NDArray] = []
     content = json.dumps({"key": key, "solution": _encoded(solution, arrays)})
     named: dict[str, Any] = {str(k): array for k, array in enumerate(arrays)}
@@ -147,7 +146,7 @@ def _remove_unused(folder: Path) -> None:
 
 
 def _encoded(value: Any, arrays: list[NDArray]) -> Any:
-    """Encode a value for JSON; arrays are replaced by indices into ``arrays``."""
+    """Encode a value for JSON, with arrays replaced by indices into ``arrays``."""
     if isinstance(value, np.ndarray):
         arrays.append(value)
         return {"array": str(len(arrays) - 1)}
@@ -185,7 +184,7 @@ def _decoded(value: Any, arrays: Mapping[str, NDArray]) -> Any:
 
 @cache
 def _kinds() -> dict[str, Any]:
-    """Return the classes of the objects in a solution, by name."""
+    """Return the classes that occur in a solution, by name."""
     from forcefit.stiffness.fem.adaptive_step import Level
     from forcefit.stiffness.fem.condensation import Condensed
     from forcefit.stiffness.fem.elements import Elements

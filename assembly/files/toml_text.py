@@ -1,4 +1,4 @@
-"""Formatting of TOML, with numbers at full precision and one line per array."""
+"""Formatting of TOML text, with numbers in full precision and arrays on one line."""
 
 from collections.abc import Iterable, Mapping
 from typing import Any
@@ -16,11 +16,11 @@ def file_text(
 
     Args:
         values: values in the root table.
-        tables: tables by type, each written as ``[[type]]``.
-        diagnosis: values in the table ``[diagnosis]``, which precedes all other tables.
+        tables: lists of tables, by name.
+        diagnosis: values in the table ``[diagnosis]``.
 
     Returns:
-        Text whose first line marks the file as one that may be overwritten.
+        Text.  The first line marks the file as one that may be overwritten.
     """
     lines = [ROBOT_MARK, *_lines(values)]
     if diagnosis:
@@ -32,13 +32,13 @@ def file_text(
 
 
 def _lines(table: Mapping[str, Any]) -> list[str]:
-    """Return one line of text per key."""
+    """Return a line of text for each key."""
     return [f"{key} = {toml_value(value)}" for key, value in table.items()]
 
 
 def toml_value(value: Any) -> str:
-    """Format a value in TOML."""
-    # tomli-w is not used, because it puts each number in an array on its own line
+    """Return the TOML text of a value."""
+    # the package tomli-w writes each number of an array on a separate line
     if isinstance(value, bool | np.bool_):
         return str(value).lower()
     if isinstance(value, str):
@@ -52,11 +52,11 @@ def toml_value(value: Any) -> str:
 
 
 def _key(name: str) -> str:
-    """Format a key, with quotes if necessary."""
+    """Return the TOML text of a key, with quotes if necessary."""
     bare = name and all(c.isascii() and (c.isalnum() or c in "-_") for c in name)
     return name if bare else toml_value(name)
 
 
 def _escaped(c: str) -> str:
-    """Escape a character for a string in double quotes."""
+    """Return a character, or its escape sequence for a string in double quotes."""
     return f"\\u{ord(c):04x}" if c < " " or c in '"\\\x7f' else c

@@ -1,4 +1,4 @@
-"""Lengths and angles in files, given as numbers or as texts with a unit."""
+"""Lengths and angles in files, which are numbers or texts with a unit."""
 
 import re
 from collections.abc import Sequence
@@ -6,7 +6,7 @@ from typing import Any
 
 from forcefit.inputs.table import BadInput, Table, describe
 
-UNITS = {  # units of each dimension, with conversion factors to m or rad
+UNITS = {  # conversion factors to m or rad, by dimension and unit
     "length": {"m": 1.0, "mm": 1e-3, "um": 1e-6, "in": 0.0254},
     "angle": {"rad": 1.0, "mrad": 1e-3, "deg": 0.017453292519943295},
 }
@@ -19,11 +19,11 @@ def without_units(table: Table, key: str, dimension: str | Sequence[str]) -> Non
 
     Args:
         table: table with the value, which is modified in place.
-        key: key of the value, which may be absent, a number, a text, or a nested list.
+        key: key of the value, which is a number, a text, or a nested list.
         dimension: ``"length"`` or ``"angle"``, or one dimension for each list entry.
 
     Raises:
-        BadInput: a text is not a number with a unit of the given dimension.
+        BadInput: a text is not a number with a unit of this dimension.
     """
     if key in table.content:
         table.content[key] = _plain(table, key, table.content[key], dimension)
@@ -53,7 +53,7 @@ def _number(table: Table, key: str, text: str, dimension: str) -> float:
 
 
 def _wrong(table: Table, key: str, text: str, dimension: str) -> BadInput:
-    """Return the error for a text that is not a number with a unit."""
+    """Return an error about a text that is not a number with a unit."""
     units = " ".join(UNITS[dimension])
     example = '"200 mm"' if dimension == "length" else '"30 deg"'
     fault = f"found {describe(text)}, expected a number, or a text with a unit"

@@ -261,7 +261,7 @@ BROKEN_PARTS = [
     ("fails", "model broken:fails of their-tools failed: KeyError: 'absent'"),
     ("small", "model broken:small of their-tools returned an array of shape "),
     ("loose", "model broken:loose of their-tools: stiffness is not positive"),
-    ("ragged", "model broken:ragged of their-tools returned no array of "),
+    ("ragged", "model broken:ragged of their-tools did not return an array of "),
     ("cine", 'found "cine", expected an installed link model; did you mean'),
     ("arm.three", "the reader broken:read of their-tools failed: ValueEr"),
     ("arm.count", "of their-tools returned int, expected a Robot"),

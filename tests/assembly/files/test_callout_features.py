@@ -1,4 +1,4 @@
-"""Round faces, envelopes and datums at maximum material in robot files."""
+"""Round faces, envelopes and datums with maximum material condition in robot files."""
 
 import re
 
@@ -13,7 +13,7 @@ from forcefit.assembly.statistics.linear_response import linear_response
 from forcefit.assembly.statistics.worst_pose import worst_pose
 from forcefit.inputs.table import BadInput
 
-# a bracket: mounting face A, bore B 12 H7, bore C; a rod turns in C
+# bracket with the mounting face A, bore B (12 H7) and bore C, in which a rod rotates
 BRACKET = """
 format = 2
 name = "bracket"
@@ -70,7 +70,7 @@ axis = [0, 0, 1]
 """
 
 
-# a plate on an exact pin in its hole B 12 H7; a rod in a second hole C of the plate
+# plate with hole B (12 H7) on an exact pin, and hole C, in which a rod rotates
 PLATE = """
 format = 2
 name = "plate"
@@ -115,13 +115,16 @@ def placed(robot):
 
 
 def largest(one, row):
-    """Largest component of the error of a frame over the zone."""
+    """Return the maximum of an error component over the tolerance zone."""
     return one.zone.support(row @ np.linalg.pinv(one.zone.columns))
 
 
-def test_zone_of_a_round_face_is_a_double_cone_of_its_diameter(tmp_path):
-    """Profile 0.06: 30 um along the normal, 30 um / 20 mm of tilt; parallelism 0.04
-    leaves 20 um / 20 mm = 1 mrad."""
+def test_tilt_of_a_round_face_is_limited_by_its_diameter(tmp_path):
+    """Limits of displacement and tilt of a face with a diameter of 40 mm.
+
+    A profile tolerance of 0.06 mm permits 30 um along the normal and a tilt of 30 um /
+    20 mm.  A parallelism tolerance of 0.04 mm limits the tilt to 20 um / 20 mm.
+    """
     robot = read(tmp_path, BRACKET)
     (face,) = (p for p in placed(robot) if "flange" in p.name)
     errors = face.errors[robot.index("flange.slide_x")]
@@ -137,22 +140,23 @@ def errors_row(robot):
     return robot.index("flange.slide_x")
 
 
-def test_shift_of_a_datum_uses_the_hole_of_its_fit(tmp_path):
-    """The hole of B is drawn once: its clearance is at least twice the shift plus
-    6 um, the minimum clearance for g6."""
+def test_shift_of_a_datum_does_not_exceed_clearance_of_its_fit(tmp_path):
+    """The clearance is at least twice the shift plus 6 um, the minimum for g6."""
     robot = read(tmp_path, BRACKET)
     sources = sources_of(robot)
     values = sources.draw(0, 20_000, 1)
-    shift = 9 * np.linalg.norm(values[:, -3:-1], axis=1)  # um, unit disc of 9 um
+    shift = 9 * np.linalg.norm(values[:, -3:-1], axis=1)  # [um]
     diametral = 20.5 + 2e6 * values[:, -1]
     assert (diametral >= 2 * shift + 6 - 1e-9).all()
     assert shift.max() > 8
 
 
-def test_primary_datum_at_maximum_material_shifts_and_tilts_the_whole_body(tmp_path):
-    """Both ends of the bore B of 20 mm are within s of 0 to 9 um: at a height h, s
-    max(1, 2 h / 20 mm), with a variance of E[s^2] (1/8 + (h / 20 mm)^2 / 2) per axis.
-    The rod's point is 50 mm above the middle of B; the zone of bore C is a point.
+def test_body_shifts_and_tilts_with_primary_datum_at_maximum_material(tmp_path):
+    """Both ends of the 20 mm long bore B are displaced by at most s = 0 to 9 um.
+
+    At a height h above the centre of B, the maximum displacement is
+    s max(1, 2 h / 20 mm), and its variance is E[s^2] (1/8 + (h / 20 mm)^2 / 2) in each
+    direction.  The platform is at h = 50 mm.
     """
     robot = read(tmp_path, PLATE)
     sources = sources_of(robot)
@@ -168,9 +172,8 @@ def test_primary_datum_at_maximum_material_shifts_and_tilts_the_whole_body(tmp_p
     assert [vars(c) for c in again.callouts] == [vars(c) for c in robot.callouts]
 
 
-def test_envelope_requirement_limits_the_tilt_of_a_face_by_its_length(tmp_path):
-    """30 +- 0.05 mm: 50 um along the normal for both; with (E) over a diameter of
-    40 mm a tilt of at most 50 um / 20 mm."""
+def test_envelope_requirement_limits_the_tilt_of_a_face(tmp_path):
+    """With (E), a length of 30 +- 0.05 mm limits the tilt to 50 um / 20 mm."""
     zones = 'profile = "0.06 mm"\nparallelism = "0.04 mm"'
     tilts = []
     for mark in ("", " (E)"):
@@ -191,7 +194,7 @@ def test_envelope_requirement_limits_the_tilt_of_a_face_by_its_length(tmp_path):
         ('"B (M)"', '"B (M"', 'datums: found "B (M", expected a joint of "bracket"'),
         ('["A", "B (M)"]', '["B (M)", "A"]',
          'datums: found "B (M)" as datum A, which can tilt in the hole; expected '
-         '"datum_extent" too, the length of this hole'),
+         'also "datum_extent", the length of this hole'),
         ('datum_hole = "12 H7"', 'datum_hole = "12 H7"\ndatum_extent = "20 mm"',
          "datum_extent: found without (M) at datum A; expected none"),
         ('datum_hole = "12 H7"', 'datum_hole = "12 H7"\ndatum_extent = "20 mm (M)"',
@@ -220,7 +223,7 @@ def test_envelope_requirement_limits_the_tilt_of_a_face_by_its_length(tmp_path):
          'length = "30 +- 0.05 mm (E)"', "extent: missing; expected two sizes"),
     ],
 )  # fmt: skip
-def test_mistake_in_a_callout_is_reported_in_one_line(tmp_path, old, new, message):
+def test_invalid_callout_is_rejected(tmp_path, old, new, message):
     assert old in BRACKET
     with pytest.raises(BadInput, match=re.escape(message)) as error:
         read(tmp_path, BRACKET.replace(old, new, 1))

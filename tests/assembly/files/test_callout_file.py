@@ -16,7 +16,7 @@ name = "arm"
 platform = "plate"
 platform_at = [0.7, 0, 0.1]
 
-[[tolerance]]                       # of the base
+[[tolerance]]                       # tolerance of the base
 feature = "leg1.foot"
 datums = ["leg2.foot"]
 position = "0.1 mm"
@@ -70,7 +70,7 @@ axis = [0, 0, 1]
 
 @pytest.fixture(scope="module")
 def without_circle():
-    """The file without the pair of datums that refer to each other."""
+    """Return the file without the second of two datums that refer to each other."""
     start = FILE.index('[[leg.body.tolerance]]\nfeature = "foot"')
     return FILE[:start] + FILE[FILE.index("[[leg.joint]]") :]
 
@@ -85,10 +85,8 @@ def placed(robot):
     return place_callouts(home_posture(robot))
 
 
-def test_file_of_frames_written_from_bodies_has_the_same_callouts(
-    tmp_path, without_circle
-):
-    """Also round faces, and datums that shift by their clearance."""
+def test_callouts_are_equal_in_both_file_formats(tmp_path, without_circle):
+    """The second robot has a round face and a datum with maximum material condition."""
     names = [c.name for c in read(tmp_path, without_circle).callouts]
     assert names == [
         "face", "leg1.foot on base", "leg1.pad on rod", "leg2.pad on rod",
@@ -104,7 +102,7 @@ def test_file_of_frames_written_from_bodies_has_the_same_callouts(
             assert one.errors == pytest.approx(other.errors, abs=1e-15)
 
 
-def test_callouts_of_a_copied_leg_are_rotated_with_the_leg(tmp_path, without_circle):
+def test_callouts_of_a_copied_leg_are_rotated(tmp_path, without_circle):
     robot = read(tmp_path, without_circle)
     first, second = placed(robot)[2:]
     one = first.errors[robot.index("leg1.pad.slide_x")]
@@ -113,9 +111,12 @@ def test_callouts_of_a_copied_leg_are_rotated_with_the_leg(tmp_path, without_cir
     assert one == pytest.approx(other, abs=1e-15)
 
 
-def test_normal_of_a_face_is_the_normal_of_its_planar_joint(tmp_path, without_circle):
-    """Profile 0.1: TZ within 50 um along the normal, which is the first frame's y;
-    perpendicularity 0.02 over 40 by 30 mm: 0.5 mrad about the joint's y."""
+def test_normal_of_a_face_is_axis_of_its_planar_joint(tmp_path, without_circle):
+    """A profile tolerance of 0.1 mm permits a displacement of 50 um along the normal.
+
+    A perpendicularity tolerance of 0.02 mm limits the tilt of a face of 40 by 30 mm to
+    0.5 mrad about y of the joint.
+    """
     robot = read(tmp_path, without_circle)
     face = placed(robot)[2]
     errors = face.errors[robot.index("leg1.pad.slide_x")]
@@ -125,8 +126,8 @@ def test_normal_of_a_face_is_the_normal_of_its_planar_joint(tmp_path, without_ci
     assert tilts == pytest.approx([0, 0.5e-3, 10e-6 / 15e-3], abs=1e-9)
 
 
-def test_contacts_of_a_joint_do_not_move_its_feature(tmp_path):
-    """The feature is at the centre of a bore, although its frames are at the ends."""
+def test_position_of_a_feature_does_not_depend_on_joint_contacts(tmp_path):
+    """The feature is at the centre of a bore, the contacts are at its ends."""
     start = FILE.index('[[leg.body.tolerance]]\nfeature = "pad"')
     end = FILE.index('[[leg.body.tolerance]]\nfeature = "foot"')
     text = (FILE[:start] + FILE[end:]).replace('hole = "12 H7"\n', "")
@@ -144,7 +145,7 @@ def test_contacts_of_a_joint_do_not_move_its_feature(tmp_path):
     assert moved[1] == pytest.approx(moved[0], abs=1e-12)
 
 
-def test_fit_of_a_drawn_joint_equals_the_fit_of_its_frame(tmp_path, without_circle):
+def test_fit_of_a_joint_is_assigned_to_its_frame(tmp_path, without_circle):
     joint = 'name = "foot"\ntype = "revolute"'
     text = without_circle.replace(joint, joint + '\nclearance = { fit = "12 H7/g6" }')
     robot = read(tmp_path, text)

@@ -1,4 +1,4 @@
-"""Messages for invalid tolerances, form tolerances and fits in robot files."""
+"""Error messages for invalid tolerances and fits in robot files."""
 
 import pytest
 
@@ -56,12 +56,12 @@ name = "wheel"
 
 
 def of_tip(zones):
-    """The first joint after a tolerance of the tip with these zones."""
+    """Return a tolerance table of the joint ``tip`` with the given zones."""
     table = '[[body.tolerance]]\nfeature = "tip"\ndatums = ["pin"]\n'
     return f'{table}{zones}\nextent = "20 mm"\n{JOINT}'
 
 
-# by file: what is replaced, by what, and the message
+# for each file: text to be replaced, new text, and expected message
 REFUSED = {
     "bodies": (FILE, [
         ("", "", 'tolerance of "leg1.pad on rod": found datums that depend'),
@@ -108,10 +108,10 @@ REFUSED = {
     ]),
     "frames of other parts": (FRAMES.replace('length = "400 +- 0.05 mm"', BORE), [
         ('name = "b"\nparent = "a"\n', f'name = "b"\nparent = "a"\n{END}',
-         'of the parts "a", expected "12 H7/g6" as for an earlier frame'),
+         'for the parts "a", expected "12 H7/g6" as at an earlier frame'),
     ]),
     "frames at one place": (FRAMES.replace("[0.4, 0, 0]", "[0, 0, 0]"), [
-        # within the accepted difference from the geometry, which is 0
+        # this length agrees with the distance of 0 within the accepted difference
         ('"400 +- 0.05 mm"', '"0.0001 +- 0.00001 mm"',
          "a coincident datum, expected"),
     ]),
@@ -125,8 +125,8 @@ REFUSED = {
         ('{ fit = "12 H7/g6", length = "40 mm" }', '{ fit = "25 H7/p6" }',
          'clearance.fit: found "25 H7/p6", an interference fit'),
         ('cylindricity = "0.006 mm"', 'cylindricity = "0.006 mm"\ndatums = ["pin"]',
-         "datums: found this key for a feature with only a form tolerance, expected "
-         "none"),
+         "datums: found this key for a feature that has only a form tolerance, "
+         "expected none"),
     ]),
     "zones, which form, orientation and location decrease in this order": (TWO_PINS, [
         (JOINT, of_tip('position = "0.05 mm"\nparallelism = "0.02 mm"\n'
@@ -162,7 +162,7 @@ REFUSED = {
          "feature that is an axis, expected"),
         (f'datums = ["A"]\n{LENGTH}', f'datums = ["A", "A"]\n{BORE}',
          "datums: found ['A', 'A'], expected each datum once"),
-        # tables and the parts of a worst case are by name
+        # names of callouts must be unique, because results are listed by name
         ("[[body.tolerance]]\n", '[[body.tolerance]]\nname = "x"\n',
          'tolerance of "x": found "length of x" twice, expected a different'),
     ]),
@@ -171,7 +171,7 @@ REFUSED = {
          "direction: found a direction for a point, expected none"),
     ]),
     "face": (FACE, [
-        (PIN, PIN.replace("revolute", "planar"), "found a direction for a face; its"),
+        (PIN, PIN.replace("revolute", "planar"), "found a direction for a face, whose"),
     ]),
 }  # fmt: skip
 
@@ -180,9 +180,7 @@ REFUSED = {
     ("text", "old", "new", "message"),
     [(text, *row) for text, rows in REFUSED.values() for row in rows],
 )
-def test_tolerance_that_cannot_be_used_is_refused_in_one_line(
-    tmp_path, text, old, new, message
-):
+def test_invalid_tolerance_is_rejected(tmp_path, text, old, new, message):
     assert old in text
     (tmp_path / "robot.toml").write_text(text.replace(old, new))
     with pytest.raises(BadInput) as refused:
@@ -193,7 +191,7 @@ def test_tolerance_that_cannot_be_used_is_refused_in_one_line(
     assert told.count("robot.toml") == 1
 
 
-def test_class_of_perpendicularity_needs_the_length_of_a_square_bore(tmp_path):
+def test_general_perpendicularity_tolerance_requires_length_of_bore(tmp_path):
     head, pin, tail = CRANK.replace(LENGTH, 'general = "ISO 2768-mK"').partition(PIN)
     text = head + pin + tail.replace("axis = [0, 0, 1]", "axis = [1, 0, 0]", 1)
     (tmp_path / "robot.toml").write_text(text)

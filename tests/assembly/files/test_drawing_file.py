@@ -1,4 +1,4 @@
-"""Reading of files with bodies and joints, and messages for invalid files."""
+"""Reading of robot files of format 2 (bodies and joints), and error messages."""
 
 import re
 
@@ -64,7 +64,7 @@ axis2 = [0, 1, 0]
 
 @pytest.fixture
 def read(tmp_path):
-    """The robot of a text."""
+    """Return a function that reads a robot from a text."""
 
     def robot(text):
         path = tmp_path / "drawn.toml"
@@ -74,8 +74,8 @@ def read(tmp_path):
     return robot
 
 
-def test_stiffness_of_tsais_robot_equals_that_of_another_program(read):
-    """K_C of a model of bodies' twists, printed to 6 digits."""
+def test_stiffness_of_3_upu_robot_agrees_with_another_program(read):
+    """The reference is the stiffness K_C from another program, with 6 digits."""
     found = platform_stiffness(home_posture(read(TSAI))).stiffness
     expected = np.diag([162410, 162410, 35817, 3.16338e6, 3.16338e6, 5.00457e7])
     expected[0, 4] = expected[4, 0] = -711761
@@ -84,7 +84,7 @@ def test_stiffness_of_tsais_robot_equals_that_of_another_program(read):
     assert np.abs((found - expected) / np.outer(size, size)).max() < 1e-5
 
 
-def test_names_of_joints_in_the_drawing_become_names_of_frames(read):
+def test_frames_have_the_names_of_joints_and_bodies(read):
     robot = read(TSAI)
     leg = ["lower.first", "lower.second", "slide", "rod", "upper.first", "upper.second"]
     names = [f"leg{k}.{name}" for k in (1, 2, 3) for name in leg]
@@ -93,33 +93,36 @@ def test_names_of_joints_in_the_drawing_become_names_of_frames(read):
     assert robot.platform == "platform"
 
 
-def test_remarks_name_the_joints_at_which_loops_are_closed(read):
+def test_remark_lists_joints_that_close_loops(read):
     (cut,) = read(TSAI).remarks
     assert cut == (
         'loops close after "leg2.upper" (at "platform"), "leg3.upper" (at "platform")'
     )
 
 
-def test_remark_names_the_bodies_whose_mass_has_no_centre(read):
-    """Without a centre the mass of the platform is 450 mm away from the platform."""
+def test_remark_lists_bodies_without_centre_of_mass(read):
+    """Without ``centre``, the platform mass acts at the origin of the base."""
     text = TSAI.replace('centre = [0, 0, "450 mm"]\n', "")
-    remark = 'masses without "centre" act at [0, 0, 0] of the drawing: "platform"'
+    remark = 'masses without "centre", which act at the origin of the base: "platform"'
     assert remark in read(text).remarks
     assert not any("centre" in found for found in read(TSAI).remarks)
 
 
-def test_remark_states_between_which_of_many_joints_a_link_is_placed(read):
-    """The platform has one joint per leg; if the key is given, there is no remark."""
+def test_remark_reports_assumed_end_joints_of_a_link(read):
+    """There is no remark if the keys ``from`` and ``to`` specify the joints."""
     link = "link = { beam = { radius = 0.01 }, young = 7e10, poisson = 0.3 }"
     text = TSAI.replace("mass = 3.0", f"mass = 3.0\n{link}")
-    remark = 'links from first to second joint: "platform" "leg1.upper" to "leg2.upper"'
+    remark = (
+        'links between the first two joints of a body: "platform" from "leg1.upper" '
+        'to "leg2.upper"'
+    )
     assert remark in read(text).remarks
     text = text.replace(link, f'{link}\nfrom = "leg1.upper"\nto = "leg2.upper"')
     assert remark not in read(text).remarks
 
 
-def test_a_leg_may_be_repeated_about_an_axis_through_a_point(read):
-    """The second leg is rotated by half a turn about the line x = 0.3."""
+def test_legs_are_copied_about_an_axis_through_a_point(read):
+    """The second leg is rotated by 180 degrees about the line x = 0.3, y = 0."""
     repeat = '{ count = 2, about = [0, 0, 2], at = ["300 mm", 0, 0] }'
     text = re.sub(r"repeat = .*", f"repeat = {repeat}", TSAI)
     text = text.replace(
@@ -131,8 +134,8 @@ def test_a_leg_may_be_repeated_about_an_axis_through_a_point(read):
     assert slide == pytest.approx([0.36, 0, 0], abs=1e-15)
 
 
-def test_masses_of_a_leg_are_copied_with_it(read):
-    """Half a turn about the line x = 0.3, y = 0.1: (x, y) to (0.6 - x, 0.2 - y)."""
+def test_mass_of_a_copied_leg_is_rotated(read):
+    """The point (x, y) of the first leg corresponds to (0.6 - x, 0.2 - y)."""
     repeat = "{ count = 2, about = [0, 0, 1], at = [0.3, 0.1, 0] }"
     text = ARC.replace("{ count = 1, about = [0, 0, 1] }", repeat)
     text = text.replace(
@@ -153,8 +156,8 @@ def test_masses_of_a_leg_are_copied_with_it(read):
     assert z == pytest.approx(0.3 * 0.4 / robot.frame("leg1.arc").mass)
 
 
-def test_errors_may_have_units(read):
-    """The first three are angles, the last three lengths."""
+def test_geometric_error_with_units_is_converted(read):
+    """The first three numbers are angles, the last three are lengths."""
     written = '["1 mrad", "1 deg", 2, "1 mm", "1 um", "1 in"]'
     text = ARM.replace("position = 0.5", f"geometric_error = {written}")
     expected = [1e-3, np.pi / 180, 2, 1e-3, 1e-6, 0.0254]
@@ -165,12 +168,12 @@ def test_errors_may_have_units(read):
     ('"240 mm"', 0.24), ('"24e4 um"', 0.24), ('"0.24 m"', 0.24), ('"240mm"', 0.24),
     ('"10 in"', 0.254), ("0.24", 0.24),
 ])  # fmt: skip
-def test_lengths_may_have_units(written, metres, read):
+def test_length_with_unit_is_converted(written, metres, read):
     robot = read(TSAI.replace('at = ["240 mm", 0, 0]', f"at = [{written}, 0, 0]"))
     assert robot.frames[0].translation == pytest.approx([metres, 0, 0], abs=1e-16)
 
 
-def test_angles_may_have_units(read):
+def test_angle_with_unit_is_converted(read):
     text = ARM.replace("position = 0.5", 'position = "0.4 rad"')
     assert read(text).frame("turn").position == 0.4
     text = ARM.replace("position = 0.5", 'position = "30 deg"')
@@ -210,8 +213,8 @@ at = [0.6, 0, 0]
 """
 
 
-def test_frames_of_a_drawn_arm_are_at_their_positions_at_home(read):
-    """The spring of the drive, the link and the mass of the hand are also checked."""
+def test_arm_of_format_2_has_correct_frames_and_link(read):
+    """The drive stiffness, the link and the mass are also compared."""
     robot = read(ARM)
     turn, arm, hand = (robot.frame(name) for name in ("turn", "arm", "hand"))
     assert np.diag(turn.joint_stiffness).tolist() == [*[np.inf] * 2, 1e4, *[np.inf] * 3]
@@ -222,12 +225,12 @@ def test_frames_of_a_drawn_arm_are_at_their_positions_at_home(read):
 
 
 @pytest.mark.parametrize(("up", "soft"), [("", "TY"), (", up = [0, 1, 0]", "TZ")])
-def test_height_of_a_beam_section_is_along_the_z_axis_of_the_base(up, soft, read):
-    """A cantilever deflects by F L^3 / (3 E I), less along the larger height."""
+def test_height_of_a_beam_section_is_along_z_or_up(up, soft, read):
+    """The deflection F L^3 / (3 E I) of a cantilever is smaller along its height."""
     text = ARM.replace('height = "30 mm"', f'height = "30 mm", theory = "euler"{up}')
     text = text.replace("drive_stiffness = 1e4\n", "")
     C = platform_stiffness(home_posture(read(text))).compliance
-    I = {"TY": 0.03 * 0.02**3 / 12, "TZ": 0.02 * 0.03**3 / 12}  # bending along y and z
+    I = {"TY": 0.03 * 0.02**3 / 12, "TZ": 0.02 * 0.03**3 / 12}  # for forces along y, z
     if soft == "TZ":
         I = {"TY": I["TZ"], "TZ": I["TY"]}
     for k, key in ((4, "TY"), (5, "TZ")):
@@ -269,8 +272,11 @@ name = "hand"
 """
 
 
-def test_an_arc_of_a_quarter_turn_has_the_deflection_of_castigliano(read):
-    """Out of its plane: F r^3 (pi/4 / EI + (3 pi/4 - 2) / GJ) and the shear of F r."""
+def test_deflection_of_quarter_circle_arc_equals_textbook_formula(read):
+    """The deflection is F r^3 (pi/4 / EI + (3 pi/4 - 2) / GJ) plus that by shear.
+
+    The force F is perpendicular to the plane of the arc.
+    """
     C = platform_stiffness(home_posture(read(ARC))).compliance
     r, rho, E, nu = 0.1, 0.005, 2.1e11, 0.3
     G, area, I = E / 2.6, np.pi * rho**2, np.pi * rho**4 / 4
@@ -279,7 +285,7 @@ def test_an_arc_of_a_quarter_turn_has_the_deflection_of_castigliano(read):
     assert C[5, 5] == pytest.approx(bending + shear, rel=1e-10)
 
 
-def test_arc_has_the_mass_and_centre_of_mass_of_a_quarter_circle(read):
+def test_mass_of_quarter_circle_arc_equals_textbook_formula(read):
     robot = read(ARC)
     arc = robot.frame("leg1.arc")
     mass = 7800 * np.pi * 0.005**2 * np.pi / 2 * 0.1
@@ -289,13 +295,13 @@ def test_arc_has_the_mass_and_centre_of_mass_of_a_quarter_circle(read):
     assert centre == pytest.approx([0.2 / np.pi, 0.2 / np.pi, 0], abs=1e-14)
 
 
-def test_copies_of_an_arc_are_turned_with_their_leg(read):
-    """Two parallel arcs have twice the stiffness of one arc."""
+def test_stiffness_of_a_copied_arc_is_rotated(read):
+    """The stiffness of two legs is K + R K R^T for the rotation R of the second leg."""
     one = read(ARC)
     text = ARC.replace("count = 1, about = [0, 0, 1]", "count = 2, about = [0, 1, 0]")
     two = read(text)
     K, both = (platform_stiffness(home_posture(r)).stiffness for r in (one, two))
-    turned = np.diag([-1, 1, -1, -1, 1, -1])  # half a turn about y
+    turned = np.diag([-1, 1, -1, -1, 1, -1])  # rotation by 180 degrees about y
     expected = K + turned @ K @ turned
     size = np.sqrt(np.diag(expected))
     assert np.abs((both - expected) / np.outer(size, size)).max() < 1e-10
@@ -306,14 +312,14 @@ def test_copies_of_an_arc_are_turned_with_their_leg(read):
     ('section = {', 'sektion = {', "section"),
     ("poisson = 0.3", "poisson = 0.3\nbeam = { radius = 0.1 }", "link.beam: found "),
 ])  # fmt: skip
-def test_mistake_in_a_curve_is_reported_in_one_line(old, new, message, read):
+def test_invalid_curve_is_rejected(old, new, message, read):
     with pytest.raises(BadInput) as caught:
         read(ARC.replace(old, new))
     assert message in str(caught.value)
     assert "\n" not in str(caught.value)
 
 
-# rows of the free motions, and bounds that limit others
+# screw components of the free motions, and bounds that limit other motions
 SEVERAL = {
     "cylindrical": ([2, 5], {"radial", "tilt"}),
     "spherical": ([0, 1, 2], {"radial", "axial"}),
@@ -323,17 +329,15 @@ STIFF = [2e3, 3e3, 5e3, 2e6, 3e6, 5e6]
 
 
 def held_by(kind, keys):
-    """A hand on one joint of several freedoms, with more keys."""
+    """Return a robot file with a joint of the given type and additional keys."""
     text = ARM.replace('type = "fixed"', f'type = "{kind}"\naxis = [0, 0, 1]\n{keys}')
     return text.replace("drive_stiffness = 1e4\n", "")
 
 
 @pytest.mark.parametrize("full", [False, True], ids=["diagonal", "rows"])
 @pytest.mark.parametrize("kind", SEVERAL)
-def test_springs_of_a_compound_joint_resist_only_constrained_directions(
-    kind, full, read
-):
-    """Zero along the free motions; a number there is refused."""
+def test_compound_joint_has_stiffness_only_in_constrained_directions(kind, full, read):
+    """The stiffness must be zero along the free motions."""
     free = SEVERAL[kind][0]
     K = [0.0 if row in free else value for row, value in enumerate(STIFF)]
     values = np.diag(K).tolist() if full else K
@@ -354,9 +358,7 @@ def test_springs_of_a_compound_joint_resist_only_constrained_directions(
 
 @pytest.mark.parametrize("bound", ["radial", "axial", "tilt", "spin"])
 @pytest.mark.parametrize("kind", SEVERAL)
-def test_clearances_of_a_compound_joint_bound_only_constrained_directions(
-    kind, bound, read
-):
+def test_compound_joint_has_clearance_only_in_constrained_directions(kind, bound, read):
     text = held_by(kind, f"clearance = {{ {bound} = 1e-5 }}")
     if bound in SEVERAL[kind][1]:
         frames = [f for f in read(text).frames if f.name.startswith("bolts")]
@@ -369,8 +371,8 @@ def test_clearances_of_a_compound_joint_bound_only_constrained_directions(
             read(text)
 
 
-def test_a_link_of_a_platform_with_one_joint_ends_at_its_point(read):
-    """A cantilever: its point deflects by F L^3 / 3 E I."""
+def test_link_of_a_platform_with_one_joint_ends_at_reference_point(read):
+    """The deflection of the reference point is F L^3 / (3 E I)."""
     text = ARM[: ARM.index('[[joint]]\nname = "bolts"')].replace('"hand"', '"arm"', 1)
     text = text.replace(
         '[[body]]\nname = "hand"\nmass = 2.0\ncentre = [0.6, 0, 0.1]', ""
@@ -383,13 +385,13 @@ def test_a_link_of_a_platform_with_one_joint_ends_at_its_point(read):
 
 
 def inertia_in_base_axes(robot, name):
-    """(3, 3) [kg m^2] of a frame about its centre, at home."""
+    """Return the inertia matrix of a frame in base axes, (3, 3) [kg m^2]."""
     R = home_posture(robot).transforms[robot.index(name)][:3, :3]
     return R @ robot.frame(name).inertia @ R.T
 
 
-def test_moments_of_inertia_of_a_body_are_copied_with_its_leg(read):
-    """Half a turn about z: Ixz and Iyz change sign, the others stay."""
+def test_inertia_of_a_copied_leg_is_rotated(read):
+    """A rotation by 180 degrees about z changes the signs of Ixz and Iyz."""
     text = ARC.replace("count = 1", "count = 2").replace("  density = 7800\n", "")
     text = text.replace("density = 7800\n", "").replace(
         'name = "arc"', 'name = "arc"\ninertia = [3, 4, 5, 0.1, 0.2, 0.3]'
@@ -405,9 +407,12 @@ def test_moments_of_inertia_of_a_body_are_copied_with_its_leg(read):
         np.testing.assert_allclose(J, expected, atol=1e-14)
 
 
-def test_an_arc_has_the_moments_of_inertia_of_a_quarter_of_a_ring(read):
-    """Discs along a circle: each has m rho^2 / 4 about its diameters, m rho^2 / 2 about
-    the tangent.  A ball of 2 kg at the origin joins it by Steiner's rule."""
+def test_inertia_of_quarter_circle_arc_equals_hand_calculation(read):
+    """The arc consists of thin discs of radius rho with the mass m.
+
+    Each has the moment m rho^2 / 4 about a diameter and m rho^2 / 2 about the tangent.
+    A sphere of 2 kg at the origin is added by the parallel axis theorem.
+    """
     r, rho, mass = 0.1, 0.005, 7800 * np.pi * 0.005**2 * np.pi / 2 * 0.1
     c = 2 / np.pi * r
     about_axis = mass * (r**2 + rho**2 / 4) - mass * 2 * c**2
@@ -422,18 +427,18 @@ def test_an_arc_has_the_moments_of_inertia_of_a_quarter_of_a_ring(read):
     )
     whole, way = read(text).frame("leg1.arc"), np.array([c, c, 0])
     assert whole.mass == pytest.approx(2 + mass, rel=1e-14)
-    both = 2 * mass / (2 + mass)  # reduced mass
+    both = 2 * mass / (2 + mass)  # reduced mass of sphere and arc
     expected += ball * np.eye(3) + both * (way @ way * np.eye(3) - np.outer(way, way))
     J = inertia_in_base_axes(read(text), "leg1.arc")
     np.testing.assert_allclose(J, expected, rtol=1e-10, atol=1e-15)
 
 
-def test_a_file_of_bodies_needs_no_format_key(read):
+def test_file_with_bodies_is_read_without_format_key(read):
     assert read(TSAI.replace("format = 2\n", "")).platform == "platform"
 
 
-def test_universal_joint_accepts_a_number_for_each_bearing(read):
-    """One table for both, or a pair."""
+def test_bearings_of_universal_joint_have_common_or_separate_clearances(read):
+    """The clearance is one table for both bearings, or a list of two tables."""
     both = "axis2 = [0, 1, 0]\nclearance = { radial = 1e-5, tilt = 1e-4 }"
     pair = "axis2 = [0, 1, 0]\nclearance = [{ radial = 1e-5 }, { axial = 2e-5 }]"
     for text, expected in ((both, (1e-5, None)), (pair, (None, 2e-5))):
@@ -580,7 +585,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("case", REFUSED)
-def test_mistake_in_a_drawing_is_reported_in_one_line(case, read):
+def test_invalid_bodies_and_joints_are_rejected(case, read):
     old, new, message = REFUSED[case]
     assert old in TSAI
     with pytest.raises(BadInput) as caught:
@@ -621,12 +626,12 @@ actuated = true
         ('{ pose = { rz = "30 deg" } }', {"rz": np.pi / 6}),
     ],
 )
-def test_pose_at_which_a_joint_is_bolted_can_have_units(read, written, plain):
+def test_bolting_pose_with_units_is_converted(read, written, plain):
     bolt = read(SLOTTED.replace("LOCKED", written)).frames[0].locked_at
     assert {**bolt.pose, **bolt.joints} == pytest.approx(plain)
 
 
-def test_angle_of_a_bolted_joint_is_not_accepted_in_a_unit_of_length(read):
+def test_bolting_angle_with_length_unit_is_rejected(read):
     text = SLOTTED.replace("LOCKED", '{ joints = { hinge = "90 mm" } }')
     with pytest.raises(BadInput, match=r'"slot".locked_at.joints.hinge: found .90 mm'):
         read(text)
@@ -641,9 +646,7 @@ def test_angle_of_a_bolted_joint_is_not_accepted_in_a_unit_of_length(read):
         ("[[leg]]", "[[legs]]", 'unknown key "legs"; did you mean "leg"?'),
     ],
 )  # fmt: skip
-def test_misspelt_list_of_tables_is_named_instead_of_the_bodies_in_it(
-    read, word, wrong, message
-):
+def test_error_message_suggests_name_for_misspelt_table(read, word, wrong, message):
     text = TSAI.replace(word, wrong)
     if word == "[[leg]]":
         text = text.replace("[[leg.", "[[legs.")

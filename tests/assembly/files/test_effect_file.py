@@ -1,4 +1,4 @@
-"""Effects in robot files: written, read, refused, and applied by ``solve``."""
+"""Reading and writing of effects in robot files, and their results in ``solve``."""
 
 import json
 from dataclasses import replace
@@ -29,13 +29,13 @@ link = {{ beam = {{ radius = 0.015 }}, young = 7e10, poisson = 0.3, density = 27
 
 
 def arm_with(tmp_path, *effects):
-    """A robot file of the arm, with lines of ``[[effect]]``."""
+    """Write a robot file of an arm with ``[[effect]]`` tables."""
     path = tmp_path / "arm.toml"
     path.write_text(ARM + "".join(f"[[effect]]\n{e}\n" for e in effects))
     return path
 
 
-def test_every_effect_is_equal_after_writing_and_reading(tmp_path):
+def test_effects_are_equal_after_writing_and_reading(tmp_path):
     plain = read_robot(arm_with(tmp_path))
     effects = {
         name: {
@@ -77,14 +77,14 @@ REFUSED = {
 
 
 @pytest.mark.parametrize(("lines", "message"), REFUSED.items())
-def test_invalid_effect_is_refused_with_its_message(lines, message, tmp_path):
+def test_invalid_effect_is_rejected(lines, message, tmp_path):
     path = arm_with(tmp_path, lines)
     with pytest.raises(BadInput) as refused:
         read_robot(path)
     assert str(refused.value) == f"{path}: effect {message}"
 
 
-def test_unknown_effect_is_refused_with_the_nearest_name(tmp_path):
+def test_unknown_effect_is_rejected_with_suggestion(tmp_path):
     path = arm_with(tmp_path, 'name = "self_wait"')
     with pytest.raises(BadInput) as refused:
         read_robot(path)
@@ -99,8 +99,8 @@ def solved(run, *words):
     return json.loads(out)
 
 
-def test_effects_of_a_file_change_the_result_of_solve(tmp_path, run):
-    """F L / k of a second spring in series; alpha T L of a warm beam."""
+def test_solve_includes_effects_in_robot_file(tmp_path, run):
+    """The changes are F L / k for a spring in series and alpha T L for a warm beam."""
     plain = arm_with(tmp_path)
     words = ("--load", "fy=10")
     before = solved(run, plain, *words)["platform_screw"]
@@ -112,7 +112,7 @@ def test_effects_of_a_file_change_the_result_of_solve(tmp_path, run):
     assert after[3] - before[3] == pytest.approx(2e-5 * 6 * L, rel=1e-9)
 
 
-def test_device_drift_changes_the_reading_and_not_the_pose(tmp_path, run):
+def test_device_drift_changes_reading_but_not_pose(tmp_path, run):
     drift = 'name = "drift"\nparameters = { "amplitude.tz" = 1e-5, time_constant = 10 }'
     path = arm_with(tmp_path, drift)
     found = solved(run, path, "--under", "time=10")
@@ -120,7 +120,7 @@ def test_device_drift_changes_the_reading_and_not_the_pose(tmp_path, run):
     assert found["reading"][5] == pytest.approx(1e-5 * (1 - 1 / 2.718281828459045))
 
 
-def test_effect_without_its_covariate_is_refused_with_the_option(tmp_path, run):
+def test_solve_requires_covariate_of_an_effect(tmp_path, run):
     warm = 'name = "thermal_expansion"\nparameters = { tool = 2e-5 }'
     path = arm_with(tmp_path, warm)
     status, out, err = run("assembly", "solve", path)

@@ -1,4 +1,4 @@
-"""Flatness and cylindricity increase a joint clearance by half their width."""
+"""Increase of joint clearances by half the flatness or cylindricity tolerance."""
 
 import pytest
 
@@ -49,37 +49,42 @@ def worst(robot):
     return worst_pose(prepared, sources_of(robot), "rotation").attained
 
 
-def test_cylindricity_of_both_parts_widens_a_fit(tmp_path):
-    """Largest radial clearance 17.5 um of the fit, 2 + 3 um of the form: the rod tilts
-    by 2 x 22.5 um / 40 mm = 1.125 mrad."""
+def test_cylindricity_of_shaft_and_hole_increases_clearance_of_fit(tmp_path):
+    """The tilt is 2 * 22.5 um / 40 mm.
+
+    The radial clearance of the fit is at most 17.5 um, and the form adds 2 + 3 um.
+    """
     robot = read(tmp_path, ARM)
     assert worst(robot) == pytest.approx(1.125e-3, rel=1e-6)
     assert any('"pin" by 5 um (cylindricity)' in remark for remark in robot.remarks)
     assert not robot.callouts
     sources = sources_of(robot)
     radial = sources.fits[0].fit.mean_radial + sources.draw(0, 2000, 1)[:, 0]
-    assert 8e-6 <= radial.min() <= radial.max() <= 22.5e-6  # 3 .. 17.5 um, and 5 um
+    # 3 to 17.5 um of the fit, plus 5 um of the form
+    assert 8e-6 <= radial.min() <= radial.max() <= 22.5e-6
     assert radial.mean() == pytest.approx(15.25e-6, abs=0.3e-6)
 
 
-def test_form_tolerance_is_preserved_in_a_file_with_frames(tmp_path):
+def test_form_tolerance_is_preserved_in_format_1(tmp_path):
     robot = read(tmp_path, ARM)
     write_robot(robot, tmp_path / "frames.toml")
     again = read_robot(tmp_path / "frames.toml")
     assert worst(again) == pytest.approx(1.125e-3, rel=1e-6)
 
 
-def test_cylindricity_widens_every_gap_of_a_shaft(tmp_path):
-    """Two bearings 50 mm apart, 10 um and 19.5 um at most (12 H7/h6 leaves 14.5 um),
-    each with 5 um more: tilt (15 + 19.5) um / 50 mm."""
+def test_cylindricity_increases_clearances_of_two_bearings(tmp_path):
+    """The tilt between two bearings at a distance of 50 mm is (15 + 19.5) um / 50 mm.
+
+    The form adds 5 um to the clearances of 10 um and 14.5 um (12 H7/h6).
+    """
     fit = '{ fit = "12 H7/g6", length = "40 mm" }'
     one, two = '{ z = 0, radial = "10 um" }', '{ z = "50 mm", fit = "12 H7/h6" }'
     robot = read(tmp_path, ARM.replace(fit, f"{{ bearings = [ {one}, {two} ] }}"))
     assert worst(robot) == pytest.approx((15e-6 + 19.5e-6) / 0.05, rel=1e-6)
 
 
-def test_flatness_widens_the_gap_of_a_pad(tmp_path):
-    """Gaps of 10 and 15 um from the middle: all screws of the pad grow by 1.5."""
+def test_flatness_increases_the_gap_of_a_pad(tmp_path):
+    """The gap increases from 10 to 15 um, and all screws by a factor of 1.5."""
     of_form = [
         '[[tolerance]]\nfeature = "pin"\nflatness = "0.004 mm"\n',
         '[[body.tolerance]]\nfeature = "pin"\nflatness = "0.006 mm"\n',

@@ -1,4 +1,4 @@
-"""Reading and writing of the effect ``function``, and messages for invalid files."""
+"""Reading and writing of the effect ``function``, and error messages."""
 
 import json
 from math import cos, sin
@@ -29,7 +29,7 @@ parameters = { a = 1e-4, b = 2e-5 }
 """
 
 
-def test_documented_function_is_equal_after_writing_and_reading(tmp_path):
+def test_functions_are_equal_after_writing_and_reading(tmp_path):
     robot = read_robot(arm_with(tmp_path, PUBLIC, FORMULA))
     assert robot.functions[0] == Function(
         "drive", ("rz",), ("q.drive",), "waves", {"1.sine": 1.2e-4, "1.cosine": -3e-5},
@@ -57,7 +57,8 @@ VARIABLES = (
 )
 REFUSED = {
     "an unknown place": (PUBLIC, 'where = "drive"', 'where = "driv"',
-        '.where: found "driv", expected a frame or a place; did you mean "drive"?'),
+        '.where: found "driv", expected a frame, "base", "reading" or "load"; did you '
+        'mean "drive"?'),
     "an unknown variable": (PUBLIC, '"q.drive"', '"q.drivee"',
         f'.variables: found "q.drivee", {VARIABLES}; did you mean "q.drive"?'),
     "a fixed joint's coordinate": (PUBLIC, '"q.drive"', '"q.tool"',
@@ -98,7 +99,7 @@ REFUSED = {
         '.formula: found "p", which is neither a variable nor a parameter; valid: a, '
         "b, drive, q, q_drive"),
     "a number unused": (FORMULA, "a*sin(3*q) + b", "a*sin(3*q)",
-        '.formula: parameter "b" is not in it'),
+        '.formula: parameter "b" is not in the formula'),
     "units": (FORMULA, ANGLE,
         'variables = ["time"]\nform = "formula"\nformula = "a*sin(3*time) + b"',
         '.formula: units clash in "3 * time": found s, expected 1'),
@@ -107,9 +108,7 @@ REFUSED = {
 
 @pytest.mark.parametrize(("text", "old", "new", "message"), REFUSED.values(),
                          ids=REFUSED)  # fmt: skip
-def test_invalid_function_is_refused_with_one_message(
-    text, old, new, message, tmp_path
-):
+def test_invalid_function_is_rejected(text, old, new, message, tmp_path):
     assert old in text
     path = arm_with(tmp_path, text.replace(old, new))
     with pytest.raises(BadInput) as error:
@@ -127,7 +126,7 @@ def answer(run, tmp_path, *words):
 
 
 @pytest.mark.parametrize("state", ["contact", "exact"])
-def test_functions_act_in_linear_and_exact_solutions(state, tmp_path, run):
+def test_linear_and_exact_solutions_include_functions(state, tmp_path, run):
     path = str(arm_with(tmp_path, FORMULA))
     turn = 1e-4 * sin(0.9) + 2e-5
     screw = answer(
@@ -137,14 +136,14 @@ def test_functions_act_in_linear_and_exact_solutions(state, tmp_path, run):
     assert screw["platform_screw"] == pytest.approx(expected, rel=1e-3, abs=1e-8)
 
 
-def test_formula_without_a_finite_value_is_refused_at_its_argument(tmp_path, run):
+def test_formula_with_infinite_value_is_rejected(tmp_path, run):
     path = str(arm_with(tmp_path, FORMULA.replace("sin(3*q)", "log(q)")))
     code, _, error = run("assembly", "solve", path, "--joint", "drive=-0.3")
     assert code == 2
     assert "found nan at q.drive = -0.3, expected a finite number" in error
 
 
-def test_unknown_session_is_refused_with_the_nearest_name(tmp_path, run):
+def test_unknown_session_is_rejected_with_suggestion(tmp_path, run):
     path = str(arm_with(tmp_path, PUBLIC))
     words = ["solve", path, "--joint", "drive=0.5"]
     there = answer(run, tmp_path, *words, "--under", "session=day2")
@@ -156,7 +155,7 @@ def test_unknown_session_is_refused_with_the_nearest_name(tmp_path, run):
     assert '--under session: found "day3"; did you mean "day2"' in error
 
 
-def test_missing_covariate_is_refused_with_its_option(tmp_path, run):
+def test_solve_requires_covariate_of_a_function(tmp_path, run):
     humid = PUBLIC.replace('"q.drive"', '"cov.humidity"').replace('"waves"', '"powers"')
     humid = humid.replace('"1.sine" = 1.2e-4, "1.cosine" = -3e-5', '"1" = 1e-6')
     path = str(arm_with(tmp_path, humid.replace('session = "day2"', "")))

@@ -1,4 +1,4 @@
-"""Guides with a fit: limits, random draws and worst case."""
+"""Linear guides with a fit: limits, random draws and worst case."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ from forcefit.assembly.statistics.callout_sources import sources_of
 from forcefit.assembly.statistics.linear_response import linear_response
 from forcefit.assembly.statistics.worst_pose import worst_pose
 
-# a block in a guide of 80 mm; a point of its axis 200 mm from its middle
+# block in a guide with a length of 80 mm; the platform is 200 mm from its centre
 GUIDE = """
 format = 2
 name = "guide"
@@ -42,14 +42,16 @@ def worst(robot):
 
 
 @pytest.mark.parametrize(("fit", "um"), [(ONE, (25, 25)), (TWO, (25, 37))])
-def test_block_tilts_by_the_largest_gap_of_its_fit(tmp_path, fit, um):
-    """40 H7/g6: 0/+25 and -25/-9 um, gaps of 4.5 to 25 um; 30 H8/f7: 0/+33 and
-    -41/-20 um, 10 to 37 um.  A point at 200 mm moves by c 2 x 200/80 along x and y."""
+def test_worst_case_of_guide_follows_from_largest_gap_of_fit(tmp_path, fit, um):
+    """A gap c displaces a point at 200 mm by c * 2 * 200 / 80 along x and y.
+
+    The gap is 4.5 to 25 um for 40 H7/g6 and 10 to 37 um for 30 H8/f7.
+    """
     robot = read(tmp_path, GUIDE.replace("FIT", fit))
     assert worst(robot) == pytest.approx(5e-6 * np.hypot(*um), rel=1e-6)
 
 
-def test_fit_of_a_guide_is_preserved_in_a_file_with_frames(tmp_path):
+def test_fit_of_a_guide_is_preserved_in_format_1(tmp_path):
     robot = read(tmp_path, GUIDE.replace("FIT", TWO))
     write_robot(robot, tmp_path / "frames.toml")
     again = read_robot(tmp_path / "frames.toml")
@@ -58,7 +60,7 @@ def test_fit_of_a_guide_is_preserved_in_a_file_with_frames(tmp_path):
     assert worst(again) == pytest.approx(worst(robot), rel=1e-9)
 
 
-def test_one_gap_of_a_guide_is_drawn_along_each_axis(tmp_path):
+def test_gaps_of_a_guide_along_x_and_y_are_independent(tmp_path):
     robot = read(tmp_path, GUIDE.replace("FIT", TWO))
     sources = sources_of(robot)
     assert [fit.name for fit in sources.fits] == [
@@ -69,7 +71,7 @@ def test_one_gap_of_a_guide_is_drawn_along_each_axis(tmp_path):
     gaps = 1e6 * (sources.draw(0, 20_000, 1) + means)
     assert (gaps.min(axis=0) >= [4.5, 10]).all()
     assert (gaps.max(axis=0) <= [25, 37]).all()
-    # uniform sizes of widths 25 and 16, 33 and 21 um: half the root of their squares
+    # the gap is half the difference of two uniform sizes with the given ranges [um]
     expected = [np.hypot(25, 16) / np.sqrt(48), np.hypot(33, 21) / np.sqrt(48)]
     assert gaps.std(axis=0) == pytest.approx(expected, rel=0.02)
     assert abs(np.corrcoef(gaps.T)[0, 1]) < 0.03

@@ -1,4 +1,4 @@
-"""Messages for invalid links in robot files."""
+"""Error messages for invalid links in robot files."""
 
 import pytest
 
@@ -127,5 +127,5 @@ REFUSED_LINKS = {
 @pytest.mark.parametrize(
     ("old", "new", "message"), REFUSED_LINKS.values(), ids=REFUSED_LINKS
 )
-def test_invalid_link_is_refused_with_one_message(old, new, message, write_file):
+def test_invalid_link_is_rejected(old, new, message, write_file):
     assert_refused(write_file, old, new, message)

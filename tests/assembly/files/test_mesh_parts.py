@@ -1,4 +1,4 @@
-"""Mesh links with parts of different materials in robot files."""
+"""Mesh links that consist of different materials."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -17,7 +17,7 @@ def arm(parts=PARTS):
     return Robot("one", "arm", (Frame("arm", translation=[0, 0, 1], link=link),))
 
 
-def test_modulus_scale_multiplies_the_modulus_of_every_part():
+def test_modulus_scale_multiplies_modulus_of_each_material():
     conditions = as_declared(home_posture(arm()))
     link = MODULUS_SCALE.apply(conditions, {"arm": 2.0}).robot.frame("arm").link
     assert link.young == 1.4e11

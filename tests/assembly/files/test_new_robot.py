@@ -1,4 +1,4 @@
-"""Tests of the robot files written by ``forcefit new``."""
+"""Robot files that ``forcefit new`` writes."""
 
 import json
 import sys
@@ -14,8 +14,8 @@ from forcefit.assembly.kinematics.posture import home_posture
 from forcefit.assembly.robots import load_robot
 from forcefit.results.schema import schema_of
 
-# all freedoms, of the platform, over-constraints: Merlet, Parallel Robots (2006), by
-# Kutzbach's count where the closures are independent; three of each loop in a plane
+# degrees of freedom of the robot and of the platform, and number of redundant
+# constraints, from Merlet, Parallel Robots (2006)
 MOBILITY = {
     "UPS": (6, 6, 0), "RUS": (6, 6, 0), "UPU": (3, 3, 0), "PRS": (3, 3, 0),
     "RRR": (3, 3, 6), "delta": (9, 3, 0),
@@ -23,9 +23,7 @@ MOBILITY = {
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_new_robot_has_the_mobility_of_the_literature_and_solves(
-    run, tmp_path, monkeypatch, kind
-):
+def test_new_robot_has_mobility_of_the_literature(run, tmp_path, monkeypatch, kind):
     monkeypatch.chdir(tmp_path)
     status, out, err = run("new", "mine", "--kind", kind)
     assert (status, err) == (0, "")
@@ -41,13 +39,11 @@ def test_new_robot_has_the_mobility_of_the_literature_and_solves(
     results = json.loads(out)
     assert (status, results["status"]) == (0, "ok")
     assert not results["mobility"]["singular"]
-    assert results["platform_screw"][5] < 0  # the platform gives way downwards
+    assert results["platform_screw"][5] < 0  # the platform moves in load direction
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_new_robot_file_follows_the_schema_that_its_first_line_names(
-    run, tmp_path, monkeypatch, kind
-):
+def test_new_robot_file_is_valid_according_to_schema(run, tmp_path, monkeypatch, kind):
     monkeypatch.chdir(tmp_path)
     run("new", "mine", "--kind", kind)
     text = (tmp_path / "mine.toml").read_text()
@@ -58,12 +54,12 @@ def test_new_robot_file_follows_the_schema_that_its_first_line_names(
 
 
 @pytest.mark.parametrize(("kind", "legs", "expected"), [
-    # more legs than freedoms: each further drive is redundant
+    # drives of additional legs are redundant
     ("UPS", 8, (6, 2, 0)), ("RRR", 4, (3, 1, 9)),
-    # each leg of a 3-UPU holds one turn: two of four hold the third too
+    # each leg of a 3-UPU robot constrains one rotation, so that the fourth is redundant
     ("UPU", 4, (3, 1, 1)),
 ])  # fmt: skip
-def test_additional_legs_of_a_new_robot_are_redundant(
+def test_additional_legs_of_new_robot_are_redundant(
     run, tmp_path, kind, legs, expected
 ):
     path = tmp_path / "mine.toml"

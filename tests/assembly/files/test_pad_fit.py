@@ -1,7 +1,7 @@
-"""A fit as the gap of a pad between two planes: its limits by hand.
+"""Pad between two planes, whose gap is determined by a fit.
 
-20 H9/h9 is 0 to 52 um between the planes and -52 to 0 um of the pad: gaps of 0 to 52 um
-from the middle, on average 26 um.
+The deviations for 20 H9/h9 are 0 to 52 um between the planes and -52 to 0 um of the
+pad.  The gap on each side is 0 to 52 um with a mean of 26 um.
 """
 
 import re
@@ -18,7 +18,7 @@ from forcefit.assembly.statistics.linear_response import linear_response
 from forcefit.assembly.statistics.worst_pose import worst_pose
 from forcefit.inputs.table import BadInput
 
-A, B = 0.03, 0.02  # [m] half sizes of the pad
+A, B = 0.03, 0.02  # [m] half the length and half the width of the pad
 FIT = 'fit = "20 H9/h9"'
 PAD = """
 format = 2
@@ -44,14 +44,14 @@ def read(tmp_path, text=PAD):
 
 
 def octahedron(robot, gap, rng):
-    """Reachable screws have the support max(|w_T|, |w_RX| / B, |w_RY| / A) g."""
+    """Check that the support function is gap * max(|w_T|, |w_RX| / B, |w_RY| / A)."""
     reachable = reachable_screws(solve_assembly(home_posture(robot)), "frozen")
     for w in rng.normal(size=(20, 6)) * [B, A, 0, 0, 0, 1]:
         expected = gap * (np.abs(w[[0, 1, 5]]) / [B, A, 1]).max()
         assert reachable.support(w).height == pytest.approx(expected, rel=1e-7)
 
 
-def test_pad_with_a_fit_has_the_octahedron_of_the_gap_of_each_draw(tmp_path, rng):
+def test_reachable_screws_of_a_pad_are_proportional_to_its_gap(tmp_path, rng):
     robot = read(tmp_path)
     sources = sources_of(robot)
     assert [fit.name for fit in sources.fits] == ["fit 20 H9/h9 of slot.turn"]
@@ -60,8 +60,8 @@ def test_pad_with_a_fit_has_the_octahedron_of_the_gap_of_each_draw(tmp_path, rng
     octahedron(sources.with_largest_clearances(), 52e-6, rng)
 
 
-def test_gap_of_a_pad_is_half_the_difference_of_two_uniform_sizes(tmp_path):
-    """Widths of 52 um each: a deviation of 52 / sqrt(24) um, and means of 26 um."""
+def test_random_gap_of_a_pad_has_mean_and_deviation_of_fit(tmp_path):
+    """The standard deviation of the gap is 52 / sqrt(24) um and its mean is 26 um."""
     gaps = 26 + 1e6 * sources_of(read(tmp_path)).draw(0, 20_000, 1)[:, 0]
     assert 0 <= gaps.min() <= gaps.max() <= 52
     assert gaps.mean() == pytest.approx(26, abs=0.3)
@@ -69,8 +69,8 @@ def test_gap_of_a_pad_is_half_the_difference_of_two_uniform_sizes(tmp_path):
 
 
 @pytest.mark.parametrize(("more", "um"), [("", 52), ("0.004 mm", 54)])
-def test_pad_tilts_by_the_largest_gap_of_its_fit_and_its_form(tmp_path, more, um):
-    """Rotation about x by g / B; a face that is flat within t adds t / 2."""
+def test_worst_case_tilt_of_pad_follows_from_fit_and_flatness(tmp_path, more, um):
+    """The rotation about x is gap / B; a flatness tolerance t increases it by t / 2."""
     form = f'[[tolerance]]\nfeature = "slot"\nflatness = "{more}"\n' if more else ""
     robot = read(tmp_path, PAD.replace("[[body]]", form + "[[body]]", 1))
     prepared = linear_response(home_posture(robot))
@@ -78,7 +78,7 @@ def test_pad_tilts_by_the_largest_gap_of_its_fit_and_its_form(tmp_path, more, um
     assert found.attained == pytest.approx(um * 1e-6 / B, rel=1e-6)
 
 
-def test_fit_of_a_pad_is_preserved_in_a_file_with_frames(tmp_path, rng):
+def test_fit_of_a_pad_is_preserved_in_format_1(tmp_path, rng):
     robot = read(tmp_path)
     write_robot(robot, tmp_path / "frames.toml")
     again = read_robot(tmp_path / "frames.toml")
@@ -95,9 +95,7 @@ def test_fit_of_a_pad_is_preserved_in_a_file_with_frames(tmp_path, rng):
          'fit: found together with "pad", expected it in the pad'),
     ],
 )  # fmt: skip
-def test_fit_that_is_not_possible_for_a_pad_is_refused_in_one_line(
-    tmp_path, old, new, message
-):
+def test_invalid_fit_of_a_pad_is_rejected(tmp_path, old, new, message):
     with pytest.raises(BadInput, match=re.escape(message)) as error:
         read(tmp_path, PAD.replace(old, new))
     assert "\n" not in str(error.value)

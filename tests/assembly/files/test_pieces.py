@@ -1,4 +1,4 @@
-"""``pieces`` of a beam in robot files: read, written, refused."""
+"""Reading and writing of the key ``pieces`` of a beam."""
 
 import pytest
 
@@ -25,7 +25,7 @@ def file(tmp_path):
     return path
 
 
-def test_pieces_of_a_curved_link_are_read_and_written_and_can_be_varied(file, tmp_path):
+def test_number_of_beam_springs_is_read_written_and_varied(file, tmp_path):
     robot = read_robot(file)
     assert robot.frame("tip").link.pieces == 4
     write_robot(robot, tmp_path / "again.toml")

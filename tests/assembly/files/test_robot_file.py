@@ -1,4 +1,4 @@
-"""Robot files read and written: equivalent forms give the same robot."""
+"""Reading and writing of robot files."""
 
 import json
 import math
@@ -64,9 +64,7 @@ LOADS = {
 
 
 @pytest.mark.parametrize("change", LOADS.values(), ids=LOADS)
-def test_equivalent_forms_of_a_file_describe_the_same_robot(
-    change, write_file, tmp_path
-):
+def test_equivalent_files_describe_the_same_robot(change, write_file, tmp_path):
     expected = read_robot(write_file(FOUR_BAR))
     changed = change(FOUR_BAR)
     assert changed != FOUR_BAR
@@ -74,7 +72,7 @@ def test_equivalent_forms_of_a_file_describe_the_same_robot(
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_frame_order_does_not_change_the_robot(seed, write_file):
+def test_home_pose_does_not_depend_on_frame_order(seed, write_file):
     head, *frames = FOUR_BAR.split("[[frame]]")
     frames[-1], closure = frames[-1].split("[[closure]]")
     mixed = np.random.default_rng(seed).permutation(len(frames))
@@ -86,8 +84,8 @@ def test_frame_order_does_not_change_the_robot(seed, write_file):
     np.testing.assert_allclose(here.platform, there.platform, rtol=0, atol=1e-12)
 
 
-def test_transform_by_dh_parameters_equals_the_product_of_its_four_factors(write_file):
-    """Rot(z, theta) Trans(z, d) Trans(x, a) Rot(x, alpha), multiplied by hand."""
+def test_dh_transform_equals_product_of_four_factors(write_file):
+    """The factors are Rot(z, theta) Trans(z, d) Trans(x, a) Rot(x, alpha)."""
     text = SLIDER.replace("translation = [0.3, 0.0, 0.2]\n", "").replace(
         "rotation = [0.0, 1.5707963267948966, 0.0]",
         "dh = { theta = 0.3, d = 0.1, a = 0.2, alpha = -1.1 }",
@@ -100,17 +98,17 @@ def test_transform_by_dh_parameters_equals_the_product_of_its_four_factors(write
     np.testing.assert_allclose(T, turn_z @ turn_x, rtol=0, atol=1e-15)
 
 
-def test_beam_below_a_slide_has_the_length_between_origins_at_home(write_file):
-    """0.2 m of the slide and [0.3, 0, 0.2] m of the frame: 3-4-5 times 0.1."""
+def test_beam_length_equals_distance_of_origins_at_home(write_file):
+    """The length is sqrt(0.3^2 + 0.4^2) m with a slide coordinate of 0.2 m."""
     link = read_robot(write_file(SLIDER)).frame("tool").link
     assert link.length == pytest.approx(0.5, rel=1e-15)
-    # the frame is turned by a quarter about y: its x is the slide's -z, its z is x
+    # the frame is rotated by 90 degrees about y relative to the slide
     np.testing.assert_allclose(link.axis, [-0.8, 0.0, 0.6], rtol=0, atol=1e-15)
     at_zero = read_robot(write_file(SLIDER.replace("position = 0.2", ""))).frame("tool")
     assert at_zero.link.length is None
 
 
-def test_mesh_below_a_slide_not_at_zero_is_refused(write_file):
+def test_mesh_after_a_slide_with_nonzero_coordinate_is_rejected(write_file):
     path = write_file(SLIDER.replace("beam = { radius = 0.01 }", mesh()))
     with pytest.raises(
         BadInput, match=r'"tool"\.link\.mesh: found a mesh on a frame after'
@@ -118,14 +116,14 @@ def test_mesh_below_a_slide_not_at_zero_is_refused(write_file):
         read_robot(path)
 
 
-def test_stiffness_of_seven_digits_is_made_symmetric(write_file):
+def test_rounded_stiffness_matrix_is_made_symmetric(write_file):
     K = rows({(1, 2): 0.1234567, (2, 1): 0.1234568})
     path = write_file(FOUR_BAR.replace(LINK, f"link = {{ stiffness = {K} }}"))
     K = read_robot(path).frame("coupler").link.stiffness
     np.testing.assert_array_equal(K, K.T)
 
 
-def test_relative_paths_start_from_the_robot_file(write_file, tmp_path):
+def test_relative_paths_refer_to_folder_of_robot_file(write_file, tmp_path):
     for path, expected in [
         ("meshes/x.stl", tmp_path / "meshes/x.stl"),
         ("../x.stl", tmp_path / "../x.stl"),
@@ -137,10 +135,8 @@ def test_relative_paths_start_from_the_robot_file(write_file, tmp_path):
         assert read_robot(file).frame("coupler").link == LibraryLink(expected, "k")
 
 
-def test_relative_path_is_written_relative_to_the_new_file(
-    write_file, tmp_path, monkeypatch
-):
-    """Read from the file's folder, written to a subfolder."""
+def test_written_path_is_relative_to_new_robot_file(write_file, tmp_path, monkeypatch):
+    """The robot is read from one folder and written to a subfolder."""
     write_file(FOUR_BAR.replace(BEAM, mesh()))
     monkeypatch.chdir(tmp_path)
     (tmp_path / "out").mkdir()
@@ -149,7 +145,7 @@ def test_relative_path_is_written_relative_to_the_new_file(
 
 
 def assert_same_robot(robot, expected):
-    """Every field, to the last bit."""
+    """Check that all fields of two robots are identical."""
     for key in ("name", "platform", "closures", "description"):
         assert getattr(robot, key) == getattr(expected, key)
     assert len(robot.frames) == len(expected.frames)
@@ -174,7 +170,7 @@ SECTIONS = (
 
 
 def every_link(rng):
-    """Links of every kind, with numbers of all digits."""
+    """Yield links of all types."""
     K = np.diag(rng.uniform(1, 1e8, 6))
     for section in SECTIONS:
         yield BeamLink(section, *rng.uniform(1e9, 2e11, 1), rng.uniform(-0.9, 0.49))
@@ -194,7 +190,7 @@ def every_link(rng):
 
 
 def every_joint(rng):
-    """Joints of every kind."""
+    """Yield the keys of joints of all types."""
     K = np.diag(rng.uniform(1, 1e8, 6))
     bearing, slide, locked = K.copy(), K.copy(), np.diag([math.inf] * 6)
     bearing[2, 2] = slide[5, 5] = 0.0
@@ -209,16 +205,14 @@ def every_joint(rng):
 
 
 def moments(rng):
-    """(3, 3) [kg m^2] of a point mass and a ball."""
+    """Return a random valid inertia matrix, (3, 3) [kg m^2]."""
     arm = rng.normal(size=3)
     return (arm @ arm + rng.uniform()) * np.eye(3) - np.outer(arm, arm)
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_every_kind_of_link_and_joint_is_equal_after_writing_and_reading(
-    seed, tmp_path
-):
-    """A serial arm; each seed combines links with other joints."""
+def test_links_and_joints_are_equal_after_writing_and_reading(seed, tmp_path):
+    """Each seed combines the links of a serial arm with different joints."""
     rng, frames, parent = np.random.default_rng(seed), [], "base"
     joints = list(every_joint(rng))
     for k, link in enumerate(every_link(rng)):
@@ -237,20 +231,20 @@ def test_every_kind_of_link_and_joint_is_equal_after_writing_and_reading(
     assert_same_robot(read_robot(tmp_path / "robot.toml"), robot)
 
 
-def test_documentation_example_loads_and_closes(write_file):
+def test_robot_in_documentation_has_closed_loops(write_file):
     text = (Path(__file__).parents[3] / "docs" / "robot_files.md").read_text("utf-8")
     robot = read_robot(write_file(text.split("```toml\n")[1].split("```")[0]))
     posture = home_posture(robot)
     assert posture.mismatch < 1e-9
-    # both legs are mirror images, so they meet on the y axis
+    # both legs are mirror images, so that the platform is in the plane x = 0
     assert posture.platform[0, 3] == pytest.approx(0.0, abs=1e-9)
     assert {f.joint for f in robot.frames} == {"fixed", "revolute"}
 
 
-def test_documentation_bearing_deflects_by_its_data_sheet_stiffness(write_file):
-    """Radial 1.2e8 N/m, axial 6e7 N/m: under 60 N the hub moves by F/k, worked by hand.
+def test_bearing_in_documentation_has_data_sheet_stiffness(write_file):
+    """The displacement is the clearance plus F / k for F = 60 N.
 
-    Its clearance is taken up first; about its axis nothing resists.
+    The stiffness k is 1.2e8 N/m in radial and 6e7 N/m in axial direction.
     """
     text = (Path(__file__).parents[3] / "docs" / "robot_files.md").read_text("utf-8")
     example = text.split("```toml\n")[2].split("```")[0]
@@ -268,8 +262,11 @@ def test_documentation_bearing_deflects_by_its_data_sheet_stiffness(write_file):
         solve_assembly(home_posture(robot), [0, 0, 1.0, 0, 0, 0])
 
 
-def test_documentation_nut_moves_along_its_thread_by_clearance_and_flanks(write_file):
-    """Under F along z and the moment -h F that the thread carries: b + F / k."""
+def test_nut_in_documentation_has_clearance_and_stiffness(write_file):
+    """A force F and a moment -h F along z displace the nut by b + F / k.
+
+    The lead is h, the clearance is b, and the stiffness is k.
+    """
     text = (Path(__file__).parents[3] / "docs" / "robot_files.md").read_text("utf-8")
     example = text.split("```toml\n")[3].split("```")[0]
     tip = 'platform = "tip"\n[[frame]]\nname = "tip"\nparent = "nut"\n'
@@ -282,8 +279,8 @@ def test_documentation_nut_moves_along_its_thread_by_clearance_and_flanks(write_
         solve_assembly(home_posture(robot), [0, 0, 0, 0, 0, 100.0])
 
 
-def test_missing_dh_alpha_is_reported_by_the_reader_and_by_solve(write_file, run):
-    """Denavit and Hartenberg's fourth number, taken as 0 where it is left out."""
+def test_missing_dh_alpha_is_reported(write_file, run):
+    """The default value of the Denavit-Hartenberg parameter alpha is 0."""
     text = """
 platform = "tool"
 [[frame]]
@@ -295,7 +292,7 @@ name = "tool"
 parent = "arm"
 dh = { a = 0.2, alpha = 0.0 }
 """
-    told = 'dh without alpha, taken as 0: "arm"'
+    told = 'dh without alpha, which is set to 0: "arm"'
     file = write_file(text)
     assert read_robot(file).remarks == (told,)
     _, out, _ = run("assembly", "solve", file)

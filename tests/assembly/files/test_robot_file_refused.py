@@ -1,4 +1,4 @@
-"""Messages for invalid robot files."""
+"""Error messages for invalid robot files."""
 
 import math
 import re
@@ -18,8 +18,8 @@ from tests.robot_files_for_tests import (
 )
 
 
-def test_unchanged_example_files_are_valid(write_file):
-    """Every refused case below changes one of these two files."""
+def test_unchanged_example_robot_files_are_valid(write_file):
+    """The invalid files in this module are changed versions of these two files."""
     robot = read_robot(write_file(FOUR_BAR))
     assert [f.name for f in robot.frames][:2] == ["crank", "elbow"]
     assert home_posture(robot).mismatch < 1e-12
@@ -208,7 +208,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize(("old", "new", "message"), REFUSED.values(), ids=REFUSED)
-def test_invalid_robot_file_is_refused_with_one_message(old, new, message, write_file):
+def test_invalid_robot_file_is_rejected(old, new, message, write_file):
     assert_refused(write_file, old, new, message)
 
 
@@ -226,9 +226,7 @@ CONTENTS = {
 
 
 @pytest.mark.parametrize(("content", "message"), CONTENTS.values(), ids=CONTENTS)
-def test_message_about_a_file_that_is_not_a_robot_file_omits_its_content(
-    content, message, write_file
-):
+def test_error_message_about_another_file_is_short(content, message, write_file):
     path = write_file(content)
     with pytest.raises(BadInput, match=re.escape(f"{path}: {message}")) as caught:
         read_robot(path)
@@ -236,7 +234,7 @@ def test_message_about_a_file_that_is_not_a_robot_file_omits_its_content(
     assert "\n" not in str(caught.value)
 
 
-def test_missing_file_or_folder_is_refused_by_name(tmp_path):
+def test_missing_file_or_folder_is_rejected(tmp_path):
     with pytest.raises(BadInput, match="none.toml: cannot be read: No such file"):
         read_robot(tmp_path / "none.toml")
     with pytest.raises(BadInput, match="cannot be read: Is a directory"):

@@ -1,6 +1,6 @@
-"""Damaged robot files: each is read, or refused with one line.
+"""Robot files with random changes, which are read or rejected.
 
-Every command and thousands of changes: ``benchmarks/fuzz.py``.
+More changes are tested by ``benchmarks/fuzz.py``.
 """
 
 from contextlib import suppress
@@ -36,14 +36,14 @@ SEEDS = {"four_bar": BAR, "serial": ARM, "links": LINKS}
 
 
 @pytest.mark.parametrize("name", SEEDS)
-def test_unchanged_robot_files_close_at_home(name, write_file):
-    """Otherwise every change would be refused for the same first mistake."""
+def test_loops_of_unchanged_robot_files_are_closed(name, write_file):
+    """The unchanged files are valid."""
     assert home_posture(read_robot(write_file(SEEDS[name]))).mismatch < 1e-9
 
 
 @pytest.mark.parametrize("name", SEEDS)
-def test_damaged_robot_file_is_read_or_refused_with_one_line(name, write_file):
-    """Changed values, keys, tables, lines or bytes; the same hundred in every run."""
+def test_damaged_robot_file_is_read_or_rejected(name, write_file):
+    """Values, keys, tables, lines or bytes are changed at random with fixed seeds."""
     for seed in range(100):
         path = write_file(SEEDS[name])
         change_file(path, Random(f"{name} {seed}"))
@@ -56,5 +56,5 @@ def test_damaged_robot_file_is_read_or_refused_with_one_line(name, write_file):
             assert all(c >= " " for c in told), seed
             assert len(told) <= 800, seed
             continue
-        with suppress(BadInput):  # out of reach
+        with suppress(BadInput):  # the pose may be outside the workspace
             place_robot(robot, pose={"tx": 0.4, "rz": 0.1})

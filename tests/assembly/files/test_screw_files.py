@@ -1,4 +1,4 @@
-"""Helical joints in files, and the programs that refuse them."""
+"""Helical joints in robot files and in files of other programs."""
 
 import pytest
 
@@ -17,8 +17,8 @@ def read(tmp_path):
     return robot
 
 
-def test_beam_beyond_a_turned_thread_is_longer_by_the_travel(write_file):
-    """From the thread's origin, 0.1 m before it, to its tip 0.24 m aside: 0.26 m."""
+def test_beam_length_includes_travel_of_a_screw(write_file):
+    """The length is sqrt(0.24^2 + 0.1^2) m = 0.26 m after a travel of 0.1 m."""
     path = write_file("""
         platform = "tip"
         [[frame]]
@@ -37,7 +37,7 @@ def test_beam_beyond_a_turned_thread_is_longer_by_the_travel(write_file):
     assert read_robot(path).frame("tip").link.length == pytest.approx(0.26, rel=1e-14)
 
 
-def test_screw_is_written_and_read_unchanged(read, tmp_path):
+def test_helical_joint_is_equal_after_writing_and_reading(read, tmp_path):
     robot = read()
     write_robot(robot, tmp_path / "frames.toml")
     again = read_robot(tmp_path / "frames.toml")
@@ -46,28 +46,28 @@ def test_screw_is_written_and_read_unchanged(read, tmp_path):
 
 
 @pytest.mark.parametrize("ending", ["xml", "urdf"])
-def test_files_of_other_programs_refuse_a_screw(ending, read, tmp_path):
+def test_export_of_a_helical_joint_is_rejected(ending, read, tmp_path):
     read()
     with pytest.raises(BadInput, match=r'helical joints \("nut"\), which only robot'):
         convert(tmp_path / "lift.toml", tmp_path / f"lift.{ending}")
     assert not (tmp_path / f"lift.{ending}").exists()
 
 
-def test_rotation_bound_of_a_nut_is_refused(read):
+def test_spin_bound_of_a_helical_joint_is_rejected(read):
     text = LIFT.replace("pitch =", "clearance = { spin = 1e-3 }\npitch =")
     with pytest.raises(BadInput, match="spin: found a bound on a helical joint"):
         read(text)
 
 
 @pytest.mark.exudyn
-def test_simulation_of_a_screw_is_refused_in_one_line(read, run, tmp_path):
+def test_crosscheck_of_a_helical_joint_is_rejected(read, run, tmp_path):
     read()
     code, out, err = run("validation", "crosscheck", tmp_path / "lift.toml")
     assert (code, out, err.count("\n")) == (2, "", 1)
     assert 'frame "nut": found a helical joint, expected revolute, prismatic' in err
 
 
-def test_study_with_a_cross_check_of_a_screw_is_refused_at_once(read, run, tmp_path):
+def test_study_with_crosscheck_of_a_helical_joint_is_rejected(read, run, tmp_path):
     read()
     (tmp_path / "study.toml").write_text('robot = "lift.toml"')
     code, _, err = run("study", tmp_path / "study.toml")

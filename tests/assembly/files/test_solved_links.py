@@ -1,4 +1,4 @@
-"""Links given by meshes and libraries are solved only when a robot is loaded."""
+"""Stiffness of mesh and library links, which is computed when a robot is loaded."""
 
 import builtins
 import copy
@@ -80,7 +80,7 @@ SOLVERS = {
     "sweep": swept,
     "draws": drawn,
     "crosscheck": lambda at: crosscheck(at, links="spring").slope,
-}  # those below need more of a link than its matrix
+}  # the following functions require more than the stiffness matrix of a link
 OF_A_SHAPE = {
     "stress": lambda at: peak_stresses(at.robot, solve_assembly(at).wrenches),
     "frequencies": lambda at: natural_modes(at, 3).frequencies,
@@ -88,13 +88,13 @@ OF_A_SHAPE = {
 
 
 def refuse(*given, **named):
-    """Fail if a function that only loading may use is called."""
+    """Fail if a solver reads a file or solves a finite-element model."""
     raise AssertionError(f"below the loading of a robot: {given[:1]}")
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """A robot file, the mesh and the library that it names."""
+    """Return a folder with a robot file, its mesh and its library."""
     pyvista = pytest.importorskip("pyvista")
     folder = tmp_path_factory.mktemp("robot")
     bar = shape_surface("rectangle", {"length": 0.3, "width": 0.02, "height": 0.02})
@@ -114,7 +114,7 @@ def robot(folder):
 
 @pytest.fixture
 def sealed(monkeypatch, folder):
-    """Return a function that disables reading of files and finite elements."""
+    """Return a function that disables file access and finite-element solutions."""
     ours = str(folder), str(cache_folder())
     usual = io.open
 
@@ -133,18 +133,17 @@ def sealed(monkeypatch, folder):
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
-def test_solvers_use_only_the_stiffness_matrices_of_a_loaded_robot(
-    folder, solver, sealed
-):
-    """The result equals that of a robot whose links are given by those matrices."""
+def test_solvers_require_only_stiffness_matrices_of_links(folder, solver, sealed):
+    """The result is equal if the links are replaced by their stiffness matrices."""
     robot = load_robot(folder / "robot.toml")
     names = [frame.name for frame in robot.frames]
     matrices = dict(zip(names, link_compliances(robot), strict=True))
     twin = robot.with_links({
         name: MatrixLink(np.linalg.inv(C)) for name, C in matrices.items() if C.any()
     })  # fmt: skip
-    expected = SOLVERS[solver](home_posture(twin))  # and all is imported and compiled
-    again = load_robot(folder / "robot.toml")  # of which nothing is kept anywhere
+    # this call also imports and compiles all functions
+    expected = SOLVERS[solver](home_posture(twin))
+    again = load_robot(folder / "robot.toml")  # a robot without cached results
     sealed()
     found = SOLVERS[solver](home_posture(again))
     scale = np.abs(np.asarray(expected)).max()
@@ -152,7 +151,7 @@ def test_solvers_use_only_the_stiffness_matrices_of_a_loaded_robot(
 
 
 @pytest.mark.parametrize("solver", OF_A_SHAPE)
-def test_stress_and_mass_of_a_loaded_robot_read_no_file(folder, solver, sealed):
+def test_stresses_and_frequencies_do_not_require_link_files(folder, solver, sealed):
     first, again = (load_robot(folder / "robot.toml") for _ in range(2))
     expected = OF_A_SHAPE[solver](home_posture(first))
     sealed()
@@ -160,8 +159,8 @@ def test_stress_and_mass_of_a_loaded_robot_read_no_file(folder, solver, sealed):
     np.testing.assert_array_equal(found, expected)
 
 
-def test_modulus_scale_of_a_mesh_link_scales_its_compliance(folder, robot, sealed):
-    """K is proportional to E, in agreement with finite elements for the same E."""
+def test_compliance_of_mesh_link_is_inverse_to_modulus_scale(folder, robot, sealed):
+    """The compliance agrees with a finite-element solution for the scaled modulus."""
     (folder / "half.toml").write_text(FILE.replace("6e10", "3e10", 1))
     expected = link_compliances(load_robot(folder / "half.toml"))
     effect = '[[effect]]\nname = "modulus_scale"\nparameters = { elbow = 0.5 }\n'
@@ -175,7 +174,7 @@ def test_modulus_scale_of_a_mesh_link_scales_its_compliance(folder, robot, seale
     assert np.abs(scaled(soft - expected[row], soft)).max() < 1e-7
 
 
-def test_solvers_refuse_links_that_are_not_solved(folder):
+def test_solvers_reject_links_without_stiffness(folder):
     robot = read_robot(folder / "robot.toml")
     for name, kind in (("elbow", "mesh"), ("wrist", "library")):
         message = rf'^frame "{name}"\.link\.{kind}: found no stiffness'
@@ -186,7 +185,7 @@ def test_solvers_refuse_links_that_are_not_solved(folder):
     assert solve_assembly(home_posture(robot)).energy > 0
 
 
-def test_loading_without_links_reads_no_link_file(folder):
+def test_loading_without_links_does_not_require_link_files(folder):
     (folder / "missing.toml").write_text(FILE.replace("bar.stl", "none.stl"))
     robot = load_robot(folder / "missing.toml", links=False)
     assert zone_margin(home_posture(robot)).margin > 0
@@ -203,10 +202,10 @@ def test_loading_without_links_reads_no_link_file(folder):
          r'"elbow"\.link\.mesh: the centre of the mesh.s tip interface'),
     ],
 )  # fmt: skip
-def test_unusable_link_file_is_refused_before_finite_elements(
+def test_invalid_link_file_is_rejected_before_finite_elements(
     folder, old, new, message, monkeypatch
 ):
-    """The message is one line."""
+    """The message consists of one line."""
     monkeypatch.setattr("forcefit.stiffness.fem.fea.solve_link", refuse)
     monkeypatch.setattr("forcefit.assembly.files.solved_links._SOLVED", {})
     path = folder / "refused.toml"
@@ -216,9 +215,7 @@ def test_unusable_link_file_is_refused_before_finite_elements(
     assert "\n" not in str(refused.value)
 
 
-def test_finite_elements_of_equal_links_run_once_and_are_logged(
-    folder, caplog, tmp_path, monkeypatch
-):
+def test_equal_mesh_links_are_solved_once(folder, caplog, tmp_path, monkeypatch):
     monkeypatch.setenv("FORCEFIT_CACHE", str(tmp_path))
     monkeypatch.setattr("forcefit.assembly.files.solved_links._SOLVED", {})
     link = 'link = { mesh = { surface = "bar.stl", base = "z=0", tip = "z=0.3" }, '
@@ -236,8 +233,8 @@ def test_finite_elements_of_equal_links_run_once_and_are_logged(
     assert first.solution is second.solution
 
 
-def test_robot_hash_depends_on_the_content_of_a_step_file(folder, monkeypatch):
-    """The name of the solid after the path does not belong to the file name."""
+def test_robot_hash_depends_on_content_of_step_file(folder, monkeypatch):
+    """The path of the surface is followed by the name of a solid."""
     bar = shape_surface("rectangle", {"length": 0.3, "width": 0.02, "height": 0.02})
     monkeypatch.setattr(
         "forcefit.stiffness.surface.surface.read_surface", lambda *given: bar
@@ -250,7 +247,7 @@ def test_robot_hash_depends_on_the_content_of_a_step_file(folder, monkeypatch):
     assert len(digests) == 2
 
 
-def test_pickled_robot_omits_its_meshes(robot):
+def test_pickled_robot_does_not_contain_meshes(robot):
     sent = pickle.dumps(robot)
     assert len(sent) < 20_000
     there = solve_links(pickle.loads(sent))

@@ -1,4 +1,4 @@
-"""Cached solutions of mesh links are bit-identical and used only for the same link."""
+"""Cache for the finite-element solutions of mesh links."""
 
 import os
 import subprocess
@@ -16,7 +16,7 @@ from forcefit.inputs.table import BadInput
 from forcefit.stiffness.surface.beam_surfaces import shape_surface
 
 BAR = {"length": 0.08, "width": 0.02, "height": 0.02}
-# each question in a process of its own: how often finite elements ran, and K's digest
+# prints the number of finite-element solutions and a hash of the compliances
 PROCESS = """
 import hashlib, sys
 from forcefit.assembly.files import solved_links
@@ -41,7 +41,7 @@ young = 6e10, poisson = 0.3, density = 2700 }
 
 @pytest.fixture(scope="module")
 def surface(tmp_path_factory):
-    """A square bar of 20 x 20 x 80 mm."""
+    """Return the surface file of a square bar of 20 x 20 x 80 mm."""
     pyvista = pytest.importorskip("pyvista")
     bar = shape_surface("rectangle", BAR)
     path = tmp_path_factory.mktemp("surface") / "bar.stl"
@@ -51,7 +51,7 @@ def surface(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def solved_once(surface, tmp_path_factory):
-    """A cache folder with one solution, and the link as it was solved."""
+    """Return a cache folder with one solution, and this solution."""
     folder = tmp_path_factory.mktemp("cache")
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("FORCEFIT_CACHE", str(folder))
@@ -62,7 +62,7 @@ def solved_once(surface, tmp_path_factory):
 
 @pytest.fixture
 def cache(solved_once, tmp_path, monkeypatch):
-    """A copy of that folder, and a process that knows no solution."""
+    """Return a copy of the cache folder, without solutions in memory."""
     folder = tmp_path / "cache"
     folder.mkdir()
     for file in solved_once[0].iterdir():
@@ -74,7 +74,7 @@ def cache(solved_once, tmp_path, monkeypatch):
 
 @pytest.fixture
 def runs(solved_once, monkeypatch):
-    """Count calls of the finite elements, replaced by the known solution."""
+    """Return a list of finite-element calls, which return the known solution."""
     runs = []
 
     def solve(frame, link, digest, options):
@@ -102,7 +102,7 @@ def assert_same(one, other):
     if isinstance(one, np.ndarray):
         assert one.dtype == other.dtype
         np.testing.assert_array_equal(one, other, strict=True)
-        # the order of sums depends on them
+        # the order of summation depends on strides
         assert one.size == 0 or one.strides == other.strides
     elif is_dataclass(one):
         for field in fields(one):
@@ -116,19 +116,15 @@ def assert_same(one, other):
         assert one == other
 
 
-def test_stored_solution_is_bit_identical_to_the_solved_one(
-    surface, solved_once, cache, runs
-):
+def test_cached_solution_is_bit_identical(surface, solved_once, cache, runs):
     again = solved_link(frame(surface))
     assert not runs
     assert again.solution is not solved_once[1]
     assert_same(again.solution, solved_once[1])
 
 
-def test_moved_files_and_turned_meshes_are_not_solved_again(
-    surface, cache, tmp_path, runs
-):
-    """The solution is stored in the axes of the mesh."""
+def test_moved_or_rotated_mesh_is_not_solved_again(surface, cache, tmp_path, runs):
+    """The solution is stored in mesh axes."""
     copy = tmp_path / "other.STL"
     copy.write_bytes(surface.read_bytes())
     turned = {"up": (1.0, 0.0, 0.0), "frame_up": (0.0, 0.0, 1.0)}
@@ -150,17 +146,17 @@ CHANGES = {
 
 
 @pytest.mark.parametrize("change", CHANGES)
-def test_changed_link_is_solved_and_stored_separately(surface, cache, runs, change):
+def test_changed_link_is_solved_again(surface, cache, runs, change):
     solved_link(frame(surface, **CHANGES[change]))
     assert len(runs) == 1
     assert len(list(cache.glob("link-*.npz"))) == 2
 
 
-def test_changed_surface_accuracy_or_program_version_is_solved_again(
+def test_link_is_solved_again_for_changed_surface_or_program(
     surface, cache, tmp_path, runs, monkeypatch
 ):
     other = tmp_path / "bar.stl"
-    # the header of a binary STL says nothing about its triangles
+    # the header of a binary STL file does not contain triangles
     other.write_bytes(b"another header".ljust(80) + surface.read_bytes()[80:])
     solved_link(frame(other))
     assert len(runs) == 1
@@ -187,9 +183,7 @@ def damaged(content):
 
 
 @pytest.mark.parametrize("damage", damaged(b" "))
-def test_damaged_stored_solution_is_solved_again_and_replaced(
-    surface, solved_once, cache, runs, damage
-):
+def test_damaged_cached_solution_is_replaced(surface, solved_once, cache, runs, damage):
     file = stored_file(cache)
     whole = file.read_bytes()
     file.write_bytes(damaged(whole)[damage])
@@ -198,13 +192,13 @@ def test_damaged_stored_solution_is_solved_again_and_replaced(
     assert_same(again.solution, solved_once[1])
     solved_links._SOLVED.clear()
     solved_link(frame(surface))
-    assert len(runs) == 1  # it is whole again
+    assert len(runs) == 1  # the damaged file was replaced
     assert [f.name for f in cache.iterdir() if f.name.startswith("link-")] == [
         file.name
     ]
 
 
-def test_stored_solution_of_another_link_is_not_used(surface, cache, runs):
+def test_cached_solution_of_another_link_is_not_used(surface, cache, runs):
     file = stored_file(cache)
     solved_link(frame(surface, young=7e10))
     (other,) = set(cache.glob("link-*.npz")) - {file}
@@ -214,7 +208,7 @@ def test_stored_solution_of_another_link_is_not_used(surface, cache, runs):
     assert len(runs) == 2
 
 
-def test_unwritable_cache_folder_does_not_change_the_solution(
+def test_solution_does_not_depend_on_unwritable_cache_folder(
     surface, solved_once, cache, runs, monkeypatch
 ):
     def refuse(*given, **named):
@@ -230,14 +224,14 @@ def test_unwritable_cache_folder_does_not_change_the_solution(
     assert len(runs) == 2
 
 
-def test_stored_solutions_unused_for_months_are_removed(surface, cache, runs):
+def test_unused_cached_solutions_are_deleted(surface, cache, runs):
     file = stored_file(cache)
     months_ago = time.time() - 100 * 86_400
     mesh = cache / "mesh-of-old.npz"
     for old in (cache / "link-of-old.npz", file, mesh):
         old.touch()
         os.utime(old, (months_ago, months_ago))
-    solved_link(frame(surface))  # reads, which counts as use
+    solved_link(frame(surface))  # reading the file changes its time of use
     assert not runs
     assert time.time() - file.stat().st_mtime < 86_400
     solved_link(frame(surface, young=7e10))
@@ -247,7 +241,7 @@ def test_stored_solutions_unused_for_months_are_removed(surface, cache, runs):
     assert mesh.exists()
 
 
-def test_refused_links_stay_refused_and_leave_no_file(surface, cache):
+def test_invalid_links_are_not_cached(surface, cache):
     before = {file.name for file in cache.iterdir()}
     for _ in range(2):
         with pytest.raises(BadInput, match="no face"):
@@ -256,7 +250,11 @@ def test_refused_links_stay_refused_and_leave_no_file(surface, cache):
 
 
 def run_processes(folder, cache, count):
-    """Start processes that load one robot; how often each solved, and K's digests."""
+    """Load a robot in several processes.
+
+    Return the number of finite-element solutions in each process, and the hashes of the
+    compliances.
+    """
     started = [
         subprocess.Popen(
             [sys.executable, "-c", PROCESS, str(folder / "one.toml")],
@@ -269,9 +267,7 @@ def run_processes(folder, cache, count):
 
 
 @pytest.mark.slow
-def test_concurrent_and_later_processes_run_finite_elements_once(
-    surface, tmp_path, monkeypatch
-):
+def test_concurrent_processes_solve_a_link_once(surface, tmp_path, monkeypatch):
     (tmp_path / "one.toml").write_text(ROBOT)
     (tmp_path / "bar.stl").write_bytes(surface.read_bytes())
     monkeypatch.setenv("FORCEFIT_CACHE", str(tmp_path / "cache"))

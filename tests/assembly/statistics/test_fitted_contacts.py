@@ -234,7 +234,7 @@ frame = [
         (', parts = "pin"', "", "clearance.parts: missing"),
         ('fit = "12 H7/g6", ', "", "clearance.fit: missing"),
         ("length", "tilt = 1e-3, length", 'clearance.tilt: found together with "le'),
-        ("12 H7/g6", "12 H7/h6", 'clearance.fit: found "12 H7/g6" of the parts "pin"'),
+        ("12 H7/g6", "12 H7/h6", 'clearance.fit: found "12 H7/g6" for the parts "pin"'),
         ("length = 0.04", "length = -1", "clearance.length: found -1"),
     ],
 )

@@ -268,4 +268,4 @@ def test_dh_parameters_without_alpha_cause_a_remark(tmp_path):
     assert flat != ARM
     campaign = read_campaign(write_campaign(tmp_path / "campaign", robot=flat))
     found = [r for r in inspect_campaign(campaign).remarks if r.about == "robot"]
-    assert [r.text for r in found] == ['dh without alpha, taken as 0: "two"']
+    assert [r.text for r in found] == ['dh without alpha, which is set to 0: "two"']
