@@ -1,4 +1,4 @@
-"""Drawing tolerances: zones of small screws, fits and general tolerances.
+"""Tolerances on engineering drawings: tolerance zones, fits and general tolerances.
 
 Start with ``zone.py`` for convex tolerance zones and with ``fits.py`` for ISO 286 fits.
 """

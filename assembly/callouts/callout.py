@@ -1,4 +1,4 @@
-"""Tolerance callouts of a feature on a drawing, and the intersection of their zones."""
+"""Tolerance callouts on an engineering drawing, and their tolerance zones."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -27,7 +27,7 @@ from forcefit.assembly.callouts.zones_of_features import (
 from forcefit.inputs.table import BadInput
 
 SHAPES = ("axis", "plane", "point")
-# screw components constrained by a datum of each shape, in the axes of the datum
+# screw components that a datum constrains, in the axes of the datum, by its shape
 HELD = {
     "axis": (0, 1, 3, 4),
     "plane": (0, 1, 5),
@@ -37,26 +37,25 @@ HELD = {
 }
 LOCATIONS = ("position", "coaxiality", "profile")
 ORIENTATIONS = ("perpendicularity", "parallelism", "angularity")
-_ALONG = 1e-3  # largest sine of the angle between directions that count as parallel
-_SAME_LENGTH = 1e-6  # [m] allowed difference between a stated and a nominal length
+_ALONG = 1e-3  # largest accepted sine of the angle between parallel directions
+_SAME_LENGTH = 1e-6  # [m] largest accepted difference from a nominal length
 
 
 @dataclass(frozen=True)
 class Datum:
-    """Datum, that is, a feature relative to which other features are measured.
+    """Datum, which is a feature relative to which other features are measured.
 
     Attributes:
         frame: name of the frame.
         shape: one of :data:`HELD`. A guide is an axis that also constrains the rotation
-            about itself; a body constrains all components.
-        axis: unit vector along the axis or normal (3,), in the frame axes.
-        at: centre of the feature (3,) [m], in the frame axes.
-        hole: size of a hole used as a datum at maximum material, for example
-            ``"12 H7"``; the larger the hole, the more the datum can shift.  Empty for
-            all other datums.
-        hole_of: see :attr:`Callout.hole_of`.
-        extent: length of a hole that is datum A at maximum material [m], so that the
-            datum can also tilt; 0 for all other datums.
+            about itself.  A body constrains all components.
+        axis: unit vector along the axis or normal in frame axes, (3,).
+        at: centre of the feature in frame axes, (3,) [m].
+        hole: size of a hole with maximum material condition, for example ``"12 H7"``;
+            empty for other datums.
+        hole_of: name of the fit or joint of the hole; see :attr:`Callout.hole_of`.
+        extent: length of the hole if it is datum A with maximum material condition [m],
+            so that it can tilt; 0 for other datums.
     """
 
     frame: str
@@ -70,34 +69,33 @@ class Datum:
 
 @dataclass(frozen=True, eq=False)
 class Callout:
-    """Tolerance callouts of a feature at a joint or a frame.
+    """Tolerance callouts of a feature.
 
     Attributes:
         name: name of the feature, for example ``"leg1.bore on tube"``.
         feature: name of the frame.
-        after: whether the feature is on the body moved by the joint of the frame;
-            otherwise it is on the body before the joint.
-        datums: datums A, B, C in this order, at least one.
+        after: whether the feature is on the child body of the joint.
+        datums: one to three datums in the order A, B, C.
         shape: one of :data:`SHAPES`.
-        axis: unit vector along the axis or normal (3,), in the frame axes.
+        axis: unit vector along the axis or normal in frame axes, (3,).
         extent: length of a bore, side lengths of a face along its x and y axes, or
             diameter of a round face [m].
         widths: width of each zone [m], by the words in :data:`LOCATIONS` and
             :data:`ORIENTATIONS`.
-        hole: size of a hole whose position tolerance applies at maximum material, for
-            example ``"12 H7"``; empty if it applies regardless of size.
-        direction: unit vector normal to the axis (3,), along which the zones are
-            measured, in the frame axes; None for all directions.  For a face, the
-            direction of its first side.
+        hole: size of a hole with maximum material condition, for example ``"12 H7"``;
+            empty without this condition.
+        direction: unit vector in frame axes, (3,), along which the zone width of an
+            axis is measured, or along which the first side of a face lies; None for all
+            directions.
         length: distance from datum A and its symmetric tolerance [m], or None.
         general: general tolerance, for example ``"ISO 2768-mK"``, or empty.
         distribution: see :meth:`forcefit.assembly.callouts.zone.Zone.draw`.
-        cp: capability index of a normal distribution.
-        at: centre of the feature (3,) [m], in the frame axes.
-        envelope: whether the limits on the length apply to the whole face (envelope
-            principle) rather than only to its centre.
-        hole_of: name of the fit or joint whose hole is at maximum material. All
-            features with the same name have the same hole size.
+        cp: process capability index of a normal distribution.
+        at: centre of the feature in frame axes, (3,) [m].
+        envelope: whether the length tolerance applies to the entire face according to
+            the envelope principle, not only to its centre.
+        hole_of: name of the fit or joint of the hole.  Features with the same name have
+            the same hole size.
     """
 
     name: str
@@ -120,7 +118,7 @@ class Callout:
 
     @property
     def words(self) -> str:
-        """Names of the callouts, for example ``"position and perpendicularity"``."""
+        """Types of the callouts, for example ``"position and perpendicularity"``."""
         found = [*self.widths, *(["length"] if self.length else [])]
         found += ["general tolerance"] if self.general else []
         return " and ".join(found)
@@ -134,7 +132,7 @@ class Callout:
 
     @property
     def axes(self) -> NDArray:
-        """Axes of the feature as columns (3, 3), in the frame axes; z is its axis."""
+        """Axes of the feature as columns in frame axes, (3, 3); z is ``axis``."""
         if self.shape == "plane" and self.direction is not None:
             x, z = np.array(self.direction), np.array(self.axis)
             return np.column_stack([x, np.cross(z, x), z])
@@ -142,7 +140,7 @@ class Callout:
 
 
 def axes_along(axis: tuple[float, float, float]) -> NDArray:
-    """Return axes as columns (3, 3) with z along a unit vector; identity if it is z."""
+    """Return axes as columns, (3, 3), with z along a unit vector."""
     z = np.array(axis)
     if np.array_equal(z, [0.0, 0.0, 1.0]):
         return np.eye(3)
@@ -153,16 +151,16 @@ def axes_along(axis: tuple[float, float, float]) -> NDArray:
 
 
 def zone_of(callout: Callout, offset: NDArray, datum_axis: NDArray | None) -> Zone:
-    """Return the zone for the deviation of a feature from its datums.
+    """Return the tolerance zone of a feature relative to its datums.
 
     Args:
         callout: callouts of the feature.
-        offset: vector from datum A to the feature (3,) [m], in the feature axes.
-        datum_axis: unit vector along the axis or normal of datum A (3,), in the feature
-            axes; None if datum A is a point.
+        offset: vector from datum A to the feature in feature axes, (3,) [m].
+        datum_axis: unit vector along the axis or normal of datum A in feature axes,
+            (3,); None if datum A is a point.
 
     Returns:
-        Intersection of the zones of all callouts, in the feature axes.
+        Intersection of the zones of all callouts, in feature axes.
 
     Raises:
         BadInput: a callout contradicts the nominal geometry.
@@ -193,7 +191,7 @@ def zone_of(callout: Callout, offset: NDArray, datum_axis: NDArray | None) -> Zo
 def _check_coaxial(
     callout: Callout, offset: NDArray, datum_axis: NDArray | None
 ) -> None:
-    """Check that coaxiality is specified only for axes that coincide at home."""
+    """Check that axes with a coaxiality tolerance coincide in the home pose."""
     if "coaxiality" not in callout.widths:
         return
     expected = "expected coincident axes at home; use position for other axes"
@@ -209,7 +207,7 @@ def _check_coaxial(
 
 
 def _zone(callout: Callout, kind: str, width: float) -> Zone:
-    """Return the zone of a callout with the given width [m]."""
+    """Return the zone of a callout with a given width [m]."""
     across = callout.direction
     direction = None if across is None else (np.array(across) @ callout.axes)[:2]
     location = kind in LOCATIONS
@@ -233,7 +231,7 @@ def _zone(callout: Callout, kind: str, width: float) -> Zone:
 
 
 def _face_within(callout: Callout, width: float) -> Zone:
-    """Return the zone of a face between two planes at the given distance [m]."""
+    """Return the zone of a face between two planes at a given distance [m]."""
     is_round = len(callout.extent) == 1
     return (round_plane_position if is_round else plane_position)(
         width, *callout.extent
@@ -241,9 +239,9 @@ def _face_within(callout: Callout, width: float) -> Zone:
 
 
 def _away(shape: str, offset: NDArray, datum_axis: NDArray | None) -> NDArray:
-    """Return the part of the offset (3,) to which a length tolerance applies.
+    """Return the component of the offset to which a length tolerance applies, (3,).
 
-    This is the part normal to a plane, or normal to parallel axes.
+    This component is normal to a plane or to parallel axes.
     """
     if shape == "plane":
         return np.array([0.0, 0.0, offset[2]])
@@ -261,7 +259,7 @@ def _general(callout: Callout, away: NDArray, datum_axis: NDArray | None) -> lis
     if geometry and square and callout.shape == "axis":
         if not callout.extent:
             fault = f"found class {geometry} for a bore without its length"
-            raise BadInput(f'{fault}, expected "extent" too, or no class {geometry}')
+            raise BadInput(f'{fault}, expected also "extent", or no class {geometry}')
         width = perpendicularity_tolerance(callout.extent[0], geometry)
         zones.append(axis_orientation(width, callout.extent[0]))
     return zones
@@ -271,14 +269,15 @@ def check_orientation(
     callout: Callout, axis: NDArray, datum_axis: NDArray | None,
     same_shape: bool | None,
 ) -> None:  # fmt: skip
-    """Check orientation callouts against the nominal geometry.
+    """Check that orientation callouts agree with the nominal geometry.
 
     Args:
         callout: callouts of the feature.
-        axis: unit vector along the axis or normal of the feature (3,).
-        datum_axis: unit vector of datum A in the same axes (3,); None for a point.
+        axis: unit vector along the axis or normal of the feature, (3,).
+        datum_axis: unit vector along the axis or normal of datum A, (3,); None for a
+            point.
         same_shape: whether the feature and datum A are both axes or both planes; None
-            if datum A may be either the face or the bore of a fixed joint.
+            if datum A may be the face or the bore of a fixed joint.
 
     Raises:
         BadInput: the nominal angle contradicts the callout, or the datum is a point.
@@ -307,7 +306,7 @@ def check_orientation(
 
 
 def _expected(kind: str, same_shape: bool | None) -> str:
-    """Return the expected angle [deg] between the axes or normals for a callout."""
+    """Return the angle between axes or normals that a callout requires [deg]."""
     if same_shape is None:
         return "0 or 90"
     return "0" if (kind == "parallelism") == same_shape else "90"

@@ -1,7 +1,7 @@
 """ISO 286 fits: limits of a hole and a shaft, and the clearance between them.
 
 The tables contain the values of ISO 286-1:2010 for the letters d to p, without the
-intermediate size ranges.  A range means "over a, up to b": 30 mm belongs to 18-30.
+intermediate size ranges.  A size range includes its upper limit.
 """
 
 import re
@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 
 from forcefit.inputs.table import BadInput, quoted
 
-STEPS = (3, 6, 10, 18, 30, 50, 80, 120, 180, 250, 315, 400, 500)  # [mm] upper limits
+# [mm] upper limits of the ranges of nominal sizes
+STEPS = (3, 6, 10, 18, 30, 50, 80, 120, 180, 250, 315, 400, 500)
 GRADES = (5, 6, 7, 8, 9, 10, 11)
-# [um] tolerance by grade, with one row per range of nominal sizes
+# [um] tolerance for each range of nominal sizes (rows) and each grade (columns)
 _WIDTHS = (
     (4, 6, 10, 14, 25, 40, 60),
     (5, 8, 12, 18, 30, 48, 75),
@@ -31,7 +32,7 @@ _WIDTHS = (
     (25, 36, 57, 89, 140, 230, 360),
     (27, 40, 63, 97, 155, 250, 400),
 )
-# [um] fundamental deviation of shafts: upper deviation for d to h, lower for k to p
+# [um] upper deviations of shafts d to h and lower deviations of shafts k to p
 _DEVIATIONS = {
     "d": (-20, -30, -40, -50, -65, -80, -100, -120, -145, -170, -190, -210, -230),
     "e": (-14, -20, -25, -32, -40, -50, -60, -72, -85, -100, -110, -125, -135),
@@ -52,7 +53,7 @@ _FIT = re.compile(
 _SIZE = re.compile(rf"\s*(\d+\.?\d*)\s*(?:mm)?\s*{_ONE}\s*")
 _UM = 1e-6
 _EXPECTED = 'expected a fit such as "12 H7/g6"'
-# a fraction 2 Phi(-3 Cp) of normally distributed sizes is outside limits at 3 Cp sigma
+# distance of a limit from the mean in standard deviations, for Cp = 1
 _DEVIATIONS_IN_LIMIT = 3.0
 
 
@@ -72,7 +73,7 @@ class Fit:
         size: nominal diameter [m].
         hole: limit deviations of the hole.
         shaft: limit deviations of the shaft.
-        form: additional radial clearance due to form deviations of the parts [m], >= 0.
+        form: additional radial clearance due to form deviations [m], >= 0.
     """
 
     text: str
@@ -83,12 +84,12 @@ class Fit:
 
     @property
     def diametral(self) -> tuple[float, float]:
-        """Minimum and maximum diametral clearance [m]; negative for interference."""
+        """Minimum and maximum diametral clearance [m]; interference is negative."""
         return self.hole.lower - self.shaft.upper, self.hole.upper - self.shaft.lower
 
     @property
     def kind(self) -> str:
-        """``"clearance"``, ``"transition"`` or ``"interference"``."""
+        """Type of the fit: ``"clearance"``, ``"transition"`` or ``"interference"``."""
         least, most = self.diametral
         if least >= 0:
             return "clearance"
@@ -105,7 +106,7 @@ class Fit:
 
     @property
     def mean_radial(self) -> float:
-        """Radial clearance of parts with mean sizes [m]."""
+        """Radial clearance between a hole and a shaft of mean sizes [m]."""
         return max(0.0, sum(self.diametral) / 4) + self.form
 
     def draw(
@@ -114,15 +115,15 @@ class Fit:
         """Draw random radial clearances.
 
         Args:
-            uniform: uniform random numbers (k, 2) between 0 and 1, for the hole and the
-                shaft.
-            distribution: distribution of the hole and shaft sizes: ``"uniform"`` within
-                the limits, or ``"normal"``, centred and not truncated at the limits.
-            cp: capability index of normally distributed sizes,
+            uniform: uniform random numbers between 0 and 1 for the hole and the shaft,
+                (k, 2).
+            distribution: distribution of the sizes: ``"uniform"`` between the limits,
+                or ``"normal"`` without truncation.
+            cp: process capability index of normally distributed sizes,
                 (upper - lower) / (6 sigma).
 
         Returns:
-            Radial clearances (k,) [m], equal to ``form`` where the parts interfere.
+            Radial clearances, (k,) [m]; equal to ``form`` in the case of interference.
         """
         from scipy.special import ndtri
 
@@ -140,18 +141,17 @@ class Fit:
 
 @dataclass(frozen=True)
 class FittedEnd:
-    """One of two fitted locations between a hole and a shaft.
+    """One of two contacts between a hole and a shaft, which limit the rotation.
 
-    The two locations are the ends of a bore or guide, or two bearings. Their clearances
-    allow the parts to rotate relative to each other.
+    The contacts are at both ends of a bore or guide, or in two bearings.
 
     Attributes:
-        length: distance between both locations [m], > 0. The rotation is limited to the
+        length: distance between both contacts [m], > 0. The largest rotation is the
             radial clearance divided by this distance.
-        parts: name of the hole and shaft; locations with the same parts have the same
-            clearance.
-        bound: clearance bound that follows from the fit: ``"tilt"`` for a bore, or
-            ``"spin"`` for a guide, in which each contact rotates about one axis.
+        parts: common name of the hole and the shaft.  Contacts with the same name have
+            the same clearance.
+        bound: rotation that the contact limits: ``"tilt"`` for a bore, or ``"spin"``
+            for a guide.
     """
 
     length: float
@@ -159,17 +159,16 @@ class FittedEnd:
     bound: str = "tilt"
 
     def bounds(self, radial: float) -> dict[str, float]:
-        """Return the rotation bound [rad], by name, for a radial clearance [m]."""
+        """Return the largest rotation [rad] for a radial clearance [m], by name."""
         return {self.bound: radial / self.length}
 
 
 def parse_fit(text: str) -> Fit:
-    """Parse a fit.
+    """Parse the text of a fit.
 
     Args:
-        text: nominal size in mm, hole and shaft, for example ``"12 H7/g6"``, optionally
-            followed by the radial clearance due to form deviations, for example
-            ``"12 H7/g6 + 5 um"``.
+        text: nominal size in mm, hole and shaft, for example ``"12 H7/g6"``.  A radial
+            clearance due to form deviations may follow, as in ``"12 H7/g6 + 5 um"``.
 
     Returns:
         Clearance, transition or interference fit.
@@ -191,10 +190,10 @@ def parse_fit(text: str) -> Fit:
 
 
 def clearance_fit(text: str) -> Fit:
-    """Return a clearance or transition fit parsed from a text.
+    """Return the clearance or transition fit that a text describes.
 
     Raises:
-        BadInput: the fit is an interference fit, or is invalid (see :func:`parse_fit`).
+        BadInput: the text is not a valid fit, or the fit is an interference fit.
     """
     fit = parse_fit(text)
     if fit.kind == "interference":
@@ -202,17 +201,17 @@ def clearance_fit(text: str) -> Fit:
         raise BadInput(
             f"found {quoted(text)}, an interference fit ({least:.0f} to {most:.0f} "
             "um), "
-            "expected a clearance or transition fit; for a press fit, write type = "
+            "expected a clearance or transition fit; for a press fit, use type = "
             '"fixed" without clearance'
         )
     return fit
 
 
 def parse_hole(text: str) -> tuple[float, Limits]:
-    """Return the nominal size [m] and deviations of a hole such as ``"12 H7"``.
+    """Return the nominal size and limit deviations [m] of a hole such as ``"12 H7"``.
 
     Raises:
-        BadInput: the text is not a size, denotes a shaft, or is not in the tables.
+        BadInput: the text is not a size, or the hole is not in the tables.
     """
     match = _SIZE.fullmatch(text)
     if match is None:
@@ -224,12 +223,12 @@ def parse_hole(text: str) -> tuple[float, Limits]:
 
 
 def limits_of(size: float, letter: str, grade: int) -> Limits:
-    """Return the limit deviations of a hole (capital letter) or shaft (small letter).
+    """Return the limit deviations of a hole or a shaft.
 
     Args:
-        size: nominal size [mm], above 0 and up to 500.
-        letter: d e f g h js k m n p for a shaft, or D to P for a hole.
-        grade: 5 to 11, except for K, M and N (6 to 8) and P (6 and 7).
+        size: nominal size [mm], > 0 and <= 500.
+        letter: d e f g h js k m n p for a shaft, or the capital letters for a hole.
+        grade: 5 to 11, with the exceptions 6 to 8 for K, M and N, and 6 to 7 for P.
 
     Returns:
         Limit deviations [m].
@@ -243,7 +242,7 @@ def limits_of(size: float, letter: str, grade: int) -> Limits:
         known = " ".join(LETTERS)
         raise BadInput(
             f"found {quoted(name)}, expected one of the letters {known}, or the "
-            "corresponding capital for a hole (ISO 286)"
+            "corresponding capital letter for a hole (ISO 286)"
         )
     if grade not in GRADES:
         raise BadInput(f"found {quoted(name)}, expected a grade from 5 to 11 (ISO 286)")
@@ -259,12 +258,12 @@ def limits_of(size: float, letter: str, grade: int) -> Limits:
 
 
 def _width(step: int, grade: int) -> float:
-    """Return the tolerance [um] of a grade."""
+    """Return the tolerance of a grade [um]."""
     return float(_WIDTHS[step][grade - GRADES[0]])
 
 
 def _shaft(step: int, letter: str, grade: int) -> tuple[float, float]:
-    """Return the lower and upper deviation [um] of a shaft."""
+    """Return the lower and upper deviation of a shaft [um]."""
     width = _width(step, grade)
     if letter == "js":
         return -width / 2, width / 2
@@ -277,9 +276,9 @@ def _shaft(step: int, letter: str, grade: int) -> tuple[float, float]:
 
 
 def _hole(step: int, letter: str, grade: int) -> tuple[float, float]:
-    """Return the lower and upper deviation [um] of a hole."""
-    # D to H mirror the shafts.  For K, M, N and P over 3 mm, ES = -ei + Delta with
-    # Delta = IT(n) - IT(n-1), except for M6 in the range 250-315.
+    """Return the lower and upper deviation of a hole [um]."""
+    # For D to H, EI = -es.  For K, M, N and P over 3 mm, ES = -ei + IT(n) - IT(n-1),
+    # except for M6 between 250 and 315 mm.
     width = _width(step, grade)
     if letter == "js":
         return -width / 2, width / 2
@@ -291,7 +290,7 @@ def _hole(step: int, letter: str, grade: int) -> tuple[float, float]:
         name = f"{letter.upper()}{grade}"
         raise BadInput(
             f"found {quoted(name)}, expected {letter.upper()} with a grade from "
-            f"{finest} to {coarsest}, because the table has no other grades"
+            f"{finest} to {coarsest}, because the table does not contain other grades"
         )
     delta = width - _width(step, grade - 1) if step else 0.0
     upper = -deviation + delta

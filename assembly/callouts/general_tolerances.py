@@ -1,8 +1,6 @@
 """ISO 2768 general tolerances for lengths and perpendicularity.
 
-Part 1 of the standard limits linear dimensions.  From part 2, only perpendicularity is
-implemented; this part has been withdrawn, and its successor ISO 22081 contains no
-tables.  Neither part limits position or coaxiality.
+Lengths are from ISO 2768-1, and perpendicularity is from ISO 2768-2.
 """
 
 import re
@@ -12,38 +10,38 @@ import numpy as np
 
 from forcefit.inputs.table import BadInput, quoted
 
-# [mm] upper limit of each column in the table; the first column starts at 0.5
+# [mm] upper limits of the ranges of lengths, the first of which starts at 0.5 mm
 LENGTHS = (3, 6, 30, 120, 400, 1000, 2000, 4000)
-# [mm] symmetric tolerance (+-); NaN where the standard has no value
+# [mm] symmetric tolerances; NaN where the standard does not specify a value
 LINEAR = {
     "f": (0.05, 0.05, 0.1, 0.15, 0.2, 0.3, 0.5, np.nan),
     "m": (0.1, 0.1, 0.2, 0.3, 0.5, 0.8, 1.2, 2.0),
     "c": (0.2, 0.3, 0.5, 0.8, 1.2, 2.0, 3.0, 4.0),
     "v": (np.nan, 0.5, 1.0, 1.5, 2.5, 4.0, 6.0, 8.0),
 }
-_SIDES = (100, 300, 1000, 3000)  # [mm] upper limit for the length of the shorter side
-# [mm] zone width; NaN for class L up to 100 mm, whose value has not been confirmed
+_SIDES = (100, 300, 1000, 3000)  # [mm] upper limits for the length of the shorter side
+# [mm] zone widths; NaN where the value has not been confirmed
 PERPENDICULARITY = {
     "H": (0.2, 0.3, 0.4, 0.5),
     "K": (0.4, 0.6, 0.8, 1.0),
     "L": (np.nan, 1.0, 1.5, 2.0),
 }
-_SHORTEST = 0.5  # [mm] smallest length for which part 1 has values
+_SHORTEST = 0.5  # [mm] smallest length in ISO 2768-1
 _TEXT = re.compile(r"\s*ISO\s*2768\s*-\s*([fmcv])([HKL])?\s*")
 
 
 class GeneralTolerance(NamedTuple):
-    """ISO 2768 tolerance classes for lengths and geometry; empty if not specified."""
+    """ISO 2768 tolerance classes for lengths and geometry, which may be empty."""
 
     linear: str
     geometry: str
 
 
 def parse_general(text: str) -> GeneralTolerance:
-    """Return the tolerance classes given by a text such as ``"ISO 2768-mK"``.
+    """Return the tolerance classes in a text such as ``"ISO 2768-mK"``.
 
     Raises:
-        BadInput: the text does not specify valid classes.
+        BadInput: the text does not contain valid classes.
     """
     match = _TEXT.fullmatch(text)
     if match is None:
@@ -55,10 +53,10 @@ def parse_general(text: str) -> GeneralTolerance:
 
 
 def linear_tolerance(length: float, kind: str) -> float:
-    """Return the symmetric tolerance [m] of a length [m] in a tolerance class.
+    """Return the symmetric tolerance of a length [m] in a tolerance class.
 
     Raises:
-        BadInput: the table has no value for this length.
+        BadInput: the table does not contain a value for this length.
     """
     mm = length * 1e3
     if mm < _SHORTEST or mm > LENGTHS[-1]:
@@ -68,10 +66,10 @@ def linear_tolerance(length: float, kind: str) -> float:
 
 
 def perpendicularity_tolerance(side: float, kind: str) -> float:
-    """Return the zone width [m] for the length of the shorter side [m] and a class.
+    """Return the zone width [m] for a shorter side [m] in a tolerance class.
 
     Raises:
-        BadInput: the table has no value for this length.
+        BadInput: the table does not contain a value for this length.
     """
     mm = side * 1e3
     if not 0 < mm <= _SIDES[-1]:
@@ -83,10 +81,10 @@ def perpendicularity_tolerance(side: float, kind: str) -> float:
 def _entry(
     row: tuple[float, ...], steps: tuple[int, ...], mm: float, name: str
 ) -> float:
-    """Return the tolerance [m] for a size [mm] from a row of the table."""
-    # a rounding error in the conversion from metres must not select the next column
+    """Return the tolerance [m] for a size [mm] from a row of a table."""
+    # the factor prevents that a rounding error selects the next column
     value = row[int(np.searchsorted(steps, mm * (1 - 1e-12)))]
     if np.isnan(value):
-        fault = f"found {mm:g} mm in {name}, for which the table has no value"
-        raise BadInput(f"{fault}, expected a different class or a stated tolerance")
+        fault = f"found {mm:g} mm in {name}, for which ISO 2768 does not have a value"
+        raise BadInput(f"{fault}, expected another class or a tolerance of the length")
     return value * 1e-3

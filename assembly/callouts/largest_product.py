@@ -5,11 +5,9 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-_GAP = 3e-8  # relative duality gap of a certified support function
-_LEAST_MU = (
-    1e-9  # for smaller barrier parameters, rounding errors dominate Newton steps
-)
-_STEPS = 50  # maximum number of Newton steps per barrier parameter
+_GAP = 3e-8  # accepted relative duality gap
+_LEAST_MU = 1e-9  # smallest barrier parameter; below it, rounding errors dominate
+_STEPS = 50  # maximum number of Newton steps for each barrier parameter
 
 
 def largest_product(
@@ -18,16 +16,14 @@ def largest_product(
     """Maximise w.x subject to |bound @ x| <= 1 with an interior-point method.
 
     Args:
-        w: coefficients (m,).
+        w: coefficients, (m,).
         bounds: matrices (k, m), which together bound all directions.
-        cones: matrices (k, m) whose first row s and remaining rows S define a double
-            cone |s.x| + |S x| <= 1.
+        cones: matrices (k, m) with the first row s and the other rows S, which define a
+            double cone |s.x| + |S x| <= 1.
 
     Returns:
-        Feasible x (m,), and a certified upper bound on the maximum. The upper bound is
-        the sum of the norms of multipliers that satisfy sum bound^T multiplier = w.
-        For a cone, this norm is the maximum of the absolute value of the first entry
-        and the norm of the remaining entries.
+        Feasible point x, (m,), and an upper bound on the maximum.  The upper bound is
+        the sum of the dual norms of multipliers with sum bound^T multiplier = w.
     """
     x, value, _ = product_by_bounds(w, bounds, cones)
     return x, value
@@ -36,23 +32,22 @@ def largest_product(
 def product_by_bounds(
     w: NDArray, bounds: Sequence[NDArray], cones: Sequence[NDArray] = ()
 ) -> tuple[NDArray, float, NDArray]:
-    """Return the result of :func:`largest_product` and the contributions to its bound.
+    """Maximise w.x, and return the contribution of each bound to the upper bound.
 
     Args:
-        w: coefficients (m,).
+        w: coefficients, (m,).
         bounds: see :func:`largest_product`.
         cones: see :func:`largest_product`.
 
     Returns:
-        x, the upper bound, and the contribution of each of ``bounds`` and ``cones`` to
-        the upper bound.  A contribution is the norm of the multiplier, which is also
-        the derivative of the upper bound with respect to the logarithm of the size of
-        the bound or cone.
+        Feasible point x, upper bound, and contributions of ``bounds`` and ``cones``.  A
+        contribution is the dual norm of the multiplier.  It is the derivative of the
+        upper bound with respect to the logarithm of the size of the bound or cone.
     """
     length = float(np.linalg.norm(w))
     if length == 0.0:
         return np.zeros_like(w), 0.0, np.zeros(len(bounds) + len(cones))
-    # the problem is scaled by the value attained along w
+    # the problem is scaled by the value of the largest feasible multiple of w
     reached = 1.0 / max(_largest_gauge(w, bounds, cones), 1e-300)
     unit = length * length * reached
     w = w / unit
@@ -63,10 +58,10 @@ def product_by_bounds(
     of_bounds = [float(part.sum()) for part in np.split(start, ends)]
     while best > (1 + _GAP) * max(float(w @ x), 0.0) and mu > _LEAST_MU:
         centre = _centre(w, bounds, cones, x, mu)
-        if centre is None:  # due to rounding errors; the best bound so far is returned
+        if centre is None:  # rounding errors; the best upper bound is returned
             break
         x, multipliers = centre
-        # smallest change of the multipliers that satisfies the condition exactly
+        # smallest change of the multipliers that satisfies sum bound^T multiplier = w
         change = np.linalg.lstsq(rows.T, w - rows.T @ multipliers, rcond=None)[0]
         parts = np.split(multipliers + change, ends)
         count = len(bounds)
@@ -84,7 +79,7 @@ def product_by_bounds(
 def _largest_gauge(
     x: NDArray, bounds: Sequence[NDArray], cones: Sequence[NDArray]
 ) -> float:
-    """Return the gauge of x, the factor by which the set must be scaled to reach x."""
+    """Return the gauge of x, which is 1 on the boundary of the feasible set."""
     sizes = [float(np.linalg.norm(b @ x)) for b in bounds]
     sizes += [abs(c[0] @ x) + float(np.linalg.norm(c[1:] @ x)) for c in cones]
     return max(sizes)
@@ -94,8 +89,8 @@ def _centre(
     w: NDArray, bounds: Sequence[NDArray], cones: Sequence[NDArray], x: NDArray,
     mu: float,
 ) -> tuple[NDArray, NDArray] | None:  # fmt: skip
-    """Maximise w.x + mu sum log(1 - |bound x|^2) from x; return x and multipliers."""
-    # a double cone adds log((1 - s.x)^2 - |S x|^2) + log((1 + s.x)^2 - |S x|^2)
+    """Maximise w.x + mu sum log(1 - |bound x|^2), and return x and the multipliers."""
+    # barrier of a double cone: log((1 - s.x)^2 - |S x|^2) + log((1 + s.x)^2 - |S x|^2)
     for _ in range(_STEPS):
         slacks = [1.0 - float((b @ x) @ (b @ x)) for b in bounds]
         gradient, H = w.copy(), np.zeros((len(w), len(w)))
@@ -132,18 +127,18 @@ def _centre(
 
 
 def _halves(cones: Sequence[NDArray], x: NDArray) -> Iterator[tuple[NDArray, float]]:
-    """Yield rows and slack for both halves |S x| <= 1 -+ s.x of each double cone."""
+    """Yield the rows and the slack of both halves |S x| <= 1 -+ s.x of double cones."""
     for cone in cones:
         for sign in (1.0, -1.0):
             signed = np.vstack([sign * cone[:1], cone[1:]])
             height = 1.0 - float(signed[0] @ x)
             across = float(np.linalg.norm(signed[1:] @ x))
-            # outside the cone, (height - across) is negative; inside, both are positive
+            # both factors are positive inside the cone
             yield signed, (height - across) * (height + across)
 
 
 def _slope(cone: NDArray, x: NDArray) -> NDArray:
-    """Return the derivative (m,) of (1 - s.x)^2 - |S x|^2."""
+    """Return the gradient of (1 - s.x)^2 - |S x|^2, (m,)."""
     return np.asarray(
         -2.0 * (1.0 - cone[0] @ x) * cone[0] - 2.0 * cone[1:].T @ (cone[1:] @ x)
     )

@@ -1,9 +1,9 @@
-"""Random points in products of unit balls, transformed from uniform random numbers."""
+"""Random points in products of unit balls from uniform random numbers."""
 
 import numpy as np
 from numpy.typing import NDArray
 
-VOLUMES = {1: 2.0, 2: np.pi, 3: 4 * np.pi / 3}  # volumes of unit balls, by dimension
+VOLUMES = {1: 2.0, 2: np.pi, 3: 4 * np.pi / 3}  # volume of the unit ball, by dimension
 
 
 def in_balls(
@@ -13,14 +13,14 @@ def in_balls(
     """Transform uniform random numbers to points in a product of unit balls.
 
     Args:
-        uniform: independent uniform random numbers (k, at least m) between 0 and 1.
-        dimensions: dimension of each ball; their sum is m.
-        distribution: ``"uniform"``, ``"truncated"`` or ``"normal"``; normally
-            distributed points may lie outside the balls.
+        uniform: uniform random numbers between 0 and 1, (k, m) or with more columns.
+        dimensions: dimension of each ball, with the sum m.
+        distribution: ``"uniform"``, ``"truncated"`` or ``"normal"``.  Points of the
+            normal distribution may be outside the balls.
         s: standard deviation of each coordinate for ``"normal"`` and ``"truncated"``.
 
     Returns:
-        Points (k, m).
+        Points, (k, m).
     """
     ends = np.cumsum(dimensions)
     parts = np.split(uniform[:, : ends[-1]], ends[:-1], axis=1)
@@ -28,7 +28,7 @@ def in_balls(
 
 
 def _in_ball(uniform: NDArray, distribution: str, s: float) -> NDArray:
-    """Transform uniform random numbers (k, d) to points (k, d) in a unit ball."""
+    """Transform uniform random numbers (k, d) to points in a unit ball, (k, d)."""
     from scipy.special import gammainc, gammaincinv
 
     d = uniform.shape[1]
@@ -50,7 +50,7 @@ def _in_ball(uniform: NDArray, distribution: str, s: float) -> NDArray:
 
 
 def ball_variance(d: int, distribution: str, s: float) -> float:
-    """Return the variance of each coordinate of random points in a unit d-ball."""
+    """Return the variance of a coordinate of random points in a unit ball."""
     if distribution == "uniform":
         return 1.0 / (d + 2)
     if distribution == "normal":

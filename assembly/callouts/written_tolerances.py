@@ -63,11 +63,11 @@ def parse_length(value: object) -> tuple[float, float]:
 
 
 def within_envelope(value: object) -> bool:
-    """Return whether a length has the modifier ``(E)`` for the envelope principle."""
+    """Return whether a length has the modifier ``(E)`` (envelope principle)."""
     match = _LENGTH.fullmatch(value) if isinstance(value, str) else None
     return match is not None and bool(match[7])
 
 
 def _value(digits: str, power: str | None) -> float:
-    """Compose a number from its digits and its exponent."""
+    """Return the number with the given digits and exponent."""
     return float(f"{digits}e{power or 0}")

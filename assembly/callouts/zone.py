@@ -1,12 +1,12 @@
-"""Convex tolerance zones of small screws: support function, random draws, covariance.
+"""Convex tolerance zones: support function, random draws and covariance.
 
-A zone is a set of screws d [RX RY RZ TX TY TZ] of a feature, in the feature axes. It
-contains all d with ``|bound @ d| <= 1`` for each bound; components to which no bound
-applies are zero.  A bound with one row is an interval, with two rows a disc, and with
-three rows a ball.  Linearly independent bounds can be active simultaneously, so that
-they define the set d = columns u with |u_k| <= 1.  Linearly dependent bounds cut off
-part of this set, as do the double cones ``|s @ d| + |S @ d| <= 1`` that describe round
-faces.
+A zone is a set of small screws d [RX RY RZ TX TY TZ] of a feature in feature axes.  It
+contains all d with ``|bound @ d| <= 1`` for each bound.  Components without a bound are
+zero.  A bound with one, two or three rows is an interval, a disc or a ball.
+
+Linearly independent bounds define a product of unit balls, d = columns u with
+|u_k| <= 1.  Linearly dependent bounds and the double cones ``|s @ d| + |S @ d| <= 1``
+of round faces restrict this set.
 
 Sources:
     Mujezinovic, Davidson, Shah (2004), A new mathematical model for geometric
@@ -26,24 +26,25 @@ from forcefit.assembly.callouts.largest_product import largest_product
 from forcefit.assembly.callouts.unit_balls import VOLUMES, ball_variance, in_balls
 
 DISTRIBUTIONS = ("uniform", "normal", "truncated")
-_SAMPLE = 1 << 17  # number of draws for the covariance of zones without a closed form
+_SAMPLE = 1 << 17  # number of draws for a covariance without a closed form
 _RANK = 1e-9  # smallest relative singular value of linearly independent bounds
-_MOST_ATTEMPTS = 10_000  # maximum number of attempts to draw a part inside the zone
-Numbers = Callable[[int], NDArray]  # attempt -> (k, words) uniform numbers
+_MOST_ATTEMPTS = 10_000  # maximum number of attempts of rejection sampling
+Numbers = Callable[[int], NDArray]  # returns uniform random numbers for an attempt
 
 
 @dataclass(frozen=True, eq=False)
 class Zone:
-    """Convex tolerance zone of small screws, as defined at the top of this module.
+    """Convex tolerance zone of small screws.
 
     Attributes:
-        bounds: matrices (k, 6) with k = 1, 2, 3, applied to the screw [1/rad, 1/m].
-        bonus: maximum relative growth of the zone with the size of the feature (maximum
-            material condition); 0 for no growth.
-        cones: matrices (3, 6) with the row s along the axis of a double cone and the
-            two rows S across it.  The bounds must limit the same components.
-        from_zero: whether the zone grows with the size of a hole from a single point to
-            the bounds, as for the shift of a datum at maximum material.
+        bounds: matrices (k, 6) [1/rad, 1/m] with k = 1, 2 or 3, which are multiplied by
+            the screw.
+        bonus: maximum relative growth of the zone with the hole size due to a maximum
+            material condition; 0 without growth.
+        cones: matrices (3, 6) of double cones, with the row s along the axis and two
+            rows S normal to it.  The bounds must limit the same components.
+        from_zero: whether the zone is a point for the smallest hole, as for the shift
+            of a datum with maximum material condition.
     """
 
     bounds: tuple[NDArray, ...]
@@ -70,34 +71,34 @@ class Zone:
 
     @cached_property
     def columns(self) -> NDArray:
-        """Map (6, m) [rad, m] from the coordinates u to the screw."""
+        """Matrix that maps the coordinates u to the screw, (6, m) [rad, m]."""
         rows = np.vstack([self.bounds[i] for i in self._split[0]])
         scale = _scale(rows)
         return np.asarray(np.linalg.pinv(rows / scale) / scale[:, None])
 
     @cached_property
     def cuts(self) -> tuple[NDArray, ...]:
-        """Linearly dependent bounds, as matrices (k, m) applied to u."""
+        """Linearly dependent bounds on u, as matrices (k, m)."""
         return tuple(self.bounds[i] @ self.columns for i in self._split[1])
 
     @cached_property
     def cones_on_u(self) -> tuple[NDArray, ...]:
-        """Double cones, as matrices (3, m) applied to u."""
+        """Double cones in u, as matrices (3, m)."""
         return tuple(cone @ self.columns for cone in self.cones)
 
     @property
     def is_cut(self) -> bool:
-        """Whether dependent bounds or cones restrict the product of unit balls."""
+        """Whether dependent bounds or double cones restrict the product of balls."""
         return bool(self.cuts or self.cones)
 
     @property
     def grows(self) -> bool:
-        """Whether the zone grows with the size of a feature."""
+        """Whether the zone grows with the hole size."""
         return self.bonus > 0 or self.from_zero
 
     @property
     def words(self) -> int:
-        """Number of uniform random numbers per draw; a growing zone needs one more."""
+        """Number of uniform random numbers for one draw, including the hole size."""
         return sum(self.dimensions) + self.grows
 
     def growth(self, size: NDArray) -> NDArray:
@@ -105,7 +106,7 @@ class Zone:
         return size if self.from_zero else 1.0 + self.bonus * size
 
     def inside(self, u: NDArray, grown: NDArray | float = 1.0) -> NDArray:
-        """Return whether coordinates u (k, m) are inside the scaled zone."""
+        """Return whether coordinates u, (k, m), are inside the scaled zone."""
         limits = [(part, grown) for part in self._balls(u)]
         limits += [(u @ cut.T, 1.0) for cut in self.cuts]
         marks = [np.linalg.norm(x, axis=-1) <= g * (1 + 1e-12) for x, g in limits]
@@ -113,42 +114,42 @@ class Zone:
         return np.asarray(np.all(marks, axis=0))
 
     def _cone_gauges(self, u: NDArray) -> list[NDArray]:
-        """Return the gauge of each double cone (k,), which equals 1 on its surface."""
+        """Return the gauge of each double cone, (k,), which is 1 on its surface."""
         return [
             abs(u @ c[0]) + np.linalg.norm(u @ c[1:].T, axis=-1)
             for c in self.cones_on_u
         ]
 
     def _balls(self, u: NDArray) -> list[NDArray]:
-        """Split the coordinates u into one array per ball."""
+        """Split the coordinates u into an array for each ball."""
         ends = np.cumsum(self.dimensions)
         return np.split(u, ends[:-1], axis=-1)
 
     @cached_property
     def bounds_on_u(self) -> tuple[NDArray, ...]:
-        """Bounds as matrices (k, m) applied to u, for the maximum size of the zone."""
+        """Bounds on u for the largest hole, as matrices (k, m)."""
         rows = np.split(np.eye(sum(self.dimensions)), np.cumsum(self.dimensions)[:-1])
         return (*(row / (1.0 + self.bonus) for row in rows), *self.cuts)
 
     def support(self, direction: NDArray) -> float:
-        """Return the maximum of ``direction @ d`` over the screws d in the zone.
+        """Return the support function of the zone, the maximum of ``direction @ d``.
 
         Args:
-            direction: coefficients (6,).
+            direction: coefficients, (6,).
 
         Returns:
-            Maximum, in closed form for independent bounds. Otherwise a certified upper
-            bound, which exceeds the maximum by a relative amount of about 3e-8.
+            Maximum for independent bounds; otherwise an upper bound with a relative
+            error of about 3e-8.
         """
         return self.farthest_u(np.asarray(direction, dtype=float) @ self.columns)[1]
 
     def farthest(self, direction: NDArray) -> NDArray:
-        """Return the screw d (6,) [rad, m] in the zone that maximises direction @ d."""
+        """Return the screw in the zone that maximises direction @ d, (6,) [rad, m]."""
         w = np.asarray(direction, dtype=float) @ self.columns
         return np.asarray(self.columns @ self.farthest_u(w)[0])
 
     def farthest_u(self, w: NDArray) -> tuple[NDArray, float]:
-        """Return the coordinates u (m,) that maximise w @ u, and an upper bound."""
+        """Return the coordinates that maximise w @ u, (m,), and an upper bound."""
         if self.is_cut:
             return largest_product(w, self.bounds_on_u, self.cones_on_u)
         grown, u = 1.0 + self.bonus, []
@@ -160,19 +161,19 @@ class Zone:
     def draw(
         self, numbers: Numbers, distribution: str = "uniform", cp: float = 1.0
     ) -> NDArray:
-        """Draw the coordinates u of random parts.
+        """Draw random coordinates u by rejection sampling.
 
         Args:
-            numbers: function that returns independent uniform random numbers
-                (k, :attr:`words`) for attempt 0, 1, ...  Parts outside the zone are
-                drawn again, but the sizes of their features stay those of attempt 0.
-            distribution: ``"uniform"`` in the zone; ``"normal"``, see
-                :meth:`deviation`; or ``"truncated"``, the normal distribution
+            numbers: function that returns uniform random numbers (k, :attr:`words`) for
+                attempt 0, 1, ...  Draws outside the zone are repeated with the hole
+                size of attempt 0.
+            distribution: ``"uniform"`` in the zone, ``"normal"`` (see
+                :meth:`deviation`), or ``"truncated"``, which is the normal distribution
                 restricted to the zone.
-            cp: capability index of the normal distributions.
+            cp: process capability index of the normal distributions.
 
         Returns:
-            Coordinates (k, m).
+            Coordinates, (k, m).
 
         Raises:
             RuntimeError: no draw was inside the zone, because its volume is almost
@@ -195,7 +196,7 @@ class Zone:
     def _attempt(
         self, uniform: NDArray, distribution: str, s: float, grown: NDArray
     ) -> tuple[NDArray, NDArray]:
-        """Return the coordinates drawn in one attempt, and which are accepted."""
+        """Return the coordinates of one attempt, and whether they are accepted."""
         u = self._in_balls(uniform, distribution, s) * grown[:, None]
         if distribution == "normal":
             return u, np.ones(len(u), dtype=bool)
@@ -205,14 +206,14 @@ class Zone:
         return u, self.inside(u, grown)
 
     def _in_balls(self, uniform: NDArray, distribution: str, s: float) -> NDArray:
-        """Draw coordinates (k, m) in the unit balls, without rejection."""
+        """Draw coordinates in the product of unit balls, (k, m)."""
         return in_balls(uniform, self.dimensions, distribution, s)
 
     @cached_property
     def _tightest(self) -> tuple[tuple[int, ...], NDArray]:
-        """Set of independent bounds with the minimum volume, used for drawing.
+        """Set of independent bounds with minimum volume, for rejection sampling.
 
-        The set is given by the dimensions of its balls and the matrix that maps the
+        The tuple contains the dimensions of the balls and the matrix that maps the
         coordinates in the balls to u.
         """
         bounds = [bound @ self.columns for bound in self.bounds]
@@ -231,16 +232,18 @@ class Zone:
         return found
 
     def deviation(self, cp: float = 1.0) -> float:
-        """Return the standard deviation of each u for a normal distribution.
+        """Return the standard deviation of the coordinates for a normal distribution.
 
-        As in one dimension, the probability of a part outside the zone is 2 Phi(-3 cp).
+        The probability that a draw is outside the zone is 2 Phi(-3 cp), as in one
+        dimension.
 
         Args:
-            cp: capability index > 0.
+            cp: process capability index, > 0.
 
         Returns:
             Standard deviation relative to the radii of the balls [-]. It is exact for
-            independent bounds, and otherwise a quantile of fixed draws (1 % accuracy).
+            independent bounds.  Otherwise, it is estimated from random draws with an
+            accuracy of 1 %.
         """
         from scipy.optimize import brentq
         from scipy.special import gammainc, ndtr
@@ -265,18 +268,18 @@ class Zone:
 
         Args:
             distribution: see :meth:`draw`.
-            cp: capability index of the normal distributions.
+            cp: process capability index of the normal distributions.
 
         Returns:
-            Covariance (6, 6) [rad^2 .. m^2], in closed form for independent bounds, and
-            otherwise from 131 072 fixed draws (1 % accuracy).
+            Covariance, (6, 6) [rad^2 .. m^2]. It is exact for independent bounds.
+            Otherwise, it is estimated from random draws with an accuracy of 1 %.
         """
         return np.asarray(
             self.columns @ self.variance_of_u(distribution, cp) @ self.columns.T
         )
 
     def variance_of_u(self, distribution: str = "uniform", cp: float = 1.0) -> NDArray:
-        """Return the covariance (m, m) of the coordinates; see :meth:`covariance`."""
+        """Return the covariance of the coordinates u, (m, m)."""
         if self.is_cut and distribution != "normal":
             u = self.draw(
                 lambda attempt: _sample(self.words, attempt), distribution, cp
@@ -290,18 +293,18 @@ class Zone:
 
 
 def intersection(zones: Sequence[Zone]) -> Zone:
-    """Return the intersection of zones, with the bonus of the first zone."""
+    """Return the intersection of zones; its bonus is that of the first zone."""
     bounds = tuple(bound for zone in zones for bound in zone.bounds)
     cones = tuple(cone for zone in zones for cone in zone.cones)
     return Zone(bounds, zones[0].bonus, cones)
 
 
 def _scale(rows: NDArray) -> NDArray:
-    """Return scales (6,) [1/rad, 1/m]: the largest rotation and translation entries."""
+    """Return the largest rotation and translation entries, (6,) [1/rad, 1/m]."""
     sizes = [np.abs(rows[:, part]).max() for part in (slice(0, 3), slice(3, 6))]
     return np.repeat([size if size > 0 else 1.0 for size in sizes], 3)
 
 
 def _sample(words: int, attempt: int = 0) -> NDArray:
-    """Return uniform random numbers from a fixed seed, identical on each call."""
+    """Return uniform random numbers that are identical in each call."""
     return np.random.default_rng([words, attempt]).random((_SAMPLE, words))

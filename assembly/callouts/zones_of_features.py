@@ -1,8 +1,8 @@
 """Tolerance zones of drawing callouts for axes, planes and points.
 
-The z axis of a feature is its axis or normal, and the origin is its centre.  Zone
-widths are specified as on the drawing: a diameter, or the distance between two planes.
-The offset of an axis at height z is e(z) = (TX + z RY, TY - z RX).
+The z axis of a feature is its axis or normal, and the origin is its centre.  As on a
+drawing, a zone width is a diameter or the distance between two planes.  The
+displacement of an axis at height z is e(z) = (TX + z RY, TY - z RX).
 """
 
 import numpy as np
@@ -15,7 +15,7 @@ _SIGNS = ((1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0))
 
 
 def offset_rows(z: float) -> NDArray:
-    """Return the matrix (2, 6) of the offset e(z) of an axis at height z [m]."""
+    """Return the matrix of the displacement e(z) of an axis at height z [m], (2, 6)."""
     return np.array([[0, z, 0, 1.0, 0, 0], [-z, 0, 0, 0, 1.0, 0]])
 
 
@@ -25,11 +25,11 @@ def axis_position(width: float, length: float, bonus: float = 0.0) -> Zone:
     Args:
         width: diameter of the cylinder [m].
         length: length of the bore [m], > 0.
-        bonus: growth of the diameter from the smallest to the largest hole [m], for the
-            modifier (M); 0 for no growth.
+        bonus: growth of the diameter from the smallest to the largest hole [m] for the
+            modifier (M); 0 without growth.
 
     Returns:
-        Zone of two discs, one at each end of the bore, which couple shift and tilt.
+        Zone in which the displacements at both ends of the bore are in a disc.
     """
     ends = tuple(offset_rows(z) * 2 / width for z in (length / 2, -length / 2))
     return Zone(ends, bonus / width)
@@ -43,9 +43,9 @@ def axis_position_along(
     Args:
         width: distance between the planes [m].
         length: length of the bore [m].
-        direction: unit vector normal to the planes (2,), in x and y of the feature.
-        bonus: growth of the distance from the smallest to the largest hole [m], for the
-            modifier (M); 0 for no growth.
+        direction: unit vector normal to the planes, (2,), in x and y of the feature.
+        bonus: growth of the distance from the smallest to the largest hole [m] for the
+            modifier (M); 0 without growth.
     """
     ends = (direction @ offset_rows(z) * 2 / width for z in (length / 2, -length / 2))
     return Zone(tuple(row[None] for row in ends), bonus / width)
@@ -57,10 +57,9 @@ def axis_orientation(
     """Return the zone of an axis for perpendicularity, parallelism or angularity.
 
     Args:
-        width: diameter [m], or distance between two planes if a direction is given.
+        width: diameter [m], or distance between two planes if ``direction`` is given.
         length: length of the bore [m].
-        direction: unit vector (2,) of the direction in which the tilt is limited; None
-            for all directions.
+        direction: unit vector normal to the planes, (2,); None for all directions.
     """
     tilt = (offset_rows(1.0) - offset_rows(0.0)) * length / width
     return Zone((tilt if direction is None else (direction @ tilt)[None],))
@@ -109,12 +108,12 @@ def round_plane_orientation(width: float, diameter: float) -> Zone:
 
 
 def point_position(width: float) -> Zone:
-    """Return the zone of a point within a ball with the given diameter [m]."""
+    """Return the zone of a point within a ball with a given diameter [m]."""
     return Zone((np.hstack([np.zeros((3, 3)), np.eye(3)]) * 2 / width,))
 
 
 def datum_shift(hole: str, length: float = 0.0) -> Zone:
-    """Return the zone for the shift of a hole that is a datum at maximum material.
+    """Return the zone of the shift of a datum hole with maximum material condition.
 
     Args:
         hole: size of the hole, for example ``"12 H7"``.
@@ -122,9 +121,8 @@ def datum_shift(hole: str, length: float = 0.0) -> Zone:
             constrains the tilt.
 
     Returns:
-        Disc normal to the axis of the hole, or one disc at each end. Its diameter is
-        the size of the hole minus the smallest size, so that the zone is a single point
-        for the smallest hole.
+        Disc normal to the axis of the hole, or a disc at each end.  Its diameter is the
+        difference between the size of the hole and the smallest size.
     """
     growth = float(np.ptp(parse_hole(hole)[1]))
     heights = (length / 2, -length / 2) if length else (0.0,)
@@ -133,11 +131,11 @@ def datum_shift(hole: str, length: float = 0.0) -> Zone:
 
 
 def shift_along(tolerance: float, direction: NDArray) -> Zone:
-    """Return the zone for a shift along one direction within a symmetric tolerance.
+    """Return the zone of a displacement along one direction.
 
     Args:
-        tolerance: maximum shift to each side [m].
-        direction: unit vector of the shift (3,), in the feature axes.
+        tolerance: maximum displacement in positive and negative direction [m].
+        direction: unit vector of the displacement in feature axes, (3,).
     """
     row = np.concatenate([np.zeros(3), np.asarray(direction, dtype=float)])
     return Zone((row[None] / tolerance,))

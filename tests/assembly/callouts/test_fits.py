@@ -1,4 +1,4 @@
-"""Tests of ISO 286 fits: tabulated limits and the distribution of the clearance."""
+"""ISO 286 fits: tabulated limits and the distribution of the clearance."""
 
 import numpy as np
 import pytest
@@ -20,9 +20,7 @@ from forcefit.inputs.table import BadInput
     ("20 H7/k6", (0, 21), (2, 15), (-15, 19), "transition"),
     ("25 H7/p6", (0, 21), (22, 35), (-35, -1), "interference"),
 ])  # fmt: skip
-def test_limits_of_a_fit_equal_the_table_of_examples(
-    text, hole, shaft, clearance, kind
-):
+def test_limits_of_fits_equal_table_values(text, hole, shaft, clearance, kind):
     fit = parse_fit(text)
     um = 1e6
     assert np.multiply(fit.hole, um) == pytest.approx(hole)
@@ -34,21 +32,24 @@ def test_limits_of_a_fit_equal_the_table_of_examples(
 @pytest.mark.parametrize(
     ("size", "name", "lower", "upper"),
     [
-        # shaft basis and transition holes as in tables of machine elements
+        # limits [um] of holes and shafts from a handbook of machine elements
         (20, ("G", 7), 7, 28), (20, ("F", 8), 20, 53), (50, ("K", 7), -18, 7),
         (25, ("N", 7), -28, -7), (10, ("M", 7), -15, 0), (40, ("P", 7), -42, -17),
         (10, ("JS", 7), -7.5, 7.5), (12, ("K", 8), -19, 8), (300, ("M", 6), -41, -9),
         (2, ("N", 7), -14, -4), (18, ("k", 8), 0, 27), (31, ("h", 11), -160, 0),
     ],
 )  # fmt: skip
-def test_holes_and_shafts_have_their_tabulated_limits(size, name, lower, upper):
+def test_limits_of_holes_and_shafts_equal_table_values(size, name, lower, upper):
     limits = limits_of(size, *name)
     assert np.multiply(limits, 1e6) == pytest.approx((lower, upper))
 
 
-def test_width_of_a_tolerance_grade_equals_its_tolerance_units_up_to_rounding():
-    """IT7 = 16 i, i = 0.45 D^(1/3) + 0.001 D at the geometric mean of the step; the
-    standard rounds, so the plain formula may miss by one tenth."""
+def test_tolerance_of_grade_7_agrees_with_formula_of_the_standard():
+    """The tolerance is IT7 = 16 i with i = 0.45 D^(1/3) + 0.001 D.
+
+    D is the geometric mean of the limits of the size range.  The tolerances in the
+    standard are rounded.
+    """
     for low, high in [(6, 10), (18, 30), (50, 80), (120, 180), (250, 315)]:
         D = (low * high) ** 0.5
         unit = 0.45 * D ** (1 / 3) + 0.001 * D
@@ -56,9 +57,11 @@ def test_width_of_a_tolerance_grade_equals_its_tolerance_units_up_to_rounding():
         assert width == pytest.approx(16 * unit, rel=0.05)
 
 
-def test_clearance_of_fit_12_h7_g6_has_the_spread_computed_by_hand():
-    """Uniform sizes: sqrt(18^2/12 + 11^2/12) = 6.09 um diametral; normal at Cp = 1: a
-    sixth of the widths, 3.52 um.  Quantiles 0.135, 50, 99.865 % of the radius."""
+def test_standard_deviation_of_clearance_equals_hand_calculation():
+    """The standard deviation is sqrt(18^2/12 + 11^2/12) = 6.09 um for uniform sizes.
+
+    For normally distributed sizes with Cp = 1, it is sqrt(18^2 + 11^2) / 6 = 3.52 um.
+    """
     fit = parse_fit("12 H7/g6")
     numbers = np.random.default_rng(1).random((400_000, 2))
     tails = (0.00135, 0.5, 0.99865)
@@ -70,21 +73,20 @@ def test_clearance_of_fit_12_h7_g6_has_the_spread_computed_by_hand():
         assert np.quantile(radial, tails) == pytest.approx(quantiles, abs=0.07)
 
 
-def test_transition_fit_interferes_in_31_percent_of_normal_pairs():
+def test_transition_fit_has_interference_in_31_percent_of_draws():
     fit = clearance_fit("20 H7/k6")
     numbers = np.random.default_rng(1).random((400_000, 2))
     assert np.mean(fit.draw(numbers, "normal") == 0.0) == pytest.approx(0.31, abs=0.005)
 
 
-def test_hole_at_maximum_material_has_the_sizes_computed_by_hand():
-    """12 H7 grows by 18 um; with a position of 0.05 mm (M) a pin of 11.95 mm, the
-    virtual size, always fits."""
+def test_virtual_size_of_a_hole_equals_hand_calculation():
+    """The virtual size is 12 mm minus the position tolerance of 0.05 mm (M)."""
     size, limits = parse_hole("12 H7")
     assert np.ptp(limits) == pytest.approx(18e-6)
     assert size + limits.lower - 0.05e-3 == pytest.approx(11.95e-3)
 
 
-# rows of ISO 286-1 in um: IT5 to IT11, then the deviations d e f g k m n p
+# rows of ISO 286-1 [um]: tolerances IT5 to IT11, and deviations of d e f g k m n p
 TABLE = """
 0-3 4 6 10 14 25 40 60 -20 -14 -6 -2 0 2 4 6
 3-6 5 8 12 18 30 48 75 -30 -20 -10 -4 1 4 8 12
@@ -103,7 +105,7 @@ TABLE = """
 
 
 @pytest.mark.parametrize("row", TABLE.split("\n")[1:-1])
-def test_tolerance_table_has_the_195_values_of_the_transcribed_standard(row):
+def test_tolerances_and_deviations_equal_values_of_the_standard(row):
     step, *values = row.split()
     size, values = float(step.split("-")[1]), [float(value) for value in values]
     for grade, width in zip(range(5, 12), values[:7], strict=True):
@@ -125,7 +127,7 @@ def test_tolerance_table_has_the_195_values_of_the_transcribed_standard(row):
     ("25 H7/p6", "an interference fit (-35 to -1 um)"),
     ("1 HJ7/g6", '"HJ7"'),
 ])  # fmt: skip
-def test_invalid_fit_is_refused_with_a_message_of_one_line(text, message):
+def test_invalid_fit_is_rejected(text, message):
     with pytest.raises(BadInput) as error:
         clearance_fit(text)
     assert message in str(error.value)

@@ -1,4 +1,4 @@
-"""Tests of the ISO 2768 tables and of the parsing of tolerances."""
+"""Tables of ISO 2768 and parsing of tolerances."""
 
 import pytest
 
@@ -10,7 +10,7 @@ from forcefit.assembly.callouts.general_tolerances import (
 from forcefit.assembly.callouts.written_tolerances import parse_length, parse_width
 from forcefit.inputs.table import BadInput
 
-# ISO 2768-1 in mm up to the length: f m c v
+# ISO 2768-1 [mm]: upper limit of the length, and tolerances of classes f, m, c, v
 LENGTHS = """
 3 .05 .1 .2 -
 6 .05 .1 .3 .5
@@ -24,7 +24,7 @@ LENGTHS = """
 
 
 @pytest.mark.parametrize("row", LENGTHS.split("\n")[1:-1])
-def test_general_tolerances_of_lengths_equal_the_transcribed_standard(row):
+def test_general_length_tolerances_equal_values_of_the_standard(row):
     length, *values = row.split()
     for kind, value in zip("fmcv", values, strict=True):
         if value != "-":
@@ -32,7 +32,7 @@ def test_general_tolerances_of_lengths_equal_the_transcribed_standard(row):
             assert found == pytest.approx(float(value) * 1e-3)
 
 
-def test_general_tolerance_of_perpendicularity_follows_from_its_class():
+def test_general_perpendicularity_tolerances_equal_values_of_the_standard():
     worked = {"H": (0.2, 0.3, 0.4, 0.5), "K": (0.4, 0.6, 0.8, 1.0)}
     for kind, widths in worked.items():
         sides = (0.1, 0.3, 1.0, 3.0)
@@ -45,12 +45,12 @@ def test_general_tolerance_of_perpendicularity_follows_from_its_class():
 @pytest.mark.parametrize(
     ("mm", "kind"), [(0.3, "m"), (5000, "m"), (2.0, "v"), (3000, "f")]
 )
-def test_length_without_a_value_is_refused(mm, kind):
+def test_length_outside_general_tolerances_is_rejected(mm, kind):
     with pytest.raises(BadInput, match="expected"):
         linear_tolerance(mm * 1e-3, kind)
 
 
-def test_texts_of_general_tolerances_are_parsed():
+def test_valid_tolerance_texts_are_parsed():
     assert parse_general("ISO 2768-mK") == ("m", "K")
     assert parse_general("ISO 2768 - f") == ("f", "")
     assert parse_length("452 +- 0.1 mm") == pytest.approx((0.452, 1e-4))
@@ -61,12 +61,12 @@ def test_texts_of_general_tolerances_are_parsed():
 
 
 @pytest.mark.parametrize("value", ["0.05", "-1 mm", 0, True, [1], "0 mm", "1e9 m"])
-def test_text_that_is_not_a_tolerance_width_is_refused(value):
+def test_invalid_tolerance_width_is_rejected(value):
     with pytest.raises(BadInput, match=r"expected a width > 0 such as \"0.05 mm\""):
         parse_width(value)
 
 
 @pytest.mark.parametrize("value", ["452", "452 +- 0.1", "1 +- 2 mm", 452.0, "5 +- 0 m"])
-def test_length_without_a_tolerance_is_refused(value):
+def test_length_without_valid_tolerance_is_rejected(value):
     with pytest.raises(BadInput, match=r"expected a length such as"):
         parse_length(value)

@@ -1,4 +1,4 @@
-"""Comparison of the support function of intersected zones with cvxpy."""
+"""Comparison of the support function of a tolerance zone with cvxpy."""
 
 import cvxpy as cp
 import numpy as np
@@ -8,8 +8,8 @@ from forcefit.assembly.callouts.largest_product import largest_product
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_support_of_discs_and_double_cones_agrees_with_cvxpy(seed):
-    """The zone is bounded by double cones, discs and intervals in five coordinates."""
+def test_support_function_of_discs_and_double_cones_agrees_with_cvxpy(seed):
+    """The zone in five coordinates is bounded by double cones, discs and intervals."""
     rng = np.random.default_rng(seed)
     bounds = [*np.split(np.eye(5), 5), rng.normal(size=(2, 5)), rng.normal(size=(2, 5))]
     cones = [rng.normal(size=(3, 5)), rng.normal(size=(3, 5))]

@@ -1,4 +1,4 @@
-"""Tolerance zones compared with hand calculations, closed forms and brute force."""
+"""Tolerance zones, compared with hand calculations and linear programming."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ from forcefit.assembly.callouts.zones_of_features import (
     shift_along,
 )
 
-LENGTH, WIDTH = 0.020, 50e-6  # bore of 20 mm, position 0.05 mm
+LENGTH, WIDTH = 0.020, 50e-6  # [m] length of a bore, and its position tolerance
 POSITION = axis_position(WIDTH, LENGTH)
 BOTH = intersection([POSITION, axis_orientation(20e-6, LENGTH)])
 
@@ -35,19 +35,19 @@ def drawn(zone, distribution="uniform", cp=1.0, count=100_000):
 
 
 def reach(zone, height):
-    """Return the largest offset of the axis at a height, over all directions."""
+    """Return the largest displacement of the axis at a height."""
     angles = np.linspace(0, np.pi, 13)
     rows = [np.array([np.cos(a), np.sin(a)]) @ offset_rows(height) for a in angles]
     return max(zone.support(row) for row in rows)
 
 
-def test_perpendicularity_reduces_the_largest_shift_of_a_bore():
-    """Tilt t/L = 1 mrad; reach R + (h - L/2) t/L = 25 + 190 = 215 um at 200 mm."""
+def test_perpendicularity_reduces_largest_displacement_of_a_bore():
+    """At h = 200 mm, the displacement is R + (h - L/2) t/L = 25 + 190 = 215 um."""
     assert BOTH.support(np.eye(6)[1]) == pytest.approx(1e-3, rel=1e-7)
     assert reach(BOTH, 0.200) == pytest.approx(215e-6, rel=1e-7)
 
 
-def test_farthest_screw_attains_the_support():
+def test_farthest_screw_attains_support_function():
     rng = np.random.default_rng(3)
     for zone in (POSITION, BOTH, plane_position(4e-5, 0.04, 0.03)):
         for _ in range(5):
@@ -58,9 +58,12 @@ def test_farthest_screw_attains_the_support():
             assert max(sizes) <= 1 + 1e-9
 
 
-def test_uniform_bore_ends_have_the_shift_and_tilt_computed_by_hand():
-    """Ends uniform in their discs: shift R/(2 sqrt 2) = 8.84 um, tilt R/(sqrt 2 L) =
-    0.884 mrad, at 50 mm R sqrt(1/8 + (h/L)^2/2) = 45.1 um; closed form and draws."""
+def test_covariance_of_position_zone_equals_hand_calculation():
+    """Standard deviations for ends that are uniformly distributed in discs of radius R.
+
+    The shift is R / (2 sqrt 2), the tilt is R / (sqrt 2 L), and the displacement at a
+    height h is R sqrt(1/8 + (h/L)^2 / 2).
+    """
     C = POSITION.covariance()
     assert np.sqrt(C[3, 3]) * 1e6 == pytest.approx(8.839, abs=1e-3)
     assert np.sqrt(C[0, 0]) * 1e3 == pytest.approx(0.8839, abs=1e-4)
@@ -70,34 +73,36 @@ def test_uniform_bore_ends_have_the_shift_and_tilt_computed_by_hand():
     assert C[1, 3] == pytest.approx(0, abs=1e-20)
 
 
-def test_perpendicularity_accepts_43_percent_of_draws_and_increases_their_shift():
+def test_perpendicularity_accepts_43_percent_of_position_draws():
     all_screws = drawn(POSITION)
     kept = np.linalg.norm(all_screws[:, :2], axis=1) <= 1e-3
     assert kept.mean() == pytest.approx(0.43, abs=0.005)
     screws = drawn(BOTH)
     assert screws[:, 0].std() * 1e3 == pytest.approx(0.474, abs=0.003)
     assert screws[:, 3].std() * 1e6 == pytest.approx(10.5, abs=0.06)
-    # the same as the draws of the larger zone that are kept
+    # equal to the standard deviation of the draws of POSITION inside this zone
     assert screws[:, 3].std() == pytest.approx(all_screws[kept, 3].std(), rel=0.01)
 
 
-def test_draw_of_one_part_does_not_depend_on_other_parts():
+def test_draw_does_not_depend_on_number_of_draws():
     few = BOTH.draw(lambda a: numbers_of(BOTH, 200)(a)[:50])
     many = BOTH.draw(numbers_of(BOTH, 200))
     assert np.array_equal(few, many[:50])
 
 
-def test_uniform_disc_has_half_the_radius_as_deviation():
+def test_standard_deviation_of_uniform_disc_is_half_its_radius():
     disc = Zone((np.array([[0, 0, 0, 1.0, 0, 0], [0, 0, 0, 0, 1.0, 0]]) / 25e-6,))
     assert np.sqrt(disc.covariance()[3, 3]) * 1e6 == pytest.approx(12.5, rel=1e-12)
-    # share of a square of the same half width that is outside: 1 - pi/4 = 21.5 %
+    # a fraction 1 - pi / 4 of a square is outside the inscribed disc
     square = np.random.default_rng(1).uniform(-1, 1, (200_000, 2))
     assert 1 - disc.inside(square).mean() == pytest.approx(0.215, abs=0.003)
 
 
-def test_normal_distribution_of_a_position_has_0_27_percent_outside_the_zone():
-    """Rayleigh: exp(-R^2/2 s^2) = 0.0027 for s = 0.2908 R = 7.27 um; s = R/3 leaves
-    exp(-4.5) = 1.11 % outside."""
+def test_normal_distribution_has_0_27_percent_outside_a_disc():
+    """Radii have a Rayleigh distribution, with exp(-R^2 / (2 s^2)) = 0.0027.
+
+    The solution is s = 0.2908 R = 7.27 um.
+    """
     disc = Zone((np.array([[0, 0, 0, 1.0, 0, 0], [0, 0, 0, 0, 1.0, 0]]) / 25e-6,))
     assert disc.deviation() == pytest.approx(0.2908, abs=1e-4)
     sigma = np.sqrt(disc.covariance("normal")[3, 3])
@@ -108,7 +113,7 @@ def test_normal_distribution_of_a_position_has_0_27_percent_outside_the_zone():
 
 
 @pytest.mark.parametrize("cp", [1.0, 1.33])
-def test_limit_of_a_normal_interval_is_three_cp_standard_deviations_from_its_centre(cp):
+def test_half_width_of_interval_is_three_cp_standard_deviations(cp):
     assert shift_along(1e-4, [1, 0, 0]).deviation(cp) == pytest.approx(1 / (3 * cp))
 
 
@@ -117,7 +122,7 @@ def test_limit_of_a_normal_interval_is_three_cp_standard_deviations_from_its_cen
     pytest.param(round_plane_position(4e-5, 0.04), marks=pytest.mark.slow),
     pytest.param(plane_position(4e-5, 0.04, 0.03), marks=pytest.mark.slow),
 ])  # fmt: skip
-def test_truncated_draws_are_inside_the_zone_and_have_its_covariance(zone):
+def test_truncated_draws_have_covariance_of_the_zone(zone):
     screws = drawn(zone, "truncated", 0.6)
     sizes = [np.linalg.norm(screws @ b.T, axis=1).max() for b in zone.bounds]
     assert max(sizes) <= 1 + 1e-9
@@ -127,17 +132,19 @@ def test_truncated_draws_are_inside_the_zone_and_have_its_covariance(zone):
 
 
 @pytest.mark.parametrize("zone", [POSITION, BOTH, round_plane_position(4e-5, 0.04)])
-def test_normal_draws_leave_the_zone_as_often_as_a_normal_variable_in_one_dimension(
+def test_probability_outside_zone_does_not_depend_on_its_shape(
     zone,
 ):
     u = zone.draw(numbers_of(zone), "normal", 0.7)
-    # 2 Phi(-2.1) = 3.57 %
+    # the probability is 2 Phi(-2.1) = 3.57 %
     assert 1 - zone.inside(u).mean() == pytest.approx(0.0357, abs=0.0015)
 
 
 def test_zone_of_a_rectangular_face_is_an_octahedron():
-    """Support g max(|w_TZ|, |w_RX|/B, |w_RY|/A); variance of a cross-polytope in three
-    dimensions g^2/10 along each of its axes."""
+    """The support function is g max(|w_TZ|, |w_RX| / B, |w_RY| / A).
+
+    The variance of a uniform distribution in an octahedron is g^2 / 10 along each axis.
+    """
     g, A, B = 20e-6, 0.020, 0.015
     zone = plane_position(2 * g, 2 * A, 2 * B)
     rng = np.random.default_rng(1)
@@ -151,8 +158,11 @@ def test_zone_of_a_rectangular_face_is_an_octahedron():
 
 
 def test_zone_of_a_round_face_is_a_double_cone():
-    """Support g max(|w_TZ|, |(w_RX, w_RY)|/r).  Sections at a height are discs of
-    radius (g - |TZ|)/r, so the variances are g^2/10 and 3 (g/r)^2/20."""
+    """The support function is g max(|w_TZ|, |(w_RX, w_RY)| / r).
+
+    The cross section at TZ is a disc with the radius (g - |TZ|) / r, so that the
+    variances are g^2 / 10 and 3 (g/r)^2 / 20.
+    """
     g, r = 20e-6, 0.020
     zone = round_plane_position(2 * g, 2 * r)
     rng = np.random.default_rng(1)
@@ -168,13 +178,13 @@ def test_zone_of_a_round_face_is_a_double_cone():
     assert C[0, 0] == pytest.approx(3 / 20 * (g / r) ** 2, rel=0.01)
     screws = drawn(zone, count=20_000)
     gauge = abs(screws[:, 5]) + r * np.hypot(screws[:, 0], screws[:, 1])
-    # the share of the volume within a factor f of the zone is f^3
+    # scaling the zone by 0.5 scales its volume by 0.5^3
     assert np.mean(gauge < 0.5 * g) == pytest.approx(0.125, abs=0.01)
     assert gauge.max() <= g * (1 + 1e-9)
 
 
-def test_parallelism_cuts_the_double_cone_of_a_round_face():
-    """Corners: the tip (g, 0) and the circle (g - r b, b) with b = t/(2 r)."""
+def test_parallelism_limits_tilt_of_a_round_face():
+    """The extreme points are the tip (g, 0) and the circle (g - r b, b)."""
     g, r, b = 20e-6, 0.020, 0.4e-3
     zone = intersection([
         round_plane_position(2 * g, 2 * r), round_plane_orientation(2 * r * b, 2 * r)
@@ -189,9 +199,8 @@ def test_parallelism_cuts_the_double_cone_of_a_round_face():
 
 
 @pytest.mark.parametrize("size", [0.0, 0.4, 1.0])
-def test_position_in_a_growing_zone_depends_only_on_the_size(size):
-    """A size is drawn first, then the position in the zone of that size: uniform in
-    the part of the tilts that perpendicularity allows."""
+def test_draws_in_a_growing_zone_equal_those_for_fixed_size(size):
+    """The hole size is drawn first, then the position in the zone for this size."""
     zone = intersection([
         axis_position(WIDTH, LENGTH, bonus=18e-6), axis_orientation(20e-6, LENGTH)
     ])  # fmt: skip
@@ -201,7 +210,7 @@ def test_position_in_a_growing_zone_depends_only_on_the_size(size):
 
     def numbers(attempt):
         uniform = numbers_of(zone, 40_000)(attempt)
-        if attempt == 0:  # later attempts keep the size of the part
+        if attempt == 0:  # the hole size is drawn only in the first attempt
             uniform[:, -1] = size
         return uniform
 
@@ -210,7 +219,7 @@ def test_position_in_a_growing_zone_depends_only_on_the_size(size):
     assert screws.var(axis=0)[[0, 3]] == pytest.approx(np.diag(C)[[0, 3]], rel=0.03)
 
 
-def test_support_of_a_polyhedron_agrees_with_a_linear_programme():
+def test_support_function_of_a_polyhedron_agrees_with_linear_programme():
     zone = intersection([
         plane_position(5e-5, 0.04, 0.03),
         plane_orientation(2e-5, 0.04, 0.03),
@@ -227,7 +236,7 @@ def test_support_of_a_polyhedron_agrees_with_a_linear_programme():
         assert zone.support(full) == pytest.approx(-found.fun, rel=1e-7)
 
 
-def test_position_tolerance_in_one_direction_allows_no_error_in_the_other_direction():
+def test_directed_position_tolerance_permits_no_perpendicular_displacement():
     zone = axis_position_along(WIDTH, LENGTH, np.array([1.0, 0.0]))
     assert zone.support(np.eye(6)[3]) == pytest.approx(25e-6)
     assert zone.support(np.eye(6)[1]) == pytest.approx(2.5e-3)
@@ -235,9 +244,11 @@ def test_position_tolerance_in_one_direction_allows_no_error_in_the_other_direct
     assert zone.support(np.eye(6)[0]) == pytest.approx(0, abs=1e-15)
 
 
-def test_position_in_one_direction_at_maximum_material_grows_with_the_hole():
-    """Between planes 0.05 to 0.068 mm apart: at most 34 um, E[x^2] = E[R^2]/3 at one
-    end for uniform ends and R uniform in 25 to 34 um."""
+def test_directed_position_zone_at_maximum_material_grows_with_hole():
+    """The displacement x of an end has the variance E[x^2] = E[R^2] / 3.
+
+    It is uniform in -R to R, and R is uniform in 25 to 34 um.
+    """
     zone = axis_position_along(WIDTH, LENGTH, np.array([1.0, 0.0]), bonus=18e-6)
     assert zone.support(np.eye(6)[3]) == pytest.approx(34e-6)
     ends = drawn(zone, count=400_000) @ offset_rows(LENGTH / 2)[0]
@@ -246,14 +257,17 @@ def test_position_in_one_direction_at_maximum_material_grows_with_the_hole():
     assert np.mean(ends**2) == pytest.approx(mean_square, rel=0.01)
 
 
-def test_orientation_in_one_direction_is_an_interval():
+def test_directed_orientation_zone_is_an_interval():
     zone = axis_orientation(20e-6, LENGTH, np.array([1.0, 0.0]))
     assert zone.support(np.eye(6)[1]) == pytest.approx(1e-3)
     assert zone.support(np.eye(6)[0]) == pytest.approx(0, abs=1e-15)
 
 
-def test_support_of_a_bore_is_the_sum_of_its_two_ends():
-    """|B+^T w| + |B-^T w| with (TX, TY) = c (u+ + u-)/2, (RY, -RX) = c (u+ - u-)/L."""
+def test_support_function_of_a_bore_is_sum_over_both_ends():
+    """The support function is |B+^T w| + |B-^T w|, where B+ and B- map end points.
+
+    The screw is (TX, TY) = c (u+ + u-) / 2 and (RY, -RX) = c (u+ - u-) / L.
+    """
     c = WIDTH / 2
     columns = []
     for sign in (1, -1):
@@ -276,20 +290,20 @@ def test_point_zone_is_a_ball():
     assert screws[:, 3:].var(axis=0) == pytest.approx([20e-6**2 / 5] * 3, rel=0.01)
 
 
-def test_zone_at_maximum_material_grows_with_the_hole():
-    """12 H7 with 0.05 (M): 0.050 mm for the smallest, 0.068 mm for the largest hole."""
+def test_position_zone_at_maximum_material_grows_with_hole():
+    """The zone width is 0.050 mm for the smallest and 0.068 mm for the largest hole."""
     zone = axis_position(WIDTH, LENGTH, bonus=18e-6)
     assert zone.support(np.eye(6)[3]) == pytest.approx(34e-6)
     screws = drawn(zone, count=400_000)
     ends = np.linalg.norm(screws @ offset_rows(LENGTH / 2).T, axis=1)
     assert 33.9e-6 < ends.max() <= 34e-6
-    # size uniform, then the position: E[r^2] = E[R^2]/2, R uniform in 25..34 um
+    # E[r^2] = E[R^2] / 2, where the zone radius R is uniform in 25 to 34 um
     mean_square = (34e-6**3 - 25e-6**3) / (3 * 9e-6) / 2
     assert np.mean(ends**2) == pytest.approx(mean_square, rel=0.01)
     assert zone.covariance()[3, 3] == pytest.approx(screws[:, 3].var(), rel=0.01)
 
 
-def test_shift_tolerance_along_a_direction_has_no_component_across_it():
+def test_length_tolerance_permits_no_perpendicular_displacement():
     along = np.array([0.5, np.sqrt(0.75), 0.0])
     zone = shift_along(1e-4, along)
     across = np.concatenate([np.zeros(3), [-along[1], along[0], 0]])
@@ -299,8 +313,8 @@ def test_shift_tolerance_along_a_direction_has_no_component_across_it():
     assert both.support(across) == pytest.approx(0, abs=1e-18)
 
 
-def test_draws_of_a_wide_zone_that_lie_in_a_narrow_zone_are_distributed_as_its_draws():
-    """A position tolerance of 20 mm has no effect together with one of 0.05 mm."""
+def test_intersection_with_a_wide_zone_does_not_change_draws():
+    """A tolerance of 20 mm has no effect together with a tolerance of 0.05 mm."""
     narrow = axis_position(WIDTH, LENGTH)
     zone = intersection([axis_position(20e-3, LENGTH), narrow])
     screws = drawn(zone, count=20_000)
