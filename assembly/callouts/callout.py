@@ -84,9 +84,8 @@ class Callout:
             :data:`ORIENTATIONS`.
         hole: size of a hole with maximum material condition, for example ``"12 H7"``;
             empty without this condition.
-        direction: unit vector in frame axes, (3,), along which the zone width of an
-            axis is measured, or along which the first side of a face lies; None for all
-            directions.
+        direction: unit vector in frame axes, (3,); the direction of the zone width of
+            an axis or of the first side of a face; None for all directions.
         length: distance from datum A and its symmetric tolerance [m], or None.
         general: general tolerance, for example ``"ISO 2768-mK"``, or empty.
         distribution: see :meth:`forcefit.assembly.callouts.zone.Zone.draw`.

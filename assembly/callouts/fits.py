@@ -159,7 +159,7 @@ class FittedEnd:
     bound: str = "tilt"
 
     def bounds(self, radial: float) -> dict[str, float]:
-        """Return the largest rotation [rad] for a radial clearance [m], by name."""
+        """Return the name of the bound and its value [rad] for a clearance [m]."""
         return {self.bound: radial / self.length}
 
 

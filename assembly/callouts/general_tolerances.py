@@ -82,7 +82,7 @@ def _entry(
     row: tuple[float, ...], steps: tuple[int, ...], mm: float, name: str
 ) -> float:
     """Return the tolerance [m] for a size [mm] from a row of a table."""
-    # the factor prevents that a rounding error selects the next column
+    # with the factor, a rounding error does not select the next column
     value = row[int(np.searchsorted(steps, mm * (1 - 1e-12)))]
     if np.isnan(value):
         fault = f"found {mm:g} mm in {name}, for which ISO 2768 does not have a value"

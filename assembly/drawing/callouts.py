@@ -1,4 +1,4 @@
-"""Transfer of the callouts of drawn bodies to the frames of their joints."""
+"""Conversion of tolerance callouts of joints to callouts of frames."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -15,7 +15,7 @@ from forcefit.assembly.model.placed_frames import PlacedFrame, own_motion
 from forcefit.inputs.table import BadInput, quoted
 
 _ROUNDING = 1e-12
-# datum shape by joint type; for all remaining joint types, the datum is an axis
+# shape of a datum, by joint type; the default is an axis
 _DATUM_SHAPES = {
     "planar": "plane",
     "spherical": "point",
@@ -28,16 +28,15 @@ Vector = tuple[float, float, float]
 def frame_callouts(
     drawing: Drawing, steps: Sequence[Step], placed: Sequence[PlacedFrame]
 ) -> tuple[Callout, ...]:
-    """Return the callouts of a drawing, with joints replaced by frames.
+    """Convert callouts of joints to callouts of frames.
 
     Args:
         drawing: bodies and joints.
-        steps: steps of the drawing's spanning tree.
-        placed: the frames with their home poses.
+        steps: edges of the spanning tree.
+        placed: frames with their home poses.
 
     Returns:
-        The callouts in the order of the drawing; axes and directions are in the axes of
-        the frames.
+        The callouts.  Axes and directions are in frame axes.
     """
     passed = {s.edge.item.name: s for s in steps if isinstance(s.edge.item, DrawnJoint)}
     poses = {frame.name: (pose, pose @ own_motion(frame)) for frame, pose in placed}
@@ -47,7 +46,7 @@ def frame_callouts(
 def frame_fits(
     steps: Sequence[Step],
 ) -> tuple[dict[str, str], dict[str, FittedEnd]]:
-    """Return the fits and fitted ends of all joint frames in a tree."""
+    """Return the fits and fitted ends of all joint frames, by name."""
     found = {
         part.name: part.numbers
         for step in steps if isinstance(step.edge.item, DrawnJoint)
@@ -61,14 +60,14 @@ def _of_frames(
     drawn: DrawnCallout, passed: Mapping[str, Step],
     poses: Mapping[str, tuple[NDArray, NDArray]],
 ) -> Callout:  # fmt: skip
-    """Transfer a drawn callout to the frame on the body of the callout."""
+    """Convert the callout of a joint to a callout of its frame."""
     callout = drawn.callout
     step = passed[callout.feature]
     frame, after, joint = _side(step, drawn.body)
     pose = poses[frame][after]
     R = pose[:3, :3]
     across = None if drawn.direction is None else np.array(drawn.direction)
-    if callout.shape == "plane":  # the callout's direction is that of its first size
+    if callout.shape == "plane":  # the first side of a face is along x of the joint
         across = joint.across if len(callout.extent) == 2 else None
     datums = []
     for datum in callout.datums:
@@ -97,7 +96,7 @@ def _of_frames(
 
 
 def _hole_of(step: Step, drawn: DrawnCallout) -> str:
-    """Return the name of the fit of a hole, or the name of the joint without a fit."""
+    """Return the name of the fit of a hole, or of the joint if it has no fit."""
     joint = step.edge.item
     assert isinstance(joint, DrawnJoint)
     fitted = [p for p in parts_of(joint, step.reverse) if p.numbers.fit]
@@ -115,7 +114,7 @@ def _hole_of(step: Step, drawn: DrawnCallout) -> str:
 
 
 def _side(step: Step, body: str) -> tuple[str, bool, DrawnJoint]:
-    """Return a joint's frame at a body, whether the joint moves it, and the joint."""
+    """Return the frame of a joint at a body, whether it moves, and the joint."""
     joint = step.edge.item
     assert isinstance(joint, DrawnJoint)
     after = step.start[0] != body
@@ -123,20 +122,20 @@ def _side(step: Step, body: str) -> tuple[str, bool, DrawnJoint]:
 
 
 def _axis(joint: DrawnJoint, body: str) -> NDArray:
-    """Return the joint axis that is fixed to a body (3,), in base axes at home."""
+    """Return the joint axis that is fixed to a body, (3,), in base axes."""
     second = joint.kind == "universal" and body == joint.second
     return joint.axis2 if second else joint.axis
 
 
 def _point(pose: NDArray, joint: DrawnJoint) -> Vector:
-    """Return the joint's point in a frame's axes; a contact's origin may differ."""
+    """Return the position of a joint relative to a frame."""
     point = pose[:3, :3].T @ (joint.at - pose[:3, 3])
     x, y, z = (float(v) + 0.0 for v in np.where(abs(point) < _ROUNDING, 0.0, point))
     return x, y, z
 
 
 def _vector(vector: NDArray) -> Vector:
-    """Return a vector with zeros and ones exact; the sign of an axis is arbitrary."""
+    """Return a unit vector without rounding errors in components that are 0 or 1."""
     rounded = np.where(abs(vector) < _ROUNDING, 0.0, vector)
     rounded = np.where(abs(abs(rounded) - 1) < _ROUNDING, np.sign(rounded), rounded)
     if np.array_equal(abs(rounded), [0.0, 0.0, 1.0]):

@@ -1,7 +1,7 @@
-"""Data model of a drawing: bodies and joints, given in base axes at home.
+"""Data model of robots that are described by bodies and joints.
 
-All names are unique within the robot.  For example, the body ``tube`` in the copy
-``leg1`` of a leg is named ``leg1.tube``.
+All names are unique.  For example, the body ``tube`` in the copy ``leg1`` of a leg is
+named ``leg1.tube``.
 """
 
 from dataclasses import dataclass, field, replace
@@ -14,8 +14,8 @@ from forcefit.assembly.callouts.fits import FittedEnd
 from forcefit.assembly.drawing.contacts import Contact
 from forcefit.assembly.model.robot import BeamLink, Clearance, Link, LockedAt, MeshLink
 
-# free components of each type: rows of the screw [RX RY RZ TX TY TZ] in the joint's
-# axes; the two rotations of a universal joint have separate axes
+# free components of the screw [RX RY RZ TX TY TZ] in joint axes, by joint type; the two
+# rotations of a universal joint have different axes
 FREE_ROWS: dict[str, tuple[int, ...]] = {
     "fixed": (),
     "revolute": (2,),
@@ -27,25 +27,25 @@ FREE_ROWS: dict[str, tuple[int, ...]] = {
     "planar": (2, 3, 4),
 }
 Direction = tuple[float, float, float] | None
-NEAR_X = 0.985  # cosine of 10 deg; nearer to the base's x, the base's y is used
+NEAR_X = 0.985  # cosine of 10 deg
 
 
 @dataclass(frozen=True, eq=False)
 class JointNumbers:
-    """Error, clearance and stiffness of a joint or bearing, in the joint axes.
+    """Error, clearance and stiffness of a joint or bearing, in joint axes.
 
     Attributes:
         clearance: clearance bounds, or None.
-        stiffness: K_B (6, 6) [N m/rad .. N/m], with ``inf`` on the diagonal for rigid
-            components and 0 for free motions; or None.
-        error: geometric error delta l (6,) [rad, m].
-        tolerance: standard deviations of the error (6,) [rad, m], or None.
-        fit: ISO 286 fit whose mean radial clearance is in ``clearance``, or empty.
-        fitted_end: data that relate the tilt to the fit; None if the fit determines
-            ``radial``.
-        contacts: additional clearance, given by the dimensions of contacts.
+        stiffness: stiffness K_B, (6, 6) [N m/rad .. N/m], with ``inf`` on the diagonal
+            for rigid components and 0 for free motions, or None.
+        error: geometric error delta l, (6,) [rad, m].
+        tolerance: standard deviations of the error, (6,) [rad, m], or None.
+        fit: ISO 286 fit with the mean radial clearance in ``clearance``, or empty.
+        fitted_end: relation between the fit and the tilt; None if the fit determines
+            the radial clearance.
+        contacts: additional frames for clearance that depends on contact dimensions.
         locked_at: pose at which a fixed joint is bolted, with its clearance before
-            bolting; or None.
+            bolting, or None.
     """
 
     clearance: Clearance | None = None
@@ -60,26 +60,26 @@ class JointNumbers:
 
 @dataclass(frozen=True, eq=False)
 class DrawnJoint:
-    """Joint between two bodies; all vectors are in base axes at home.
+    """Joint between two bodies; all vectors are in base axes in the home pose.
 
     Attributes:
         name: name of the joint.
         kind: key of :data:`FREE_ROWS`.
         first: name of the first body, or ``"base"``.
         second: name of the second body, which moves in the positive direction of
-            ``axis`` relative to the first body when the coordinate increases.
-        at: position of the joint (3,) [m].
-        axis: unit vector along the axis (3,): for a universal joint, the axis fixed to
-            the first body; for a planar joint, the normal.
-        across: unit vector along the x axis (3,), perpendicular to ``axis``.
+            ``axis`` relative to the first body if the coordinate increases.
+        at: position of the joint, (3,) [m].
+        axis: unit vector along the axis, (3,).  For a universal joint, this axis is
+            fixed to the first body.  For a planar joint, it is the normal.
+        across: unit vector along the x axis, (3,), perpendicular to ``axis``.
         axis2: unit vector along the axis of a universal joint that is fixed to the
-            second body (3,); equal to ``across`` for all remaining types.
-        actuated: whether a drive holds the joint.
-        position: coordinate at home [rad or m].
+            second body, (3,); equal to ``across`` for other joint types.
+        actuated: whether the joint is driven.
+        position: coordinate in the home pose [rad or m].
         limits: minimum and maximum coordinate [rad or m], or None.
-        pitch: translation per turn of a helical joint [m]; 0 for all remaining types.
-        numbers: error, clearance and stiffness: one entry per bearing for a universal
-            joint, otherwise one entry.
+        pitch: translation per turn of a helical joint [m]; 0 for other joint types.
+        numbers: error, clearance and stiffness, with one entry for each bearing of a
+            universal joint, and one entry for other joint types.
     """
 
     name: str
@@ -99,18 +99,19 @@ class DrawnJoint:
 
 @dataclass(frozen=True, eq=False)
 class DrawnBody:
-    """Body of a robot; all vectors are in base axes at home.
+    """Body of a robot; all vectors are in base axes in the home pose.
 
     Attributes:
         name: name of the body.
         mass: mass in addition to the mass of the link [kg].
-        centre: centre of this additional mass (3,) [m].
-        inertia: moments of inertia about this centre (3, 3) [kg m^2].
-        axes: base axes rotated with the copy of the leg, as columns (3, 3).
-        link: elastic link between two joints of the body; a stiffness matrix refers to
-            the position and axes of the joint ``ends[1]``.
-        ends: names of the joints at both ends of the link; the second one is None for
-            the reference point of the platform.
+        centre: centre of the additional mass, (3,) [m].
+        inertia: inertia matrix of the additional mass about its centre, (3, 3)
+            [kg m^2].
+        axes: base axes rotated with the copy of the leg, as columns, (3, 3).
+        link: elastic link between two joints of the body.  A stiffness matrix refers to
+            the frame of the joint ``ends[1]``.
+        ends: names of the joints at both ends of the link; the second name is None if
+            the link ends at the reference point of the platform.
     """
 
     name: str
@@ -128,8 +129,8 @@ class DrawnCallout:
 
     Attributes:
         body: name of the body, or ``"base"``.
-        callout: callouts in which frame names are replaced by joint names.
-        direction: direction in which the zones are measured (3,), in base axes at home;
+        callout: callouts with joint names instead of frame names.
+        direction: direction in which the zone widths are measured, (3,), in base axes;
             None for all directions.
     """
 
@@ -140,16 +141,16 @@ class DrawnCallout:
 
 @dataclass(frozen=True, eq=False)
 class Drawing:
-    """Robot that consists of bodies and joints.
+    """Robot that is described by bodies and joints.
 
     Attributes:
         name: name of the robot.
-        platform: name of the body whose pose error is reported.
-        platform_at: reference point of the platform (3,) [m], in base axes at home.
-        bodies: bodies in file order.
-        joints: joints in file order.
-        description: one-line description.
-        remarks: default values in the file that are easily overlooked.
+        platform: name of the platform.
+        platform_at: reference point of the platform in base axes, (3,) [m].
+        bodies: bodies in the order of the file.
+        joints: joints in the order of the file.
+        description: description of the robot in one line.
+        remarks: remarks on default values in the file.
         callouts: tolerance callouts of features.
     """
 
@@ -172,12 +173,12 @@ def perpendicular(axis: NDArray, near: NDArray | None = None) -> NDArray:
     """Return a unit vector perpendicular to an axis.
 
     Args:
-        axis: unit vector (3,).
-        near: direction that is projected onto the plane normal to the axis (3,); None
-            for the base x axis, or the y axis if the axis is within 10 deg of x.
+        axis: unit vector, (3,).
+        near: direction that is projected onto the plane normal to the axis, (3,); None
+            for the base x axis, or for the y axis if the axis is within 10 deg of x.
 
     Returns:
-        Unit vector (3,).
+        Unit vector, (3,).
     """
     if near is None:
         near = np.eye(3)[1 if abs(axis[0]) > NEAR_X else 0]
@@ -206,7 +207,7 @@ def turned_link(link: Link | None, R: NDArray) -> Link | None:
     """Express the directions of a link in rotated axes.
 
     Args:
-        link: link; stiffness matrices and library entries contain no directions.
+        link: link of any type.  Only beams and meshes have directions.
         R: rotation matrix from the current axes to the new axes.
 
     Returns:
@@ -221,7 +222,7 @@ def turned_link(link: Link | None, R: NDArray) -> Link | None:
 
 
 def _turned(vector: Direction, R: NDArray) -> Direction:
-    """Express a direction in rotated axes; None stays None."""
+    """Express a direction, or None, in rotated axes."""
     if vector is None:
         return None
     x, y, z = (R @ np.array(vector)).tolist()

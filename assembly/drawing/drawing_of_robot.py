@@ -1,4 +1,4 @@
-"""Conversion of a robot with frames and closures to a drawing with bodies and joints.
+"""Conversion of a robot with frames and closures to bodies and joints.
 
 Start with :func:`drawing_of_robot`.  ``frames.py`` contains the inverse conversion.
 """
@@ -32,8 +32,8 @@ from forcefit.inputs.table import BadInput, quoted
 from forcefit.results.display import rounded
 from forcefit.stiffness.screws import rotation_vector, transform
 
-_SAME = 1e-12  # [robot sizes, rad] tolerance for coincident points and axes
-# frame fields that a drawing can represent
+_SAME = 1e-12  # [rad, or fraction of the robot size] tolerance for coincidence
+# attributes of a frame that are converted
 _HELD = {
     "name", "parent", "translation", "rotation", "joint", "actuated", "position",
     "limits", "geometric_error", "tolerance", "clearance", "joint_stiffness", "link",
@@ -44,14 +44,14 @@ _HELD = {
 
 @dataclass(frozen=True, eq=False)
 class DrawnRobot:
-    """Drawing of a robot, with a list of properties that it cannot represent.
+    """Bodies and joints of a robot, and descriptions of omitted properties.
 
     Attributes:
         drawing: bodies and joints of the robot.
-        frames: name of the frame of each joint after the drawing is converted back to a
-            robot. Ball, cylindrical and planar joints are not listed, because their
-            axes change.
-        left_out: descriptions of properties that the drawing omits.
+        frames: names of joint frames after conversion back to frames, by their names in
+            the original robot.  Frames of ball, cylindrical and planar joints are not
+            included, because their axes change.
+        left_out: descriptions of properties that are omitted.
     """
 
     drawing: Drawing
@@ -60,25 +60,26 @@ class DrawnRobot:
 
 
 def drawing_of_robot(robot: Robot) -> DrawnRobot:
-    """Convert a robot to a drawing in its home pose.
+    """Convert a robot to bodies and joints in its home pose.
 
     Args:
         robot: robot with frames and closures.
 
     Returns:
-        Drawing, and descriptions of omitted properties.
+        Bodies and joints, and descriptions of omitted properties.
 
     Raises:
-        BadInput: a drawing cannot represent the robot.
+        BadInput: the robot cannot be described by bodies and joints.
     """
     posture = home_posture(robot)
     rigid = rigid_bodies(robot)
     end = rigid.after[robot.index(robot.platform)]
     if end == 0:
         raise BadInput(
-            f"{robot.name}: found a platform fixed to the base, expected a moving one"
+            f"{robot.name}: found a platform that is fixed to the base, expected a "
+            "moving platform"
         )
-    # a robot with effects keeps one joint per frame: effects refer to frames by name
+    # frames are not combined if effects refer to frames by name
     sheet = _Sheet(posture, rigid, found_joints(posture, rigid, not robot.has_effects))
     _add_bodies(sheet)
     for i, frame in enumerate(robot.frames):
@@ -100,15 +101,16 @@ def drawing_of_robot(robot: Robot) -> DrawnRobot:
 
 @dataclass(frozen=True, eq=False)
 class _Sheet:
-    """The incomplete drawing during the conversion.
+    """Intermediate data of the conversion.
 
     Attributes:
-        posture: the robot at home.
+        posture: the robot in its home pose.
         rigid: rigid bodies of the robot.
         found: joints of the robot.
-        bodies: bodies of the drawing by number, without the base.
-        joints: joints of the drawing, with the numbers of their two bodies.
-        same: for each body at the near end of a link, the body that contains the link.
+        bodies: bodies by number, without the base.
+        joints: joints, with the numbers of their two bodies.
+        same: number of the body that contains a link, by the number of the rigid body
+            at the start of the link.
     """
 
     posture: Posture
@@ -119,12 +121,12 @@ class _Sheet:
     same: dict[int, int] = field(default_factory=dict)
 
     def name_of(self, k: int) -> str:
-        """Return the name of a body, given its number."""
+        """Return the name of the body with a given number."""
         k = self.same.get(k, k)
         return self.bodies[k].name if k else BASE
 
     def new_name(self, name: str, joint: bool) -> str:
-        """Return the name, with a suffix if another body or joint has the same name."""
+        """Append underscores to the name of a body or joint until it is unique."""
         taken = {j.name for j, _, _ in self.joints} | {f.joint.name for f in self.found}
         if not joint:
             taken = {body.name for body in self.bodies.values()} | {BASE}
@@ -134,7 +136,7 @@ class _Sheet:
 
 
 def _frames(sheet: _Sheet) -> dict[str, str]:
-    """Return the name of each joint's frame in the robot of the drawing."""
+    """Return names of joint frames after conversion, by their original names."""
     names = {}
     for found in sheet.found:
         if len(found.rows) == 1 or found.joint.kind == "universal":
@@ -145,15 +147,15 @@ def _frames(sheet: _Sheet) -> dict[str, str]:
 
 
 def _left_out(sheet: _Sheet) -> list[str]:
-    """Return descriptions of properties that a drawing cannot represent."""
+    """Return descriptions of properties that bodies and joints do not include."""
     posture, robot = sheet.posture, sheet.posture.robot
     lost = []
     turned = rotation_vector(posture.platform[:3, :3])
     if np.abs(turned).max() > _SAME:
         numbers = ", ".join(f"{rounded(angle):.6g}" for angle in turned)
         lost.append(
-            f"axes of the platform, turned by [{numbers}] rad from the base's at home: "
-            "in the new file its rotation there is 0"
+            f"axes of the platform, which are rotated by [{numbers}] rad relative to "
+            "the base at home; in the new file, this rotation is 0"
         )
     moved = [
         quoted(found.joint.name) for found in sheet.found if len(found.rows) > 1
@@ -161,7 +163,7 @@ def _left_out(sheet: _Sheet) -> list[str]:
     ]  # fmt: skip
     if moved:
         names = ", ".join(moved)
-        lost.append(f"coordinates at home of {names}: they are 0 in the new file")
+        lost.append(f"home coordinates of {names}, which are 0 in the new file")
     grounded = [
         quoted(frame.name) for i, frame in enumerate(robot.frames)
         if has_mass(frame) and sheet.rigid.before[i] == 0
@@ -170,8 +172,8 @@ def _left_out(sheet: _Sheet) -> list[str]:
         lost.append(f"masses that are fixed to the base: {', '.join(grounded)}")
     if posture.mismatch > _SAME:
         lost.append(
-            f"the nominal closure error of {posture.mismatch:.2g} rad or m: joints "
-            "coincide exactly in the new file"
+            f"nominal closure error of {posture.mismatch:.2g} rad or m, which is 0 in "
+            "the new file"
         )
     for name in sorted({each.name for each in fields(Frame)} - _HELD):
         given = [quoted(f.name) for f in robot.frames if np.any(getattr(f, name))]
@@ -180,7 +182,7 @@ def _left_out(sheet: _Sheet) -> list[str]:
 
 
 def _add_bodies(sheet: _Sheet) -> None:
-    """Name the bodies: first the platform, then others after their frames."""
+    """Add the bodies, which have the names of the platform or of their frames."""
     robot, rigid = sheet.posture.robot, sheet.rigid
     numbers = {rigid.after[robot.index(robot.platform)]: robot.platform}
     first = [i for i, frame in enumerate(robot.frames) if _holds(frame)]
@@ -207,7 +209,7 @@ def _add_bodies(sheet: _Sheet) -> None:
 
 
 def _holds(frame: Frame) -> bool:
-    """Return whether a frame's body has a mass or a link."""
+    """Return whether a frame has a mass or a link."""
     return has_mass(frame) or frame.link is not None
 
 
@@ -232,7 +234,7 @@ def _new_body(sheet: _Sheet, name: str) -> int:
 
 
 def _at(point: NDArray) -> NDArray:
-    """Return the (4, 4) pose at a point, parallel to the base axes."""
+    """Return the pose at a point with the axes of the base, (4, 4)."""
     return transform(point, np.eye(3))
 
 
@@ -248,7 +250,7 @@ def _fix(sheet: _Sheet, name: str, first: int, second: int, T: NDArray) -> Drawn
 
 
 def _add_link(sheet: _Sheet, i: int) -> None:
-    """Add a link between two joints of its body; add fixed joints where none exist."""
+    """Add a link between two joints of its body; missing joints are added."""
     robot, rigid = sheet.posture.robot, sheet.rigid
     frame, T = robot.frames[i], sheet.posture.transforms[i]
     start, end = rigid.starts[i], rigid.before[i]
@@ -272,13 +274,13 @@ def _add_link(sheet: _Sheet, i: int) -> None:
 
 
 def _distance(sheet: _Sheet, joint: DrawnJoint, point: NDArray) -> float:
-    """Return the distance of a joint from a point, divided by the robot's size."""
+    """Return the distance of a joint from a point, divided by the robot size."""
     gap = float(np.abs(joint.at - point).max())
     return gap / size_of(sheet.posture.robot)
 
 
 def _joint_at(sheet: _Sheet, i: int, body: int) -> DrawnJoint | None:
-    """Return the joint at the tip of a link if the link can use its axes, or None."""
+    """Return the joint at the tip of a link, or None if a joint must be added."""
     frame, T = sheet.posture.robot.frames[i], sheet.posture.transforms[i]
     for found in sheet.found:
         joint = found.joint
@@ -291,7 +293,7 @@ def _joint_at(sheet: _Sheet, i: int, body: int) -> DrawnJoint | None:
 
 
 def _only_joint(sheet: _Sheet, body: int, i: int) -> DrawnJoint | None:
-    """Return the joint of a body that has only this joint and a link's start."""
+    """Return the joint at the start of a link if its body has no other content."""
     robot, rigid = sheet.posture.robot, sheet.rigid
     if (
         body == 0

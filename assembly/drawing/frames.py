@@ -1,8 +1,8 @@
-"""Conversion of a drawing to a robot with frames and closures.
+"""Conversion of bodies and joints to a robot with frames and closures.
 
-A joint becomes one frame with the same name, or one frame per degree of freedom
+A joint becomes one frame with the same name, or one frame for each degree of freedom
 (``joint.first``).  A body becomes a fixed frame with the same name if it has a mass or
-a link, if it is the platform, or if a loop is closed at it.
+a link, is the platform, or is connected by a loop closure.
 """
 
 from collections.abc import Mapping
@@ -31,17 +31,17 @@ from forcefit.stiffness.screws import transform
 
 @dataclass(frozen=True, eq=False)
 class _Plan:
-    """Names of the frames of a robot, and the nodes that they belong to.
+    """Names of the frames of a robot.
 
     Attributes:
         drawing: bodies and joints.
-        joints: joints of the drawing by name.
-        bodies: bodies of the drawing by name.
-        own: by node, the name of the frame of each body that has its own frame.
-        carriers: name of the frame that carries the objects on a node.
-        links: name of the frame of a body's link, if it differs from the body's frame.
+        joints: joints by name.
+        bodies: bodies by name.
+        own: name of the body frame, by node; not all nodes have a body frame.
+        carriers: name of the parent frame of the next edges, by node.
+        links: name of the link frame, by body, if it differs from the body frame.
         ends: name of the last frame of an edge that closes a loop.
-        seats: name of the frame at which that loop closes.
+        seats: name of the frame with which the last frame coincides.
     """
 
     drawing: Drawing
@@ -55,17 +55,17 @@ class _Plan:
 
 
 def robot_of_drawing(drawing: Drawing) -> Robot:
-    """Convert a drawing to a robot, whose loops are closed at home.
+    """Convert bodies and joints to a robot with frames and closures.
 
     Args:
         drawing: bodies and joints.
 
     Returns:
-        Robot, whose remarks list the joints after which the loops are closed.
+        Robot.  Its remarks list the joints that close loops.
 
     Raises:
-        BadInput: no joint connects a body to the base, the two ends of a link coincide,
-            or the tree traverses a link from a library from its tip to its base.
+        BadInput: no joint connects a body to the base, the ends of a link coincide, or
+            a link from a library would have to be reversed.
     """
     steps = steps_of(drawing)
     plan = _plan(drawing, steps)
@@ -89,14 +89,14 @@ def robot_of_drawing(drawing: Drawing) -> Robot:
 
 
 def _cuts(steps: list[Step]) -> tuple[str, ...]:
-    """Return a remark that names the joints after which loops close, if any."""
+    """Return a remark on the joints that close loops."""
     closing = [step for step in steps if step.closes]
     names = [f"{quoted(s.edge.item.name)} (at {quoted(s.end[0])})" for s in closing]
     return (f"loops close after {', '.join(names)}",) if names else ()
 
 
 def _plan(drawing: Drawing, steps: list[Step]) -> _Plan:
-    """Return the frame names; a suffix is added if a joint has the same name."""
+    """Return the names of all frames, which are unique."""
     joints = {joint.name: joint for joint in drawing.joints}
     bodies = {body.name: body for body in drawing.bodies}
     taken = _part_names(drawing)
@@ -134,15 +134,15 @@ def _part_names(drawing: Drawing) -> set[str]:
             if part.name in owners:
                 raise BadInput(
                     f"joint {quoted(joint.name)}: found {quoted(part.name)} as the "
-                    f"name of a frame that joint {quoted(owners[part.name])} also "
-                    "has; expected a different name"
+                    "name of a frame, which is also the name of a frame of joint "
+                    f"{quoted(owners[part.name])}; expected a different name"
                 )
             owners[part.name] = joint.name
     return set(owners)
 
 
 def _free_name(name: str, taken: set[str]) -> str:
-    """Return the name, with a suffix if it is taken, and add it to the taken names."""
+    """Return a name with suffixes that make it unique, and add it to ``taken``."""
     while name in taken:
         name += ".body"
     taken.add(name)
@@ -158,7 +158,7 @@ def _is_body(drawing: Drawing, step: Step) -> bool:
 
 
 def _tip(body: DrawnBody) -> str | None:
-    """Return the joint at the end of a body's link; None for the platform's point."""
+    """Return the joint at the end of a link, or None for the reference point."""
     return body.ends[1] if body.ends else None
 
 
@@ -171,7 +171,7 @@ def _last_name(step: Step, links: Mapping[str, str]) -> str:
 
 
 def _frames_of(plan: _Plan, step: Step) -> list[PlacedFrame]:
-    """Return the frames of an edge, and of the body at its end."""
+    """Return the frames of an edge and of the body at its end."""
     item, carrier = step.edge.item, plan.carriers[step.start]
     placed: list[PlacedFrame] = []
     if isinstance(item, DrawnJoint):
@@ -192,7 +192,7 @@ def _frames_of(plan: _Plan, step: Step) -> list[PlacedFrame]:
 
 
 def _frame(joint: DrawnJoint, part: Part, carrier: str) -> Frame:
-    """Return one frame of a joint."""
+    """Return a frame of a joint."""
     numbers = part.numbers
     motion = _motion(joint, part.position) if part.kind != "fixed" else {}
     return Frame(
@@ -204,7 +204,7 @@ def _frame(joint: DrawnJoint, part: Part, carrier: str) -> Frame:
 
 
 def _parallel(step: Step) -> Parallel | None:
-    """Return the second chain of contacts of an edge; None if there is none."""
+    """Return the second chain of contacts of an edge, or None."""
     item = step.edge.item
     return parallel_parts(item, step.reverse) if isinstance(item, DrawnJoint) else None
 
@@ -221,7 +221,7 @@ def _second_chain(step: Step, chain: Parallel) -> list[PlacedFrame]:
 
 
 def _motion(joint: DrawnJoint, position: float) -> dict:
-    """Return the keys of a frame that describe the motion of a joint."""
+    """Return the motion of a joint as keys of a frame."""
     return {
         "pitch": joint.pitch, "actuated": joint.actuated, "position": position,
         "limits": joint.limits,
@@ -229,7 +229,7 @@ def _motion(joint: DrawnJoint, position: float) -> dict:
 
 
 def _mass(body: DrawnBody, pose: NDArray) -> dict:
-    """Return the keys of a frame that describe the mass and inertia of a body."""
+    """Return the mass and inertia of a body as keys of a frame."""
     if not _has_mass(body):
         return {}
     R = pose[:3, :3]
@@ -243,7 +243,7 @@ def _has_mass(body: DrawnBody) -> bool:
 
 
 def _end_pose(plan: _Plan, body: DrawnBody, tip: bool) -> NDArray:
-    """Return the (4, 4) pose of a link's end at home: of a joint or the platform."""
+    """Return the home pose of an end of a link, (4, 4)."""
     name = body.ends[tip] if body.ends else None
     if name is None:
         return transform(plan.drawing.platform_at, np.eye(3))
@@ -251,7 +251,7 @@ def _end_pose(plan: _Plan, body: DrawnBody, tip: bool) -> NDArray:
 
 
 def _pose(plan: _Plan, node: Node) -> NDArray:
-    """Return the (4, 4) pose of a body's own frame at home."""
+    """Return the home pose of a body frame, (4, 4)."""
     name, far = node
     body = plan.bodies[name]
     if name == plan.drawing.platform and far:
@@ -263,14 +263,14 @@ def _pose(plan: _Plan, node: Node) -> NDArray:
 
 
 def _body_frame(plan: _Plan, node: Node, carrier: str) -> PlacedFrame:
-    """Return the fixed frame of a body, with its mass."""
+    """Return the body frame, which includes the mass of the body."""
     pose = _pose(plan, node)
     mass = _mass(plan.bodies[node[0]], pose) if node[1] else {}
     return Frame(plan.own[node], carrier, **mass), pose
 
 
 def _ends(plan: _Plan, step: Step) -> list[PlacedFrame]:
-    """Return the frame that closes a loop at a body, and a base frame if needed."""
+    """Return the last frame of an edge that closes a loop, and a frame on the base."""
     end = Frame(plan.ends[step.edge], _last_name(step, plan.links))
     if step.end != ROOT:
         return [(end, _pose(plan, step.end))]

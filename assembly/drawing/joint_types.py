@@ -1,8 +1,8 @@
 """Recognition of joints with several degrees of freedom in a robot with frames.
 
-Consecutive passive frames at the same point, without mass or links on the bodies
-between them, form a universal, spherical, cylindrical or planar joint, provided that a
-single joint can have the same clearance and springs in all postures.
+Consecutive passive frames at the same point form a universal, spherical, cylindrical or
+planar joint if there is no mass or link between them, and if this joint can have the
+same clearance and springs in all postures.
 """
 
 from collections import Counter
@@ -26,21 +26,21 @@ from forcefit.assembly.kinematics.posture import Posture
 from forcefit.assembly.model.robot import Clearance, Frame, Robot
 from forcefit.inputs.table import BadInput, quoted
 
-_SAME = 1e-12  # [lengths, sine] points and directions that differ by less are equal
+_SAME = 1e-12  # [sine, or fraction of the robot size] tolerance for coincidence
 _PARALLEL = 1e-2  # smallest sine of the angle between the axes of a universal joint
 _TURNS = ("revolute", "revolute")
-# suffixes in the names of the frames of a drawn joint (``parts.py``)
+# suffixes of the names of joint frames (``parts.py``)
 _PARTS = {"first", "second", "third", "turn", "slide", "slide_x", "slide_y"}
 
 
 @dataclass(frozen=True, eq=False)
 class FoundJoint:
-    """A joint between two rigid bodies.
+    """Joint between two rigid bodies of a robot with frames.
 
     Attributes:
-        joint: the drawn joint, whose bodies have no names yet.
-        rows: indices of the joint's frames, from the first body to the second; they
-            decrease if the joint begins at its last frame, which has the clearance.
+        joint: the joint, without the names of its bodies.
+        rows: indices of its frames from the first to the second body.  They decrease if
+            the first body is the child.
         bodies: numbers of the first and the second body.
     """
 
@@ -55,13 +55,13 @@ def found_joints(
     """Return the joints of a robot, in the order of its frames.
 
     Args:
-        posture: the robot at home.
+        posture: the robot in its home pose.
         bodies: rigid bodies of the robot.
         several: whether frames may be combined into joints with several degrees of
             freedom.
 
     Returns:
-        Joints, such that each frame that is a joint belongs to exactly one of them.
+        Joints.  Each frame that connects two bodies is part of one joint.
     """
     robot = posture.robot
     following = _following(posture, bodies) if several else {}
@@ -93,7 +93,7 @@ def _ends(bodies: RigidBodies, rows: list[int]) -> tuple[int, int]:
 
 
 def _following(posture: Posture, bodies: RigidBodies) -> dict[int, int]:
-    """Return the next frame at this point, if no mass or link is between them."""
+    """Return the indices of consecutive frames at one point without a mass between."""
     robot, size = posture.robot, size_of(posture.robot)
     held = Counter(bodies.before[robot.index(robot.platform)] for _ in range(2))
     for i, frame in enumerate(robot.frames):
@@ -121,7 +121,7 @@ def has_mass(body: Frame | DrawnBody) -> bool:
 
 
 def _single(posture: Posture, i: int) -> DrawnJoint:
-    """Return the joint of one frame."""
+    """Return the joint that consists of one frame."""
     frame, T = posture.robot.frames[i], posture.transforms[i]
     return DrawnJoint(
         frame.name, frame.joint, "", "", T[:3, 3], T[:3, 2], T[:3, 0], T[:3, 0],
@@ -131,13 +131,13 @@ def _single(posture: Posture, i: int) -> DrawnJoint:
 
 
 def _numbers(frame: Frame) -> JointNumbers:
-    """Return error, clearance and stiffness of a frame, in its axes."""
+    """Return the error, clearance and stiffness of a frame in its axes."""
     bolt, error = frame.locked_at, frame.geometric_error
-    if bolt is not None:  # the drawing shows the robot before its joints are bolted
+    if bolt is not None:  # format 2 describes the robot before joints are bolted
         if {"rx", "ry", "rz"} & set(bolt.pose):
             raise BadInput(
                 f"frame {quoted(frame.name)}.locked_at: found a rotation of the "
-                "platform, whose axes are different in a drawing; expected only a "
+                "platform, whose axes are different in format 2; expected only a "
                 "translation, or joint coordinates"
             )
         bolt, error = replace(bolt, screw=np.zeros(6)), error - bolt.screw
@@ -147,7 +147,7 @@ def _numbers(frame: Frame) -> JointNumbers:
 
 
 def _several(posture: Posture, rows: list[int]) -> tuple[DrawnJoint, list[int]] | None:
-    """Return the joint formed by two or three frames, or None if there is none."""
+    """Return the joint that two or three frames form, or None."""
     frames = [posture.robot.frames[i] for i in rows]
     kinds = tuple(frame.joint for frame in frames)
     axes = [posture.transforms[i][:3, :3] for i in rows]
@@ -177,7 +177,7 @@ def _several(posture: Posture, rows: list[int]) -> tuple[DrawnJoint, list[int]] 
     kind, R, numbers = found
     name = _common_name(posture.robot, rows)
     if R is not axes[0] and kind == "spherical":
-        rows = rows[::-1]  # the contact remains on its body
+        rows = rows[::-1]  # the last frame, which has the clearance, becomes the first
     second = R[:, 0] if kind != "universal" else z[1]
     joint = DrawnJoint(
         name, kind, "", "", posture.transforms[rows[0]][:3, 3], R[:, 2],
@@ -190,7 +190,7 @@ _Found = tuple[str, NDArray, tuple[JointNumbers, ...]] | None
 
 
 def _universal(axes: list[NDArray], own: list[JointNumbers]) -> _Found:
-    """Return a universal joint that has the same numbers, or None if none exists."""
+    """Return a universal joint with equal properties, or None."""
     z = [R[:, 2] for R in axes]
     numbers = []
     for k, other in ((0, 1), (1, 0)):
@@ -204,7 +204,7 @@ def _universal(axes: list[NDArray], own: list[JointNumbers]) -> _Found:
 
 
 def _turned(own: JointNumbers, R: NDArray) -> JointNumbers | None:
-    """Return the numbers in axes rotated about z, or None without an equivalent."""
+    """Express properties in axes that are rotated about z; None if impossible."""
     if np.abs(R - np.eye(3)).max() < _SAME:
         return own
     turn = np.kron(np.eye(2), R)
@@ -225,7 +225,7 @@ def _turned(own: JointNumbers, R: NDArray) -> JointNumbers | None:
 def _with_one_contact(
     kind: str, axes: list[NDArray], own: list[JointNumbers], bounds: Sequence[str]
 ) -> _Found:
-    """Return a joint with its first frame's numbers, or None without an equivalent."""
+    """Return a joint with the properties of its first frame; None if impossible."""
     if not all(map(_empty, own[1:])):
         return None
     clearance = own[0].clearance or Clearance()
@@ -248,7 +248,7 @@ def _with_one_contact(
 
 
 def _isotropic(own: JointNumbers) -> bool:
-    """Return whether a frame has only a clearance that is symmetric about z."""
+    """Return whether the properties of a frame are symmetric about z."""
     K = own.stiffness
     even = K is None or (
         not (np.where(np.isinf(K), 0.0, K) - np.diag(np.where(
@@ -259,7 +259,7 @@ def _isotropic(own: JointNumbers) -> bool:
 
 
 def _empty(own: JointNumbers) -> bool:
-    """Return whether a joint has no error, clearance, spring or tolerance."""
+    """Return whether a frame has no error, clearance, spring and tolerance."""
     return (
         own.clearance is None and own.stiffness is None and own.tolerance is None
         and not own.error.any()
@@ -267,7 +267,7 @@ def _empty(own: JointNumbers) -> bool:
 
 
 def _common_name(robot: Robot, rows: list[int]) -> str:
-    """Return the common beginning of frame names, or the first name."""
+    """Return the common prefix of frame names, or the first name."""
     names = [robot.frames[i].name for i in rows]
     stems = {name.rpartition(".")[0] for name in names}
     if {name.rpartition(".")[2] for name in names} <= _PARTS and len(stems) == 1:
@@ -279,7 +279,7 @@ def _common_name(robot: Robot, rows: list[int]) -> str:
 
 
 def _while_equal(names: list[str]) -> Iterator[str]:
-    """Yield the letters with which all names begin."""
+    """Yield the letters of the common prefix of names."""
     for letters in zip(*names, strict=False):
         if len(set(letters)) > 1:
             return

@@ -1,4 +1,4 @@
-"""Conversion of links between drawn bodies and the frames at their tips."""
+"""Conversion of links between bodies and frames."""
 
 from dataclasses import replace
 
@@ -20,24 +20,24 @@ from forcefit.inputs.table import BadInput, quoted
 from forcefit.stiffness.beam.beam import section_axes
 from forcefit.stiffness.screws import screw_map
 
-_SAME_POINT = 1e-9  # [m] points with a smaller distance count as equal
-_SAME_AXES = 1e-12  # axes with a smaller difference count as equal
-_PARALLEL = 1e-6  # sine of the angle below which an axis defines no lateral direction
+_SAME_POINT = 1e-9  # [m] largest distance between coincident points
+_SAME_AXES = 1e-12  # largest difference between equal axes
+_PARALLEL = 1e-6  # smallest sine of the angle between a beam and the z axis
 
 
 def link_at_tip(
     body: DrawnBody, base: NDArray, tip: NDArray, reverse: bool = False
 ) -> Link | None:
-    """Convert the link of a drawn body to the frame at its tip.
+    """Express the link of a body in the frame at its tip.
 
     Args:
         body: body with a link.
-        base: home pose of the end closer to the robot base (4, 4).
-        tip: home pose of the opposite end (4, 4), in whose axes the link is expressed.
-        reverse: whether ``tip`` is the end at which the link of the body starts.
+        base: home pose of the end nearer to the robot base, (4, 4).
+        tip: home pose of the other end, (4, 4).
+        reverse: whether ``tip`` is the start of the link.
 
     Returns:
-        Link with directions in tip axes; beams have a length and an axis.
+        Link with directions in tip axes.  Beams have a length and an axis.
 
     Raises:
         BadInput: both ends coincide, or a library link is reversed.
@@ -49,8 +49,8 @@ def link_at_tip(
     if isinstance(link, LibraryLink):
         if reverse:
             raise BadInput(
-                f"{place}.library: found that the tree of the robot passes it from "
-                '"to" to "from"; expected joints that lead from the base to "from"'
+                f'{place}.library: found that the joint "to" is nearer to the base '
+                'than the joint "from", expected the reverse order'
             )
         return link
     span = tip[:3, 3] - base[:3, 3]
@@ -58,7 +58,7 @@ def link_at_tip(
     if isinstance(link, BeamLink | MeshLink):
         given = link.axis
         if given is None and length < _SAME_POINT:
-            raise BadInput(f"{place}: found coincident joints at both ends")
+            raise BadInput(f"{place}: found that the joints at both ends coincide")
         along = np.array(given) * (-1 if reverse else 1) if given else span / length
         x, y, z = along.tolist()
         link = replace(link, axis=(x, y, z))
@@ -71,7 +71,7 @@ def link_at_tip(
 
 
 def _default_up(body: DrawnBody, along: NDArray) -> tuple[float, float, float]:
-    """Return the z axis of the leg's copy, or its x axis for a beam along z."""
+    """Return the z axis of the body, or its x axis for a beam along z."""
     x, _, z = body.axes.T
     unit = along / np.linalg.norm(along)
     a, b, c = (x if np.linalg.norm(np.cross(unit, z)) < _PARALLEL else z).tolist()
@@ -79,7 +79,7 @@ def _default_up(body: DrawnBody, along: NDArray) -> tuple[float, float, float]:
 
 
 def _reversed_matrix(link: MatrixLink, base: NDArray, tip: NDArray) -> MatrixLink:
-    """Return a stiffness matrix, given at the base end, expressed at the tip end."""
+    """Transform a stiffness matrix from the base end to the tip end of a link."""
     turn = base[:3, :3].T @ tip[:3, :3]
     M = screw_map(base[:3, :3].T @ (tip[:3, 3] - base[:3, 3]), turn)
     K = M.T @ link.stiffness @ M
@@ -91,10 +91,10 @@ def beam_start(frame: Frame, T: NDArray) -> NDArray | None:
 
     Args:
         frame: frame of a robot.
-        T: (4, 4) home pose of the frame in base axes.
+        T: home pose of the frame, (4, 4).
 
     Returns:
-        (3,) [m] point in base axes; None for links that have no length.
+        Point in base axes, (3,) [m]; None for other links.
     """
     if isinstance(frame.link, BeamLink):
         length, axis = beam_axis(frame)
@@ -103,17 +103,16 @@ def beam_start(frame: Frame, T: NDArray) -> NDArray | None:
 
 
 def drawn_link(frame: Frame, T: NDArray, to: NDArray, spanned: bool) -> Link:
-    """Convert the link of a frame to a drawn body.
+    """Express the link of a frame in the axes of a body.
 
     Args:
         frame: frame with a link.
-        T: home pose of the frame in base axes (4, 4).
-        to: home pose of the joint at the end of the link (4, 4), at the frame origin.
-        spanned: whether a beam connects its two joints.
+        T: home pose of the frame, (4, 4).
+        to: home pose of the joint at the end of the link, (4, 4), at the frame origin.
+        spanned: whether a beam begins and ends at its two joints.
 
     Returns:
-        Link with directions in base axes; a stiffness matrix is expressed in joint
-        axes.
+        Link with directions in base axes.  A stiffness matrix is in joint axes.
     """
     link, R = frame.link, T[:3, :3]
     if isinstance(link, MatrixLink):
@@ -136,6 +135,6 @@ def drawn_link(frame: Frame, T: NDArray, to: NDArray, spanned: bool) -> Link:
 
 
 def _mesh_axis(frame: Frame, link: MeshLink) -> tuple[float, float, float]:
-    """Return the direction of a mesh from base to tip, in the frame's axes."""
+    """Return the direction of a mesh from base to tip in frame axes."""
     x, y, z = (link.axis or between_origins(frame))[:3]
     return float(x), float(y), float(z)

@@ -1,4 +1,4 @@
-"""Frames of a drawn joint: one frame per degree of freedom, all at the same point."""
+"""Frames of a joint: one frame for each degree of freedom, all at the same point."""
 
 from dataclasses import dataclass, replace
 
@@ -21,10 +21,10 @@ class Part:
     Attributes:
         name: name of the frame.
         kind: ``"fixed"``, ``"revolute"`` or ``"prismatic"``, about or along its z axis.
-        pose: home pose before the joint motion (4, 4), in base axes.
-        position: coordinate at home [rad or m].
+        pose: home pose before the joint motion, (4, 4).
+        position: coordinate in the home pose [rad or m].
         numbers: error, clearance and stiffness of this frame.
-        contact: whether the frame is a contact rather than the frame of the joint.
+        contact: whether the frame represents a contact.
     """
 
     name: str
@@ -40,9 +40,9 @@ class Parallel:
     """Second chain of frames between the same two bodies.
 
     Attributes:
-        start: name of the joint's frame after which the chain begins.
-        parts: frames of the chain; the last one meets a frame of the first chain.
-        meets: name of that frame.
+        start: name of the parent frame of the chain.
+        parts: frames of the chain; the last frame closes a loop with the first chain.
+        meets: name of the frame in the first chain with which it coincides.
     """
 
     start: str
@@ -51,36 +51,35 @@ class Parallel:
 
 
 def parts_of(joint: DrawnJoint, reverse: bool = False) -> list[Part]:
-    """Return the frames of a joint, from its first body to its second.
+    """Return the frames of a joint from its first to its second body.
 
     Args:
         joint: joint of any type.
-        reverse: whether the frames lead from the second body to the first. Axes and
-            signs are then chosen such that coordinates, errors and springs are
-            preserved.
+        reverse: whether the order is from the second to the first body.  The motion,
+            errors and springs of the joint do not depend on the order.
 
     Returns:
-        At least one frame; each error, bound and spring belongs to one of them.
+        At least one frame.
     """
     every = _all_parts(joint)
     parts = _passed([part for part, chain in every if chain == 0], reverse)
     if any(chain == 1 for _, chain in every):
         at = 1 + max(i for i, part in enumerate(parts) if part.contact)
         parts.insert(at, _bare(joint, CHAIN_END))
-        if parts[0].contact:  # errors of the preceding body move both chains
+        if parts[0].contact:  # both chains begin at this frame
             parts.insert(0, _bare(joint, CHAIN_START))
     return parts
 
 
 def parallel_parts(joint: DrawnJoint, reverse: bool = False) -> Parallel | None:
-    """Return the frames of the second chain of a joint's contacts.
+    """Return the second chain of contacts of a joint.
 
     Args:
         joint: joint of any type.
-        reverse: as for :func:`parts_of`.
+        reverse: whether the order is from the second to the first body.
 
     Returns:
-        The chain; None if the contacts form one chain.
+        The chain, or None if the contacts form one chain.
     """
     chain = [part for part, k in _all_parts(joint) if k == 1]
     if not chain:
@@ -93,19 +92,19 @@ def parallel_parts(joint: DrawnJoint, reverse: bool = False) -> Parallel | None:
 
 
 def every_part(joint: DrawnJoint, reverse: bool = False) -> list[Part]:
-    """Return the frames of a joint, followed by a second chain of contacts."""
+    """Return the frames of a joint, followed by those of a second chain."""
     chain = parallel_parts(joint, reverse)
     return [*parts_of(joint, reverse), *(chain.parts if chain else ())]
 
 
 def _bare(joint: DrawnJoint, suffix: str) -> Part:
-    """Return a fixed frame at a joint's point, where two chains of contacts meet."""
+    """Return a fixed frame at a joint, at which two chains begin or end."""
     name = f"{joint.name}.{suffix}"
     return Part(name, "fixed", joint_axes(joint), 0.0, JointNumbers())
 
 
 def _all_parts(joint: DrawnJoint) -> list[tuple[Part, int]]:
-    """Return the frames of a joint from its first body on, with their chains."""
+    """Return the frames of a joint from its first body, and their chains."""
     parts: list[tuple[Part, int]] = []
     for row, numbers in zip(_motions(joint), _shares(joint), strict=True):
         part = _part(joint, *row, numbers)
@@ -114,20 +113,20 @@ def _all_parts(joint: DrawnJoint) -> list[tuple[Part, int]]:
             for c in numbers.contacts
         ]
         own = [(part, 0)]
-        # a pad belongs to the second body, a bore and a guide to the first
+        # contacts follow the frame of a planar joint and precede that of other joints
         parts += [*own, *contacts] if joint.kind == "planar" else [*contacts, *own]
     return parts
 
 
 def _passed(parts: list[Part], reverse: bool) -> list[Part]:
-    """Return the frames in the order in which the tree traverses them."""
+    """Return the frames in their order in the spanning tree."""
     return [_reversed(part) for part in reversed(parts)] if reverse else parts
 
 
 def _contact_part(
     joint: DrawnJoint, suffix: str, pose: NDArray, contact: Contact
 ) -> Part:
-    """Return one fixed frame with a contact, placed near the given frame pose."""
+    """Return the fixed frame of a contact; ``pose`` is the home pose of the joint."""
     name = ".".join(filter(None, (joint.name, suffix, contact.suffix)))
     end = contact.end
     if end is not None:
@@ -138,17 +137,17 @@ def _contact_part(
 
 
 def joint_axes(joint: DrawnJoint) -> NDArray:
-    """Return the (4, 4) pose of a joint at home: z along axis, x along across."""
+    """Return the home pose of a joint, (4, 4), with z along ``axis``."""
     return _axes(joint.at, joint.axis, joint.across)
 
 
 def _axes(at: NDArray, z: NDArray, x: NDArray) -> NDArray:
-    """Return the (4, 4) frame at a point; x is perpendicular to z."""
+    """Return the pose at a point with given axes z and x, (4, 4)."""
     return transform(at, np.column_stack([x, np.cross(z, x), z]))
 
 
 def _motions(joint: DrawnJoint) -> list[tuple[str, str, NDArray, NDArray]]:
-    """Return suffix, kind, z and x of each frame, from the first body to the second."""
+    """Return the name suffix, joint type, z axis and x axis of each frame."""
     z, x, second = joint.axis, joint.across, joint.axis2
     y = np.cross(z, x)
     if joint.kind == "cylindrical":
@@ -174,13 +173,13 @@ def _motions(joint: DrawnJoint) -> list[tuple[str, str, NDArray, NDArray]]:
 
 
 def _across(vector: NDArray, axis: NDArray) -> NDArray:
-    """Return the unit vector (3,) along a vector's component normal to an axis."""
+    """Return the direction of a vector's component normal to an axis, (3,)."""
     rest = vector - (vector @ axis) * axis
     return rest / np.linalg.norm(rest)
 
 
 def _shares(joint: DrawnJoint) -> list[JointNumbers]:
-    """Return error, clearance and stiffness of each of the joint's frames."""
+    """Return the error, clearance and stiffness of each frame of a joint."""
     own = joint.numbers[0]
     if joint.kind == "universal":
         return [joint.numbers[0], joint.numbers[-1]]
@@ -189,25 +188,24 @@ def _shares(joint: DrawnJoint) -> list[JointNumbers]:
     if joint.kind == "spherical":
         return [own, JointNumbers(), JointNumbers()]
     if joint.kind == "planar":
-        # the error moves the plane and precedes the sliding motion; the contact belongs
-        # to the rotation
+        # the first frame has the geometric error, the last frame has the contact
         placed = JointNumbers(error=_from_axes(own.error), tolerance=_size(own))
         contact = replace(own, error=np.zeros(6), tolerance=None)
         return [placed, JointNumbers(), contact]
     return [own]
 
 
-# axes of a planar joint's first frame: its z is the joint's x, its x the joint's y
+# permutation of a screw from the axes of a planar joint to those of its first frame
 _TO_SLIDE = np.array([1, 2, 0, 4, 5, 3])
 
 
 def _from_axes(screw: NDArray) -> NDArray:
-    """Return a planar joint's screw (6,) in the axes of the joint's first frame."""
+    """Express a screw of a planar joint in the axes of its first frame, (6,)."""
     return screw[_TO_SLIDE]
 
 
 def _size(numbers: JointNumbers) -> NDArray | None:
-    """Return the tolerance (6,), without signs, in the first frame's axes."""
+    """Return the tolerance of a planar joint in the axes of its first frame, (6,)."""
     return None if numbers.tolerance is None else numbers.tolerance[_TO_SLIDE]
 
 
@@ -215,7 +213,7 @@ def _part(
     joint: DrawnJoint, suffix: str, kind: str, z: NDArray, x: NDArray,
     numbers: JointNumbers,
 ) -> Part:  # fmt: skip
-    """Return one frame; a single frame has the joint's coordinate at home."""
+    """Return a frame of a joint."""
     name = f"{joint.name}.{suffix}" if suffix else joint.name
     position = 0.0 if suffix else joint.position
     if len(FREE_ROWS[joint.kind]) > 1 and joint.kind != "universal":
@@ -224,7 +222,7 @@ def _part(
 
 
 def _held(K: NDArray | None, kind: str) -> NDArray | None:
-    """Return K_B for one frame, rigid along the motions of the other frames."""
+    """Return K_B for a frame, which is rigid along the motions of other frames."""
     if K is None:
         return None
     K = K.copy()
@@ -236,7 +234,7 @@ def _held(K: NDArray | None, kind: str) -> NDArray | None:
 
 
 def _reversed(part: Part) -> Part:
-    """Return the frame for passage from second to first body, with z reversed."""
+    """Return the frame for the order from second to first body, with z reversed."""
     own = part.numbers
     K = own.stiffness
     numbers = JointNumbers(
@@ -253,6 +251,6 @@ def _reversed(part: Part) -> Part:
 
 
 def _flipped(K: NDArray) -> NDArray:
-    """Return K_B (6, 6) in axes rotated by 180 degrees about x."""
+    """Return K_B in axes that are rotated by 180 degrees about x, (6, 6)."""
     signs = np.outer(_FLIP_SCREW, _FLIP_SCREW)
     return np.where(np.isinf(K), K, np.where(np.isinf(K), 0.0, K) * signs)

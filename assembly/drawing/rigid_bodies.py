@@ -12,12 +12,12 @@ from forcefit.inputs.table import BadInput, quoted
 
 @dataclass(frozen=True, eq=False)
 class RigidBodies:
-    """The rigid bodies of a robot, by number; the base is number 0.
+    """Numbers of the rigid bodies of a robot; the base has the number 0.
 
     Attributes:
-        before: body that carries each frame's joint, at the tip of the frame's link.
-        after: body that the joint moves.
-        starts: body at which each frame's link begins; ``before`` if it is rigid.
+        before: parent body of the joint of each frame.
+        after: child body of the joint of each frame.
+        starts: body at the start of the link of each frame; ``before`` without a link.
     """
 
     before: tuple[int, ...]
@@ -26,7 +26,7 @@ class RigidBodies:
 
 
 def connects(frame: Frame) -> bool:
-    """Return whether a frame is a joint, or a connection with an error or clearance."""
+    """Return whether a frame connects two different rigid bodies."""
     return (
         frame.joint != "fixed"
         or frame.clearance is not None
@@ -38,7 +38,7 @@ def connects(frame: Frame) -> bool:
 
 
 def rigid_bodies(robot: Robot) -> RigidBodies:
-    """Find the rigid bodies of a robot; both frames of a closure belong to one body.
+    """Find the rigid bodies of a robot.
 
     Args:
         robot: robot with frames and closures.
@@ -50,7 +50,8 @@ def rigid_bodies(robot: Robot) -> RigidBodies:
         BadInput: a closure, joint or link connects a rigid body with itself.
     """
     count = len(robot.frames)
-    group = list(range(2 * count + 1))  # nodes: before, after, base
+    # union-find structure of bodies before and after each joint, and the base
+    group = list(range(2 * count + 1))
 
     def root(node: int) -> int:
         while group[node] != node:
@@ -84,7 +85,7 @@ def rigid_bodies(robot: Robot) -> RigidBodies:
 
 
 def _same(place: str) -> str:
-    """Return the message for a connection between two frames of one body."""
+    """Return the error message for a connection between frames of one body."""
     return (
         f"{place}: found a connection between two frames of the same rigid body, which "
         "a file with bodies and joints (format 2) cannot represent"

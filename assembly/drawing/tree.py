@@ -1,8 +1,8 @@
-"""Spanning tree of a drawing, and the edges that close its loops.
+"""Spanning tree of bodies and joints, and the edges that close loops.
 
-The nodes are rigid bodies, and the edges are joints and links.  An elastic body has one
-node at each end of its link: ``(name, False)`` at the start, which contains only the
-joint at this end, and ``(name, True)``, which contains all remaining parts.
+The nodes are rigid bodies, and the edges are joints and links.  An elastic body has a
+node ``(name, False)`` at the start of its link, which has only one joint, and a node
+``(name, True)`` at the end of its link.
 """
 
 import heapq
@@ -22,9 +22,9 @@ class Edge:
     """Edge of the graph: a joint, or the link of an elastic body.
 
     Attributes:
-        item: the joint or the body.
-        first: node at which the edge begins; for a joint, its first body.
-        second: node at which the edge ends.
+        item: the joint or the elastic body.
+        first: node at the start, which is the first body of a joint.
+        second: node at the end.
     """
 
     item: DrawnJoint | DrawnBody
@@ -34,12 +34,12 @@ class Edge:
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """Edge in the direction in which the spanning tree traverses it.
+    """Edge with its direction in the spanning tree.
 
     Attributes:
         edge: the edge.
-        reverse: whether the edge is traversed from its second node to its first.
-        closes: whether the edge ends at a node that the tree reaches by another edge.
+        reverse: whether the direction is from the second to the first node.
+        closes: whether the edge closes a loop.
     """
 
     edge: Edge
@@ -48,26 +48,26 @@ class Step:
 
     @property
     def start(self) -> Node:
-        """The node that is nearer to the base."""
+        """Node from which the edge is traversed."""
         return self.edge.second if self.reverse else self.edge.first
 
     @property
     def end(self) -> Node:
-        """The node at the end of the traversed edge."""
+        """Node to which the edge is traversed."""
         return self.edge.first if self.reverse else self.edge.second
 
 
 def steps_of(drawing: Drawing) -> list[Step]:
-    """Return all edges of a drawing, in the order in which frames are created.
+    """Return all edges, in the order in which frames are created.
 
-    Edges are traversed from their first to their second body whenever a path from the
-    base allows it, and the tree uses the shortest of these paths.
+    The path from the base to each node has the smallest possible number of reversed
+    edges, and then the smallest possible number of joints.
 
     Args:
         drawing: bodies and joints.
 
     Returns:
-        Edges by branch; edges that close a loop follow the branch of their first body.
+        Edges in depth-first order.
 
     Raises:
         BadInput: no joint connects a body to the base.
@@ -97,7 +97,7 @@ def steps_of(drawing: Drawing) -> list[Step]:
 
 
 def _step(edge: Edge, node: Node, entered: Mapping[Node, Edge]) -> Step | None:
-    """Return the edge as traversed from a node; None if it starts at the other node."""
+    """Return an edge with its direction, or None if it is traversed to the node."""
     reverse = edge.second == node
     if entered.get(edge.first if reverse else edge.second) is edge:
         return Step(edge, reverse, False)
@@ -107,7 +107,7 @@ def _step(edge: Edge, node: Node, entered: Mapping[Node, Edge]) -> Step | None:
 
 
 def _edges(drawing: Drawing) -> list[Edge]:
-    """Return joints in the order of the file, each link after its first joint."""
+    """Return joints in the order of the file, with each link after its first joint."""
     bodies = {body.name: body for body in drawing.bodies}
 
     def node(name: str, joint: DrawnJoint) -> Node:
@@ -126,10 +126,10 @@ def _edges(drawing: Drawing) -> list[Edge]:
 
 
 def _entered(around: Mapping[Node, list[Edge]]) -> dict[Node, Edge]:
-    """Return the edge by which the tree reaches each node; few edges are reversed."""
+    """Return the edge by which the spanning tree reaches each node."""
     entered: dict[Node, Edge] = {}
     reached: set[Node] = set()
-    count = 0  # number of added edges, which keeps the file's order among equal paths
+    count = 0  # number of added edges, by which paths of equal length are sorted
     waiting: list[tuple[int, int, int, Node, Edge | None]] = [(0, 0, 0, ROOT, None)]
     while waiting:
         against, length, _, node, by = heapq.heappop(waiting)

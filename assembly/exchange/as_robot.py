@@ -1,8 +1,9 @@
 """Conversion between mechanisms and robots with frames.
 
-A moving joint becomes a frame with the name of the joint, and a body on a fixed joint
-becomes a frame with the name of the body.  A body on a moving joint has its own frame
-if it has a mass, is the last body in a chain, or is connected by a loop closure.
+A moving joint becomes a frame with the name of the joint.  The child body of a fixed
+joint becomes a frame with the name of the body.  The child body of a moving joint has
+its own frame only if it has a mass, is the last body in a chain, or is connected by a
+loop closure.
 """
 
 from collections.abc import Mapping

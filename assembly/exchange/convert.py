@@ -116,7 +116,7 @@ def convert(
         if given:
             raise BadInput(
                 f"{option}: found together with the robot file {source}, which "
-                "declares its own; remove the option"
+                "contains its own loops or drives; remove the option"
             )
     robot = load_robot(source, close)
     if overlay is not None:

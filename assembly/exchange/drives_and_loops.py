@@ -45,9 +45,9 @@ def with_loops(
     mechanism, parts = _retyped(mechanism, loops.turns, parts)
     ends = {name: name for name in mechanism.bodies}
     children = {joint.name: joint.child for joint in mechanism.joints}
-    # the child of a joint with several degrees of freedom is that of its last part
+    # the last elementary joint of a compound joint has the child of the compound joint
     ends |= {name: children[several[-1]] for name, several in parts.items()}
-    # a fixed joint and its link may have the same name, because both mean one frame
+    # a fixed joint and its link may have the same name, because they are one frame
     count, closed = len(mechanism.loops), list(mechanism.loops)
     for i, (pair, point) in enumerate(zip(loops.pairs, loops.points, strict=True), 1):
         for name in pair:

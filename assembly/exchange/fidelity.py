@@ -39,8 +39,8 @@ def largest_difference(placed: RobotAndMechanism) -> float:
     lost = sorted(set(rows) ^ set(moving))
     if lost:
         raise BadInput(
-            f"{robot.name}: found joint {lost[0]} either only before or only after "
-            "the conversion, expected it in both robots"
+            f"{robot.name}: found joint {lost[0]} in only one of the two robots, "
+            "expected it before and after the conversion"
         )
     random, worst = np.random.default_rng(0), 0.0
     kinds = np.array([KINDS[f.joint] for f in robot.frames])
@@ -65,7 +65,7 @@ def largest_difference(placed: RobotAndMechanism) -> float:
 def drawn_difference(robot: Robot, back: Robot, frames: Mapping[str, str]) -> float:
     """Return the largest difference between a robot and its file of format 2.
 
-    Joints that occur in both trees in the same order are moved at random, as in
+    Joints with a corresponding frame are moved at random, as in
     :func:`largest_difference`.  Ball, cylindrical and planar joints are not moved.
 
     Args:
@@ -104,7 +104,7 @@ def drawn_difference(robot: Robot, back: Robot, frames: Mapping[str, str]) -> fl
 def _passes(
     robot: Robot, row: int, pairs: Sequence[tuple[int, int]], which: int
 ) -> tuple[object, ...]:
-    """Return the numbers of the paired joints between the base and a frame."""
+    """Return the indices in ``pairs`` of the joints between the base and a frame."""
     numbers = {pair[which]: k for k, pair in enumerate(pairs)}
     passed = np.flatnonzero(robot.on_path[row]).tolist()
     moving = [i for i in passed if i != row and robot.frames[i].joint != "fixed"]

@@ -72,9 +72,9 @@ def _check_alone(mechanism: Mechanism, file: str) -> None:
     if residual >= CLOSED:
         ends = f"({quoted(loop.first)}, {quoted(loop.second)})"
         raise BadInput(
-            f"{file}: {loop.name} {ends} cannot be closed even on its own: the "
-            f"smallest gap found is {residual:.3g} rad or m; expected more joints, or "
-            "type 3d (--points)"
+            f"{file}: {loop.name} {ends} cannot be closed even without the "
+            f"other loops: the smallest gap found is {residual:.3g} rad or m; expected "
+            "more joints, or type 3d (--points)"
         )
 
 
@@ -206,7 +206,7 @@ class _Loops:
 
     @cached_property
     def ends(self) -> list[tuple[tuple[int, NDArray], tuple[int, NDArray], NDArray]]:
-        """Joint and pose of both ends of each loop, and constrained components."""
+        """Joint and pose of both ends of each loop, and its constrained components."""
         on, places = self.tree[2], []
         for loop in self.mechanism.loops:
             (i, A), (j, B) = on[loop.first], on[loop.second]

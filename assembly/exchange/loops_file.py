@@ -110,7 +110,7 @@ def read_loops(path: Path | str) -> LoopsFile:
 
 
 def with_points(loops: LoopsFile, names: Sequence[str]) -> LoopsFile:
-    """Declare the named loops as points (type 3d).
+    """Set the type of the named loops to 3d, which closes them only at a point.
 
     Args:
         loops: content of a loops file.

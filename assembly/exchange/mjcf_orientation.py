@@ -19,7 +19,7 @@ class Angles:
     Attributes:
         unit: unit of angles [rad]: 1 for radians, pi / 180 for degrees.
         sequence: axes of the Euler angles; capital letters denote fixed axes.
-        range_limits: whether a joint with a range is limited without ``limited``.
+        range_limits: whether a joint with a range but without ``limited`` is limited.
     """
 
     unit: float

@@ -197,7 +197,7 @@ def _site(model: Any, i: int) -> str:
 
 
 def _joint(model: Any, j: int, number: int) -> str:
-    """Return the name of a joint; ``number`` is its number in its body from 1."""
+    """Return the name of a joint; ``number`` counts the joints of a body from 1."""
     body = _body(model, int(model.jnt_bodyid[j]))
     return str(model.joint(j).name or f"{body}.joint{number}")
 

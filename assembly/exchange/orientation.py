@@ -16,7 +16,7 @@ _UNIT = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 
 def from_roll_pitch_yaw(angles: ArrayLike) -> NDArray:
-    """Return the rotation (3, 3) by angles (3,) [rad] about fixed x, then y, then z."""
+    """Return the rotation by three angles [rad] about fixed axes x, y and z, (3, 3)."""
     roll, pitch, yaw = np.asarray(angles, dtype=float)
     return _about("z", yaw) @ _about("y", pitch) @ _about("x", roll)
 
@@ -67,7 +67,7 @@ def from_euler(angles: ArrayLike, sequence: str) -> NDArray:
 
 
 def onto(axis: ArrayLike) -> NDArray:
-    """Return the smallest rotation (3, 3) from z to a unit vector."""
+    """Return the smallest rotation that maps z to a unit vector, (3, 3)."""
     x, y, z = np.asarray(axis, dtype=float)
     sine = math.hypot(x, y)
     if sine == 0.0:

@@ -41,7 +41,7 @@ def with_possible_moments(mechanism: Mechanism) -> Mechanism:
 
 
 def lumped_body(name: str, frames: list[Frame]) -> Body:
-    """Combine the masses of frames in one rigid body; beams are slender rods."""
+    """Combine the masses of frames, with beams as slender rods, in one rigid body."""
     parts: list[MassProperties] = []
     for frame in frames:
         T = Robot("", frame.name, (replace(frame, parent=BASE),)).fixed_transforms[0]

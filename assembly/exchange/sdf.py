@@ -93,7 +93,7 @@ def _tree(
     frames: Frames, ends: dict[str, tuple[str, str]], bodies: dict[str, Body],
     first: str, held: list[Joint],
 ) -> tuple[list[Joint], dict[str, list[str]], list[Loop]]:  # fmt: skip
-    """Return the joints of a spanning tree, their parts and the loop closures."""
+    """Return the joints of a tree, names of elementary joints, and loop closures."""
     reached = {first} if held or WORLD not in bodies else {WORLD}
     tree, loops, waiting = held, list[Loop](), list(ends)
     parts: dict[str, list[str]] = {}

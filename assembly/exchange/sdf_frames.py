@@ -212,7 +212,7 @@ def _take(frames: Frames, node: Node, scope: str, name: str, old: bool) -> None:
 
 
 def _is_old(root: Node) -> bool:
-    """Return whether joint axes are in the model frame in the version of a file.
+    """Return whether a file has an old version, with joint axes in the model frame.
 
     Raises:
         BadInput: the version is older than 1.4 or not of the form 1.x.
@@ -232,8 +232,8 @@ def included(node: Node) -> tuple[Node, bool]:
     """Return the model of an included file, and whether its version is old.
 
     Args:
-        node: element ``<include>``. The file or folder that it includes is searched in
-            the folder of the file that contains the element and in two folders above.
+        node: element ``<include>``.  The included file or folder is searched in the
+            folder of the current file and in the two folders above.
 
     Returns:
         The model, with the name, pose and placement frame of the include element.

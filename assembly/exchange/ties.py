@@ -15,10 +15,10 @@ def refuse_ties(node: Node, owners: Mapping[str, str]) -> None:
 
     Args:
         node: element that is not converted.
-        owners: names of bodies, by their names and the names of their frames.
+        owners: name of the body for each name of a body or frame.
 
     Raises:
-        BadInput: the element refers to two bodies, and its kind may connect them.
+        BadInput: the element refers to two bodies and may connect them.
     """
     if _is_harmless(node):
         return
@@ -32,7 +32,7 @@ def refuse_ties(node: Node, owners: Mapping[str, str]) -> None:
 
 
 def _is_harmless(node: Node) -> bool:
-    """Return whether an element refers to bodies without constraining them."""
+    """Return whether an element, according to its tag, does not constrain bodies."""
     return any(part in node.tag.lower() for part in _HARMLESS)
 
 

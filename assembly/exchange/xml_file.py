@@ -203,7 +203,7 @@ class Node:
             raise self.bad(
                 key, f"found {describe(vector.tolist())}, expected a nonzero vector"
             )
-        # unit vectors are not changed by rounding
+        # unit vectors are returned unchanged to avoid rounding errors
         return vector if abs(length - 1.0) < 1e-15 else vector / length
 
 
@@ -215,8 +215,8 @@ def read_xml(path: Path | str, *roots: str) -> Node:
         roots: allowed tags of the root element.
 
     Returns:
-        The root element.  Namespaces are not resolved: a tag keeps its prefix, and
-        ``xmlns`` has no effect.
+        The root element.  Namespaces are not resolved: a tag includes its prefix, and
+            ``xmlns`` has no effect.
 
     Raises:
         BadInput: the file cannot be read, is not XML, declares entities or a document

@@ -70,7 +70,7 @@ def read_frame_callouts(root: Table, frames: list[str]) -> tuple[Callout, ...]:
         Callouts in the order of the file.  They are not checked against the geometry.
 
     Raises:
-        BadInput: the file violates a rule of the format.
+        BadInput: the file is invalid.
     """
     found = []
     for table in root.tables("tolerance"):
@@ -108,7 +108,7 @@ def read_drawn_callouts(
         the home pose.
 
     Raises:
-        BadInput: the file violates a rule of the format.
+        BadInput: the file is invalid.
     """
     owners = [(copied.prefix + t.content["name"], t)
               for t in copied.table.tables("body")]  # fmt: skip
@@ -124,7 +124,7 @@ def read_drawn_callouts(
 def _drawn(
     table: Table, copied: Copy, body: str, joints: list[DrawnJoint]
 ) -> DrawnCallout | None:
-    """Read the callout of a body feature, or None for a form tolerance alone."""
+    """Read a callout of a body feature; return None for a form tolerance alone."""
     here = {j.name: j for j in joints if body in (j.first, j.second)}
     short = body.removeprefix(copied.prefix)
 

@@ -54,7 +54,7 @@ def read_drawing(root: Table, name: str, description: str) -> Drawing:
         Bodies and joints, with full names and all copies of the legs.
 
     Raises:
-        BadInput: the file violates a rule of the format.
+        BadInput: the file is invalid.
     """
     # texts with units are replaced by numbers in a copy
     root.content = copy.deepcopy(root.content)

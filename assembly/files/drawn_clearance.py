@@ -35,7 +35,7 @@ def read_drawn_clearance(table: Table, kind: str) -> _Clearance:
         Clearance bounds of the joint frame, or None, and the contacts of the joint.
 
     Raises:
-        BadInput: the table violates a rule of the format.
+        BadInput: the table is invalid.
     """
     if not table.has("clearance"):
         return None, ()
@@ -214,7 +214,7 @@ def _length(table: Table, key: str) -> float:
 
 
 def _refuse_free(table: Table, bounds: Clearance | None, kind: str) -> None:
-    """Check that a joint with several degrees of freedom has no bound on them."""
+    """Check that a compound joint has no bounds on its free motions."""
     free = set(FREE_ROWS[kind])
     for key, rows in zip(BOUNDS, CONES, strict=True):
         given = bounds is not None and getattr(bounds, key) is not None

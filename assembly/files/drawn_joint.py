@@ -38,10 +38,10 @@ def read_drawn_joint(table: Table, name: str, first: str, second: str) -> DrawnJ
         second: name of the second body.
 
     Returns:
-        Joint without the transform to the copy of its leg.
+        Joint of the leg in the file; its copies are transformed later.
 
     Raises:
-        BadInput: the table violates a rule of the format.
+        BadInput: the table is invalid.
     """
     kind = table.choice("type", FREE_ROWS)
     without_units(table, "pitch", "length")

@@ -46,7 +46,7 @@ def read_drawn_link(body: Table) -> Link | Curve | None:
         rigid body.
 
     Raises:
-        BadInput: the table violates a rule of the format.
+        BadInput: the table is invalid.
     """
     link = body.content.get("link")
     if isinstance(link, dict) and not set(_KINDS) & set(link):

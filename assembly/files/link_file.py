@@ -52,14 +52,14 @@ def read_link(frame: Table, span: NDArray) -> Link | None:
         Link, or None if the body is rigid.
 
     Raises:
-        BadInput: the table violates a rule of the format.
+        BadInput: the table is invalid.
     """
     if not frame.has("link"):
         return None
     link = frame.table("link")
     kinds = [kind for kind in _KINDS if link.has(kind)]
     if not kinds and not set(link.content) <= {*_MATERIAL, "up", "pieces"}:
-        link.finish()  # the error message suggests a key for a misspelt one
+        link.finish()  # reports a misspelt key and suggests a valid one
     if len(kinds) != 1:
         given = " and ".join(map(quoted, kinds)) or "no type of link"
         names = " | ".join(map(quoted, _KINDS))
@@ -114,7 +114,7 @@ def _section(beam: Table) -> dict[str, float]:
     kinds = [kind for kind, keys in keys_of_kind.items() if keys]
     if len(kinds) != 1:
         if not kinds:
-            beam.finish()  # the error message suggests a key for a misspelt one
+            beam.finish()  # reports a misspelt key and suggests a valid one
         names = (
             " and ".join(quoted(keys_of_kind[kind][0]) for kind in kinds)
             or "no section"
@@ -198,7 +198,7 @@ def _library_link(link: Table) -> LibraryLink:
 
 
 def _material(link: Table) -> dict[str, Any]:
-    """Return Young's modulus, Poisson's ratio and the density or None."""
+    """Return Young's modulus, Poisson's ratio, and the density, which may be None."""
     return {
         "young": _size(link, "young", "Pa"),
         "poisson": link.number("poisson", "-", above=-1.0, below=0.5),
@@ -233,7 +233,7 @@ def _direction(table: Table, key: str) -> tuple[float, float, float] | None:
 
 
 def _path(table: Table, key: str, path: str) -> Path:
-    """Return a path that is relative to the folder of the robot file."""
+    """Resolve a path relative to the folder of the robot file."""
     if path.strip() in {"", ".", ".."}:
         raise table.bad(key, f"found {describe(path)}, expected the path of a file")
     return Path(table.file).parent / path

@@ -59,7 +59,7 @@ from forcefit.stiffness.screws import rotation_matrix, rotation_vector
 
 Closing = Callable[[Robot], Robot]
 _LONGEST_NAME = 200  # [characters] maximum length of a name
-# maximum number of frames, with which closing the loops takes less than minutes
+# maximum number of frames, which limits the time to close the loops
 MOST_FRAMES = 2000
 
 
@@ -76,7 +76,7 @@ def read_robot(path: Path | str, close: Closing | None = None) -> Robot:
         read later by :func:`forcefit.assembly.files.solved_links.solve_links`.
 
     Raises:
-        BadInput: the file violates a rule of the format, or a loop is not closed.
+        BadInput: the file is invalid, or a loop is not closed.
     """
     return robot_of(read_toml(Path(path)), Path(path).stem, close)
 
@@ -93,7 +93,7 @@ def robot_of(root: Table, name: str, close: Closing | None = None) -> Robot:
         Robot with closed nominal loops in the home pose.
 
     Raises:
-        BadInput: the table violates a rule of the format, or a loop is not closed.
+        BadInput: the table is invalid, or a loop is not closed.
     """
     robot = declared_robot(root, name)
     try:
@@ -116,7 +116,7 @@ def declared_robot(root: Table, name: str) -> Robot:
         Robot, in which the lengths of beams may be unknown.
 
     Raises:
-        BadInput: the table violates a rule of the format.
+        BadInput: the table is invalid.
     """
     name = root.text("name", name, longest=_LONGEST_NAME)
     description = root.get("description", "")

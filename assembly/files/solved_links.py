@@ -149,7 +149,7 @@ def _solve(
 
 
 def _as_stored(solved: "MeshedLink") -> "MeshedLink":
-    """Remove the surface from a solution, which only mesh refinement requires."""
+    """Remove the surface, which only mesh refinement requires, from a solution."""
     solid = replace(solved.level.solid, walls={}, surface=None)
     return replace(solved, level=replace(solved.level, solid=solid))
 

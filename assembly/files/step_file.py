@@ -255,7 +255,7 @@ _READERS: dict[str, Callable[[Table, str, Robot], Step]] = {
 
 
 def _frame(table: Table, key: str, robot: Robot) -> str:
-    """Read the name of a frame, or of a joint, which has a main frame."""
+    """Read the name of a frame; the name of a joint denotes its main frame."""
     name = table.text(key, expected="the name of a frame")
     names = names_of(robot)
     if name not in names:

@@ -42,7 +42,8 @@ def solution_key(link: MeshLink, digest: str, options: object) -> str:
 
     Args:
         link: link to be solved.  The solution does not depend on the path of its
-            surface and, because it is in mesh axes, on the orientation of its mesh.
+            surface.  Because it is in mesh axes, it does not depend on the orientation
+            of its mesh either.
         digest: SHA-256 hash of the surface file.
         options: :class:`forcefit.stiffness.fem.fea.FemOptions` of the solution.
 

@@ -1,4 +1,4 @@
-"""Robots with guides and pads, and the slabs of their clearances."""
+"""Robots with guides and pads, and the inequalities of their clearances."""
 
 import itertools
 
@@ -8,22 +8,22 @@ from scipy.optimize import linprog
 from forcefit.assembly.files.robot_file import read_robot
 from forcefit.stiffness.screws import skew
 
-C, L, W, T = 1e-5, 0.08, 0.04, 0.03  # [m] gap, length, width, height
+C, L, W, T = 1e-5, 0.08, 0.04, 0.03  # [m] gap, length, width and height of the guide
 GUIDE = "guide = { gap = 1e-5, length = 0.08, width = 0.04, height = 0.03 }"
 PAD = "pad = { gap = 1e-5, length = 0.06, width = 0.04 }"
-G_PAD, A, B = 1e-5, 0.03, 0.02  # [m] gap, half the length, half the width
+G_PAD, A, B = 1e-5, 0.03, 0.02  # [m] gap, half the length and half the width of the pad
 SIGNS = list(itertools.product((1, -1), (1, -1)))
 
 
 def guide_slabs(gaps=(C, C)):
-    """Return rows (8, 6) with |row @ screw| <= 1 for screws in the guide axes."""
+    """Return a matrix (8, 6) with |matrix @ screw| <= 1 for screws of a guide."""
     rows = [np.array([0, s * L / 2, r * T / 2, 1, 0, 0]) / gaps[0] for s, r in SIGNS]
     rows += [np.array([s * L / 2, 0, r * W / 2, 0, 1, 0]) / gaps[1] for s, r in SIGNS]
     return np.array(rows)
 
 
 def pad_slabs():
-    """Return rows (4, 6) with |row @ screw| <= 1 for screws in the pad axes."""
+    """Return a matrix (4, 6) with |matrix @ screw| <= 1 for screws of a pad."""
     return np.array([[s * B, r * A, 0, 0, 0, 1] for s, r in SIGNS]) / G_PAD
 
 
@@ -42,14 +42,14 @@ def support(direction, slabs, equal=None):
 
 
 def at(point):
-    """Return the map (6, 6) of a screw at a point to the origin."""
+    """Return the transformation of a screw from a point to the origin, (6, 6)."""
     shift = np.eye(6)
     shift[3:, :3] = skew(np.array(point, dtype=float))
     return shift
 
 
 def drawn_in(folder, *tables):
-    """Return a robot with bodies and joints, whose platform is the body "table"."""
+    """Read a robot with the platform "table" from tables of bodies and joints."""
     file = folder / "drawn.toml"
     head = 'format = 2\nplatform = "table"\nplatform_at = [0, 0, 0]\n'
     file.write_text(head + "\n".join(tables))

@@ -1,4 +1,4 @@
-"""Conversion of built-in robots and robots from the literature to drawings."""
+"""Conversion of robots from frames and closures to bodies and joints."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -40,7 +40,7 @@ translation = [0.1, 0, 0]
 
 @pytest.fixture(params=[*BUILT_IN, *OTHERS])
 def robots(request, tmp_path):
-    """Return the robot as a drawing and as frames."""
+    """Return a robot from bodies and joints, and the original robot with frames."""
     name = request.param
     if name in BUILT_IN:
         robot = load_robot(name)
@@ -78,7 +78,7 @@ def with_last_digits(posture):
 
 
 def compare(drawn, framed):
-    """Compare poses, stiffness, mobility, margin, and the energy due to errors."""
+    """Compare poses, stiffness, mobility, zone margin and energy."""
     at, expected = (posture.platform[:3, 3] for posture in (drawn, framed))
     assert np.abs(at - expected).max() < SAME
     K, reference = (platform_stiffness(each).stiffness for each in (drawn, framed))
@@ -88,50 +88,51 @@ def compare(drawn, framed):
     assert found.platform_freedoms == counted.platform_freedoms
     assert found.redundant_constraints == counted.redundant_constraints
     zones = [zone_margin(each, "rigid") for each in (drawn, framed)]
-    # each is certified between its margin and its bound only
+    # each margin is known only with the accuracy of its certified bound
     unsure = sum(zone.margin - zone.bound for zone in zones if zone.margin < np.inf)
     assert zones[0].margin == pytest.approx(zones[1].margin, SAME, abs(unsure) + SAME)
-    gravity = None if "snu" in framed.robot.name else [0, 0, -9.81]  # singular at home
+    # the SNU robot is singular in its home pose
+    gravity = None if "snu" in framed.robot.name else [0, 0, -9.81]
     solved, least = (solve_assembly(p, gravity=gravity) for p in (drawn, framed))
-    # what is minimised is energy less work, which is up to 100 times as large
+    # the solver minimises energy minus work, which can be much larger than the energy
     most = least.energy + abs(least.work)
     assert abs(solved.energy - least.energy) <= SAME * most
     assert abs(solved.work - least.work) <= SAME * most
 
 
-def test_robot_converted_to_bodies_and_joints_is_equal_at_home(robots):
+def test_converted_robot_is_equal_in_home_pose(robots):
     compare(*(home_posture(robot) for robot in robots))
 
 
-def test_robot_converted_to_bodies_and_joints_is_equal_elsewhere(robots):
-    """The drives are moved by 0.01 rad or 0.01 m, and the platform follows."""
+def test_converted_robot_is_equal_in_another_pose(robots):
+    """The drive coordinates are changed by 0.01 rad or 0.01 m."""
     if "snu" in robots[1].name or "gpm" in robots[1].name:
         pytest.skip("home is singular, or two drives determine the third")
     step = {f.name: f.position + 0.01 for f in robots[1].frames if f.actuated}
     compare(*(place_robot(robot, joints=step) for robot in robots))
 
 
-def test_ball_and_universal_joints_are_written_as_compound_joints(tmp_path):
-    """The 6-UPS has a universal, a prismatic and a spherical joint in each leg."""
+def test_ball_and_universal_joints_are_recognised(tmp_path):
+    """Each leg of a 6-UPS robot has a universal, a prismatic and a spherical joint."""
     convert("hexapod", tmp_path / "drawn.toml", version=2)
     text = (tmp_path / "drawn.toml").read_text()
     for kind in ("universal", "prismatic", "spherical"):
         assert text.count(f'type = "{kind}"') == 6
     assert text.count("[[joint]]") == 18
-    assert text.count("[[body]]") == 13  # the platform, tubes and rods
+    assert text.count("[[body]]") == 13  # platform, tubes and rods
     assert 'between = ["base", "leg1.strut"]' in text
 
 
 @pytest.mark.parametrize("name", ["three_upu", "tricept", "agile_eye"])
-def test_drawn_robots_are_equal_after_conversion_to_frames_and_back(name, tmp_path):
+def test_robots_are_equal_after_conversion_to_frames_and_back(name, tmp_path):
     convert(DRAWN / f"{name}.toml", tmp_path / "frames.toml")
     convert(tmp_path / "frames.toml", tmp_path / "back.toml", version=2)
     files = (tmp_path / "back.toml", DRAWN / f"{name}.toml")
     compare(*(home_posture(load_robot(path)) for path in files))
 
 
-def test_conversion_of_a_screw_to_bodies_and_joints_keeps_its_pitch_and_names(tmp_path):
-    """One turn of the drive lowers the table by the pitch of 5 mm."""
+def test_converted_helical_joint_has_same_pitch(tmp_path):
+    """A rotation of the drive by 360 degrees lowers the table by the pitch of 5 mm."""
     source = LITERATURE.with_name("robots_drawn") / "screw.toml"
     if not source.exists():
         pytest.skip(f"{source} is not here")
@@ -145,14 +146,16 @@ def test_conversion_of_a_screw_to_bodies_and_joints_keeps_its_pitch_and_names(tm
     assert turned.pose()["tz"] == pytest.approx(0.4 - 0.005, abs=1e-12)
 
 
-def test_data_that_a_drawing_cannot_represent_are_reported(run, tmp_path):
-    """For example, the axes of a platform flange differ from those of the base."""
+def test_conversion_reports_rotated_platform_axes(run, tmp_path):
+    """In format 2, the platform axes coincide with the base axes in the home pose."""
     status, out, err = run(
         "convert", "arm6", "-o", tmp_path / "arm.toml", "--format", "2", "--json",
         tmp_path / "o.json",
     )  # fmt: skip
     assert (status, err) == (0, "")
-    assert "left out: axes of the platform, turned by [0, 1.5708, 0] rad" in out
+    assert (
+        "left out: axes of the platform, which are rotated by [0, 1.5708, 0] rad" in out
+    )
     rotation = home_posture(load_robot(tmp_path / "arm.toml")).platform[:3, :3]
     np.testing.assert_allclose(rotation, np.eye(3), atol=1e-15)
 
@@ -160,7 +163,7 @@ def test_data_that_a_drawing_cannot_represent_are_reported(run, tmp_path):
 @pytest.mark.parametrize(("words", "text", "message"), [
     (["-o", "x.xml", "--format", "2"], "", "--format 2: found together with the file"),
     (["-o", "x.toml", "--format", "3"], "", "--format: found 3, expected 1 or 2"),
-    # a closure of two frames of one body
+    # the closure connects two frames of the same body
     (["-o", "x.toml", "--format", "2"], '[[frame]]\nname = "spot"\nparent = "arm"\n'
      'translation = [0.1, 0, 0]\n[[closure]]\nframes = ["tip", "spot"]\n',
      'closure[1] ("tip", "spot"): found a connection between two frames of the same '),
@@ -168,7 +171,7 @@ def test_data_that_a_drawing_cannot_represent_are_reported(run, tmp_path):
      'kind = "geometric_error"\ncomponents = ["TX"]\nform = "constant"\n'
      "parameters = { a = 1e-4 }\n", "effect"),
 ])  # fmt: skip
-def test_robot_that_format_2_cannot_describe_is_refused_in_one_line(
+def test_invalid_conversion_to_format_2_is_rejected(
     run, tmp_path, monkeypatch, words, text, message
 ):
     monkeypatch.chdir(tmp_path)
@@ -180,8 +183,8 @@ def test_robot_that_format_2_cannot_describe_is_refused_in_one_line(
     assert [path.name for path in tmp_path.iterdir()] == ["odd.toml"]
 
 
-def test_rounded_closures_are_reported(tmp_path):
-    """Drawn joints coincide exactly, but here they are 1e-8 m apart."""
+def test_conversion_reports_nominal_closure_error(tmp_path):
+    """The distance between the two frames of the closure is 1e-8 m."""
     (tmp_path / "rounded.toml").write_text(
         ALONE.replace(
             'name = "tip"\nparent = "arm"', 'name = "tip"\nparent = "pin"'
@@ -196,8 +199,8 @@ def test_rounded_closures_are_reported(tmp_path):
     assert any("nominal closure error" in line for line in done.left_out)
 
 
-def test_masses_and_moments_of_inertia_of_one_body_are_added(tmp_path):
-    """The frequencies stay unchanged when rigidly connected parts are combined."""
+def test_masses_of_one_body_are_added(tmp_path):
+    """The natural frequencies do not change."""
     (tmp_path / "heavy.toml").write_text(
         ALONE.replace(
             "actuated = true",
@@ -219,8 +222,8 @@ def test_masses_and_moments_of_inertia_of_one_body_are_added(tmp_path):
     np.testing.assert_allclose(found, expected, rtol=1e-10)
 
 
-def test_directions_of_a_mesh_are_unchanged_by_conversion(tmp_path):
-    """Both the link direction and the height direction are compared in base axes."""
+def test_conversion_preserves_directions_of_a_mesh(tmp_path):
+    """The link direction and the height direction are compared in base axes."""
     mesh = Path(__file__).parents[3] / "meshes" / "distal_plain.stl"
     (tmp_path / "mesh.toml").write_text(
         ALONE.replace('name = "tip"\nparent = "arm"\n', 'name = "elbow"\n'
@@ -289,8 +292,8 @@ frames = ["rod", "plate"]
 
 
 @pytest.mark.parametrize("text", [BALL_ON_A_TABLE, ROD_TO_THE_PLATE_AND_FLAG])
-def test_names_of_bodies_and_joints_remain_unique_after_conversion(text, tmp_path):
-    """Cases: a ball joint with an error at its last frame, and two merged bodies."""
+def test_names_are_unique_after_conversion(text, tmp_path):
+    """Robots with a ball joint with an error, and with two bodies that are combined."""
     (tmp_path / "given.toml").write_text(text)
     convert(tmp_path / "given.toml", tmp_path / "frames.toml", version=1)
     done = convert(tmp_path / "frames.toml", tmp_path / "drawn.toml", version=2)

@@ -1,4 +1,4 @@
-"""Comparison of the same robots given by drawings and by frames."""
+"""Comparison of robots that are described by bodies and joints and by frames."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ from tests.drawn_robots_for_tests import drawn_delta, drawn_five_bar, drawn_hexa
 SAME = 1e-12
 LOAD = np.array([0.3, -0.2, 0.5, 10.0, -20.0, 30.0])
 GRAVITY = [1.0, -2.0, -9.81]
-# the text of each robot of bodies and joints, and a pose other than home
+# function that returns the text of the robot file, and a pose, by robot
 ROBOTS = {
     "five_bar": (drawn_five_bar, {"tx": 0.02, "ty": 0.15}),
     "hexapod": (drawn_hexapod, {"tx": 0.02, "ty": 0.01, "tz": 0.55, "rx": 0.1,
@@ -24,14 +24,8 @@ ROBOTS = {
 
 
 @pytest.mark.parametrize("name", ROBOTS)
-def test_drawn_robot_has_the_poses_stiffness_energy_and_mobility_of_its_frames(
-    name, tmp_path
-):
-    """The axes of a drawn platform coincide with the base axes at home.
-
-    Compliance matrices are scaled to a unit diagonal, so that entries in rad and in m
-    have equal weights.
-    """
+def test_results_are_equal_for_both_file_formats(name, tmp_path):
+    """Compliance matrices are scaled to a unit diagonal for the comparison."""
     text, pose = ROBOTS[name]
     (tmp_path / "drawn.toml").write_text(text())
     robots = read_robot(tmp_path / "drawn.toml"), load_robot(name)

@@ -1,4 +1,4 @@
-"""Tests of the example drawings, for which results are known."""
+"""Known results of the example robots with bodies and joints."""
 
 from pathlib import Path
 
@@ -13,14 +13,15 @@ from forcefit.assembly.platform_stiffness.platform_stiffness import platform_sti
 from forcefit.assembly.sweeps.parameters import load_design
 
 DRAWN = Path(__file__).parents[3] / "examples" / "drawn"
-# freedoms, of the platform, with drives locked, redundant constraints
+# degrees of freedom of the robot, of the platform, and of the robot with locked drives;
+# number of redundant constraints
 EXAMPLES = {
     "three_upu": (3, 3, 0, 0), "tricept": (3, 3, 0, 0), "agile_eye": (3, 3, 0, 6),
 }  # fmt: skip
 
 
 @pytest.mark.parametrize("name", EXAMPLES)
-def test_examples_have_the_mobility_of_the_literature(name):
+def test_example_robots_have_mobility_of_the_literature(name):
     found = mobility(home_posture(load_robot(DRAWN / f"{name}.toml")))
     assert (
         found.freedoms, found.platform_freedoms, found.freedoms_drives_locked,
@@ -28,15 +29,15 @@ def test_examples_have_the_mobility_of_the_literature(name):
     ) == EXAMPLES[name]  # fmt: skip
 
 
-def test_tricept_stiffness_along_z_equals_that_of_its_drives():
-    """The stiffness is 3 k cos^2(inclination), because the tube slides along z."""
+def test_tricept_stiffness_along_z_equals_hand_calculation():
+    """The stiffness is 3 k cos^2(inclination) for three legs of stiffness k."""
     robot = load_robot(DRAWN / "tricept.toml")
     K = platform_stiffness(home_posture(robot)).stiffness
     assert K[5, 5] == pytest.approx(3 * 1.5e8 * 81 / 85, rel=1e-12)
 
 
 def test_tricept_platform_rotates_with_its_tube():
-    """The flange stays perpendicular to the line from the universal joint."""
+    """The z axis of the platform is parallel to the tube."""
     robot = load_robot(DRAWN / "tricept.toml")
     at = place_robot(robot, {"tx": 0.1, "ty": -0.05, "tz": -0.9}).platform
     along = at[:3, 3] / np.linalg.norm(at[:3, 3])
@@ -51,8 +52,8 @@ def test_agile_eye_rotates_about_its_centre():
 
 
 @pytest.mark.parametrize("ending", ["toml", "xml", "urdf"])
-def test_drawn_robots_are_converted_to_files_of_other_programs(ending, tmp_path):
-    """The output files are read back, and the body poses are compared."""
+def test_example_robot_is_converted_to_other_formats(ending, tmp_path):
+    """The platform position is equal after reading the output files."""
     found = convert(DRAWN / "three_upu.toml", tmp_path / f"upu.{ending}")
     assert found.difference < 1e-12
     back = load_robot(tmp_path / f"upu.{ending}")
@@ -60,8 +61,8 @@ def test_drawn_robots_are_converted_to_files_of_other_programs(ending, tmp_path)
     assert np.abs(home_posture(back).platform[:3, 3] - expected[:3, 3]).max() < 1e-12
 
 
-def test_parameters_of_a_drawn_robot_can_be_varied_in_a_sweep():
-    """The leg stiffness k of a 3-UPU is varied; along z it is 3 k cos^2."""
+def test_parameters_of_all_legs_can_be_varied():
+    """The stiffness along z is 3 k cos^2(inclination) for a leg stiffness k."""
     design = load_design(DRAWN / "three_upu.toml")
     values = {"slide.joint_stiffness.tz": 1e3}
     names = design.find("rod.link.beam.radius")

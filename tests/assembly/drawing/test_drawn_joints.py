@@ -1,4 +1,4 @@
-"""Free motions of all joint types, and joints traversed in reverse direction."""
+"""Free motions, errors and stiffness of all joint types."""
 
 import numpy as np
 import pytest
@@ -25,7 +25,7 @@ from forcefit.stiffness.screws import screw_map
 AT, AXIS, AXIS2 = (
     np.array([0.1, -0.2, 0.3]), unit([1.0, 2.0, 2.0]), unit([2.0, 1.0, -1]),
 )  # fmt: skip
-# free screws at the joint's point in its axes, of the page on joints (1.1)
+# free screws in the joint frame, by joint type
 RX, RY, RZ, TX, TY, TZ = np.eye(6)
 PITCH = 0.02  # [m]
 FREE = {
@@ -54,8 +54,8 @@ def axes():
 
 
 @pytest.mark.parametrize("kind", [*FREE, "universal"])
-def test_relative_motion_of_a_joint_is_spanned_by_its_free_screws(kind):
-    """The screws of the joint frames span the free screws in the table."""
+def test_joint_has_free_motions_of_its_type(kind):
+    """The screws of the joint frames span the free screws of the joint type."""
     drawn = robot(joint(kind))
     screws = motion_screws(drawn, home_posture(drawn).transforms)[mobile(drawn)]
     if kind == "universal":
@@ -73,8 +73,8 @@ def test_relative_motion_of_a_joint_is_spanned_by_its_free_screws(kind):
     ("revolute", [*(0.3 * AXIS)]), ("prismatic", [*(0.3 * AXIS)]),
 ])  # fmt: skip
 @pytest.mark.parametrize("reverse", [False, True])
-def test_joint_coordinate_moves_the_second_body_along_the_axis(kind, step, reverse):
-    """This also holds if the tree traverses the joint in reverse direction."""
+def test_joint_coordinate_moves_second_body_along_axis(kind, step, reverse):
+    """The direction does not depend on which body is nearer to the base."""
     ends = ("table", "base") if reverse else ("base", "table")
     drawn = robot(joint(kind, *ends, actuated=True, position=0.2))
     moved = place_robot(drawn, joints={"j": 0.5}).pose()
@@ -89,7 +89,7 @@ def test_joint_coordinate_moves_the_second_body_along_the_axis(kind, step, rever
 
 
 def numbers(rng, free):
-    """Return an error, a clearance, and a full stiffness with one free motion."""
+    """Return an error, a clearance, and a full stiffness matrix with a free motion."""
     root = rng.normal(size=(6, 6))
     K = (root @ root.T + 6 * np.eye(6)) * 1e5
     K[free] = K[:, free] = 0.0
@@ -98,8 +98,8 @@ def numbers(rng, free):
 
 
 @pytest.mark.parametrize("kind", ["revolute", "prismatic", "helical"])
-def test_joint_with_exchanged_bodies_describes_the_same_robot(kind):
-    """If the bodies are exchanged and z is reversed, y and z components change sign."""
+def test_joint_with_exchanged_bodies_is_equivalent(kind):
+    """The z axis of the second joint is reversed, so y and z components change."""
     rng = np.random.default_rng(5)
     given = numbers(rng, 5 if kind == "prismatic" else 2)
     signs = np.array([1, -1, -1, 1, -1, -1])
@@ -112,7 +112,7 @@ def test_joint_with_exchanged_bodies_describes_the_same_robot(kind):
                        pitch=here.pitch, numbers=(other,))  # fmt: skip
     point = np.array([0.7, 0.3, 0.1])
     held = joint("spherical", name="ball", at=point)
-    # no path leads from the base in the direction of these two
+    # both joints have the base as second body
     back = joint("spherical", "table", "base", "ball", point)
     robots = robot(here, held), robot(there, back)
     assert robots[1].frame("j").parent == BASE
@@ -125,8 +125,8 @@ def test_joint_with_exchanged_bodies_describes_the_same_robot(kind):
 
 
 @pytest.mark.parametrize("kind", FREE)
-def test_error_of_a_joint_is_expressed_in_the_axes_of_the_joint(kind):
-    """The error moves the table by its screw, independently of the joint frames."""
+def test_joint_error_is_in_joint_axes(kind):
+    """The platform screw is the transformed error, independent of the joint type."""
     error = np.array([1e-4, -2e-4, 3e-4, 1e-5, -2e-5, 3e-5])
     drawn = robot(
         joint(kind, numbers=(JointNumbers(error=error, tolerance=2 * abs(error)),))
@@ -139,8 +139,8 @@ def test_error_of_a_joint_is_expressed_in_the_axes_of_the_joint(kind):
     assert [sorted(size) for size in sizes] == [sorted(2 * abs(error))]
 
 
-def test_error_of_a_bearing_is_expressed_in_the_axes_of_the_bearing():
-    """In a universal joint, z is the bearing axis, and x is normal to it."""
+def test_bearing_error_is_in_bearing_axes():
+    """In a universal joint, z is the axis of the bearing."""
     errors = np.diag(np.arange(1, 7) * 1e-5)[[0, 5]]
     both = tuple(JointNumbers(error=error) for error in errors)
     drawn = robot(joint("universal", numbers=both))
@@ -155,8 +155,8 @@ def test_error_of_a_bearing_is_expressed_in_the_axes_of_the_bearing():
 
 
 @pytest.mark.parametrize("kind", ["spherical", "cylindrical", "planar"])
-def test_springs_of_a_joint_of_several_frames_act_only_once(kind):
-    """The table is held by one joint with springs; its free motions are driven."""
+def test_platform_stiffness_equals_stiffness_of_compound_joint(kind):
+    """The platform stiffness equals the joint stiffness."""
     K = np.array([2e3, 3e3, 5e3, 2e6, 3e6, 5e6])
     free = {"spherical": [0, 1, 2], "cylindrical": [2, 5], "planar": [2, 3, 4]}[kind]
     K[free] = 0.0
@@ -168,8 +168,8 @@ def test_springs_of_a_joint_of_several_frames_act_only_once(kind):
     assert np.abs((found.stiffness - stiff) / np.outer(size, size)).max() < 1e-12
 
 
-def test_link_has_the_same_stiffness_from_either_end():
-    """The stiffness matrix of a link is given at one joint and at the other."""
+def test_link_stiffness_does_not_depend_on_its_start():
+    """The stiffness matrix is specified at either of the two joints."""
     rng = np.random.default_rng(3)
     root = rng.normal(size=(6, 6))
     K = (root @ root.T + 6 * np.eye(6)) * 1e5
@@ -191,8 +191,8 @@ def test_link_has_the_same_stiffness_from_either_end():
     ("name", "reverse"),
     [("bar.link", True), ("bar.end", True), ("d.end", False), ("d.base", False)],
 )
-def test_a_body_may_have_the_name_of_a_frame_that_closes_a_loop(name, reverse):
-    """The loop of a four-bar is closed at its elastic bar or at the base."""
+def test_results_do_not_depend_on_body_names(name, reverse):
+    """The loop of a four-bar linkage is closed at its elastic bar or at the base."""
 
     def compliance(name):
         link = {"link": MatrixLink(1e6 * np.eye(6)), "ends": ("b", "c")}

@@ -1,4 +1,4 @@
-"""Machines with guides, compared with statics solved by hand."""
+"""Robots with linear guides, compared with hand calculations."""
 
 import itertools
 from functools import partial
@@ -46,14 +46,14 @@ from tests.assembly.drawing.guides_for_tests import (
 )
 from tests.assembly.path.moving_robots_for_tests import instants
 
-K = np.array([2e4, 3e4, 1e4, 2e7, 1e7, 4e7])  # [N m/rad, N/m]
+K = np.array([2e4, 3e4, 1e4, 2e7, 1e7, 4e7])  # [N m/rad, N/m] diagonal stiffness
 DRIVEN = "actuated = true"
 SLIDE = f"clearance = {{ {GUIDE} }}"
 
 
 @pytest.fixture
 def drawn(tmp_path):
-    """Return a function that reads bodies and joints, the platform being "table"."""
+    """Return a function that reads a robot from tables of bodies and joints."""
     return partial(drawn_in, tmp_path)
 
 
@@ -67,8 +67,8 @@ def sprung_slide(drawn, clearance=SLIDE, mass=""):
     )  # fmt: skip
 
 
-def test_force_closes_pad_contacts_and_leaves_two_free_motions(drawn):
-    """FX closes the clearances in TX, RY and RZ, while TY and RX stay free."""
+def test_force_along_x_closes_three_clearances_of_a_guide(drawn):
+    """A force along x closes the clearances in TX, RY and RZ, but not in TY and RX."""
     posture = home_posture(sprung_slide(drawn))
     found = platform_stiffness(posture, "contact", load=[0, 0, 0, 50.0, 0, 0])
     expected = np.diag(np.where([1, 0, 0, 0, 1, 0], 0.0, K))
@@ -77,21 +77,21 @@ def test_force_closes_pad_contacts_and_leaves_two_free_motions(drawn):
     assert found.free.shape[1] == 2
 
 
-def test_a_guide_is_rigid_in_the_nominal_stiffness(drawn):
+def test_guide_is_rigid_in_nominal_stiffness(drawn):
     found = platform_stiffness(home_posture(sprung_slide(drawn)))
     np.testing.assert_allclose(found.stiffness, np.diag(K), rtol=1e-9, atol=1e-3)
 
 
 @pytest.mark.parametrize(("load", "expected"), [
-    # flat on the faces across x: gap and spring
+    # displacement along x: gap and spring deflection
     ([0, 0, 0, 100.0, 0, 0], [0, 0, 0, C + 100 / K[3], 0, 0]),
-    # about x the two ends touch across y: 2 c / L
+    # rotation about x, which the contacts at both ends limit to 2 c / L
     ([5.0, 0, 0, 0, 0, 0], [2 * C / L + 5 / K[0], 0, 0, 0, 0, 0]),
-    # about z the edges of the wider faces touch first: 2 c / w
+    # rotation about z, which the contacts at the edges limit to 2 c / w
     ([0, 0, 5.0, 0, 0, 0], [0, 0, 2 * C / W + 5 / K[2], 0, 0, 0]),
 ])  # fmt: skip
-def test_loads_close_the_contacts_of_a_guide(load, expected, drawn):
-    """The energy of the spring is f^2 / (2 K)."""
+def test_displacement_of_a_loaded_guide_equals_hand_calculation(load, expected, drawn):
+    """The platform moves by the gap and the spring deflection."""
     posture = home_posture(sprung_slide(drawn))
     found = solve_assembly(posture, load)
     work = np.dot(load, expected)
@@ -99,8 +99,8 @@ def test_loads_close_the_contacts_of_a_guide(load, expected, drawn):
     assert found.energy == pytest.approx((np.array(load) ** 2 / K).sum() / 2, rel=1e-7)
 
 
-def test_predicted_readings_of_a_guided_arm_include_closed_contacts(drawn):
-    """The readings do not change if the closed clearances are locked."""
+def test_predicted_readings_include_clearance_of_a_guide(drawn):
+    """The readings are the gap plus the spring deflection."""
     loads = np.array([[0, 0, 0, 100.0, 40.0, 0], [0, 0, 0, -100.0, 40.0, 0]])
     posture = home_posture(sprung_slide(drawn))
     rows = as_declared(together([posture, posture]), loads)
@@ -112,8 +112,8 @@ def test_predicted_readings_of_a_guided_arm_include_closed_contacts(drawn):
     np.testing.assert_allclose(held.deviation, found.deviation, atol=1e-10)
 
 
-def test_acceleration_moves_the_block_across_its_guide(drawn):
-    """The force m a moves the block by the gap and deforms the spring by m a / K."""
+def test_displacement_of_accelerated_block_equals_hand_calculation(drawn):
+    """The force m a displaces the block by the gap plus m a / K."""
     robot = sprung_slide(drawn, mass="mass = 4.0\ncentre = [0, 0, 0]\n")
     path = instants(["q.slide"], [[0.0]], [[0.0]], [[3.0]])
     found = path_errors(robot, path, gravity=[0.0, -9.81, 0.0])
@@ -124,7 +124,7 @@ def test_acceleration_moves_the_block_across_its_guide(drawn):
 
 
 def mounted(drawn, error):
-    """The table of the sprung slide, bolted to the base with an error."""
+    """Return a guide on a spring, whose block is fixed to the base with an error."""
     off = f"geometric_error = {[float(x) for x in error]}"
     spring = f"joint_stiffness = {K.tolist()}"
     return home_posture(drawn(
@@ -138,8 +138,8 @@ def mounted(drawn, error):
 ERROR = [5e-4, -8e-4, 9e-4, 3e-5, -4e-5, 0.0]
 
 
-def test_step_that_closes_a_guided_loop_does_work_equal_to_the_assembly_energy(drawn):
-    """The contacts of the guide are closed from the start; a step closes the loop."""
+def test_energy_of_assembly_step_equals_assembly_energy(drawn):
+    """The assembly plan has one step, which closes the loop."""
     posture = mounted(drawn, ERROR)
     (pair,) = loops(posture.robot)
     assert len(posture.robot.closures) == 2
@@ -149,15 +149,15 @@ def test_step_that_closes_a_guided_loop_does_work_equal_to_the_assembly_energy(d
     assert found.energy == pytest.approx(energy, rel=1e-6)
 
 
-def test_energy_of_a_guide_equals_that_of_the_problem_printed_in_the_paper(drawn):
-    """The problem is solved by cvxpy in all screws, without elimination."""
+def test_energy_of_a_guide_equals_that_of_paper_problem(drawn):
+    """The problem of the paper is solved by cvxpy without elimination of variables."""
     posture = mounted(drawn, ERROR)
     printed, _ = energy_as_printed(posture)
     assert solve_assembly(posture).energy == pytest.approx(printed, rel=1e-6)
 
 
-def test_worst_case_of_a_guided_arm_is_the_farthest_corner(drawn):
-    """The contributions of errors and clearances add up to the worst case."""
+def test_worst_case_of_a_guide_equals_largest_vertex(drawn):
+    """The worst case is the largest sum of an error and a vertex of the clearance."""
     robot = drawn(
         body("table"), joint("slide", "prismatic", "base", "table", Z, SLIDE, DRIVEN)
     )  # fmt: skip
@@ -178,8 +178,8 @@ def test_worst_case_of_a_guided_arm_is_the_farthest_corner(drawn):
         assert sum(size for _, size in found.shares) == pytest.approx(most, rel=1e-6)
 
 
-def test_positions_in_contact_are_at_corners_of_the_clearance_set_of_a_guide(drawn):
-    """Under a generic wrench, five of the eight inequalities are active."""
+def test_contact_positions_are_vertices_of_guide_clearance(drawn):
+    """Five of the eight inequalities are active."""
     posture = home_posture(drawn(
         body("table"), joint("slide", "prismatic", "base", "table", Z, SLIDE, DRIVEN)
     ))  # fmt: skip
@@ -192,8 +192,8 @@ def test_positions_in_contact_are_at_corners_of_the_clearance_set_of_a_guide(dra
     assert (touching[:, 3:] > 1 - 1e-6).all()
 
 
-def test_energies_in_a_sweep_of_a_guided_robot_equal_hand_calculation(drawn):
-    """With a lever arm q, the energy is F^2 / (2 K_TX) + (q F)^2 / (2 K_RY)."""
+def test_energies_in_a_sweep_equal_hand_calculation(drawn):
+    """The energy is F^2 / (2 K_TX) + (q F)^2 / (2 K_RY) for the lever arm q."""
     found = sweep(
         sprung_slide(drawn), grid="q.slide=0:0.04:0.02", assumption="none",
         load=(0, 0, 0, 100.0, 0, 0),
@@ -207,10 +207,8 @@ def test_energies_in_a_sweep_of_a_guided_robot_equal_hand_calculation(drawn):
     ("prismatic", GUIDE), ("planar", PAD)
 ])  # fmt: skip
 @pytest.mark.parametrize("reverse", [False, True])
-def test_errors_of_either_body_of_a_contact_are_accepted_without_clearance(
-    kind, clearance, reverse, drawn
-):
-    """In a serial arm, errors on either side of the contacts only move the platform."""
+def test_errors_of_a_serial_arm_have_zero_margin(kind, clearance, reverse, drawn):
+    """Errors of a serial arm only move the platform and do not require clearance."""
     ends = ("table", "base") if reverse else ("base", "table")
     robot = drawn(
         body("table"), joint("j", kind, *ends, Z, f"clearance = {{ {clearance} }}")
@@ -221,8 +219,8 @@ def test_errors_of_either_body_of_a_contact_are_accepted_without_clearance(
     assert zone_margin(home_posture(robot.with_errors(errors))).margin == 0.0
 
 
-def test_closures_between_contacts_are_not_exported_as_loops(drawn, tmp_path):
-    """The loop through two guides becomes one weld in MJCF and one closure."""
+def test_contact_closures_are_not_exported_as_loops(drawn, tmp_path):
+    """The exported robot has one loop, which is the loop of bodies and joints."""
     posture = mounted(drawn, ERROR)
     assert contact_closures(posture.robot).sum() == 1
     write_robot(posture.robot, tmp_path / "frames.toml")
@@ -233,8 +231,8 @@ def test_closures_between_contacts_are_not_exported_as_loops(drawn, tmp_path):
     assert [tuple(one["frames"]) for one in closures] == list(loops(posture.robot))
 
 
-def test_chain_of_bounded_clearances_is_counted_as_a_loop_of_the_mechanism():
-    """Two shafts in bores between the same bodies are overconstrained six times."""
+def test_two_bores_have_six_redundant_constraints():
+    """Two shafts in bores between the same bodies have six redundant constraints."""
     bore = Clearance(radial=1e-5, tilt=1e-4)
     frames = (
         Frame("first", clearance=bore), Frame("table", "first"),
@@ -246,8 +244,8 @@ def test_chain_of_bounded_clearances_is_counted_as_a_loop_of_the_mechanism():
 
 
 @pytest.mark.exudyn
-def test_simulated_arm_without_clearance_accepts_errors_of_every_frame(drawn, rng):
-    """Without clearance, only the spring deforms: the energy is F^2 / (2 K)."""
+def test_simulated_energy_without_clearance_equals_hand_calculation(drawn, rng):
+    """Without clearance, the energy is F^2 / (2 K)."""
     robot = without_clearance(sprung_slide(drawn))
     robot = robot.with_errors(1e-4 * rng.uniform(-1, 1, size=(len(robot.frames), 6)))
     found = simulate_assembly(home_posture(robot), load=[0, 0, 0, 100.0, 0, 0])

@@ -1,12 +1,11 @@
-"""Clearances of guides and pads compared with explicit inequalities.
+"""Clearances of guides and pads, compared with explicit inequalities.
 
-A guide of length L, width w and height t allows the small screws that satisfy
+A guide of length L, width w and height t permits the small screws that satisfy
 
     |TX + s1 L/2 RY + s2 t/2 RZ| <= c_x,  |TY + s1 L/2 RX + s2 w/2 RZ| <= c_y
 
-for s1, s2 = +-1.  A pad of 2A by 2B allows the octahedron |TZ| + B |RX| + A |RY| <= g.
-In these tests, the inequalities are constraints of linear and convex programs, which
-are solved by other solvers.
+for s1, s2 = +-1.  A pad of 2A by 2B permits the octahedron |TZ| + B |RX| + A |RY| <= g.
+In these tests, the inequalities are constraints of linear and convex programmes.
 """
 
 from functools import partial
@@ -49,12 +48,12 @@ from tests.assembly.drawing.guides_for_tests import (
     support,
 )  # fmt: skip
 
-STIFFNESS = [2e4, 3e4, 1e4, 2e7, 1e7, 4e7]  # [N m/rad, N/m]
+STIFFNESS = [2e4, 3e4, 1e4, 2e7, 1e7, 4e7]  # [N m/rad, N/m] diagonal stiffness
 
 
 @pytest.fixture
 def drawn(tmp_path):
-    """Return a function that reads bodies and joints, the platform being "table"."""
+    """Return a function that reads a robot from tables of bodies and joints."""
     return partial(drawn_in, tmp_path)
 
 
@@ -65,7 +64,7 @@ def one_joint(drawn, kind, clearance, reverse=False, keys=Z):
 
 
 def heights(posture, directions):
-    """Support function of the platform screws that clearances allow."""
+    """Return the support function of the reachable platform screws."""
     reachable = reachable_screws(solve_assembly(posture), "frozen")
     return np.array([reachable.support(w).height for w in np.array(directions)])
 
@@ -74,10 +73,10 @@ def heights(posture, directions):
 @pytest.mark.parametrize(("gap", "gaps"), [
     ("1e-5", (C, C)), ("[1e-5, 4e-6]", (C, 4e-6))
 ])  # fmt: skip
-def test_a_guide_has_the_support_function_of_its_eight_slabs(
+def test_support_function_of_a_guide_agrees_with_linear_programme(
     gap, gaps, reverse, drawn, rng
 ):
-    """The support function for 40 wrenches is computed by linear programming."""
+    """The expected support function is computed by linear programming."""
     posture = one_joint(drawn, "prismatic", GUIDE.replace("1e-5", gap), reverse)
     wrenches = rng.normal(size=(40, 6)) * [L / 2, L / 2, W / 2, 1, 1, 0]
     expected = [support(w, guide_slabs(gaps)) for w in wrenches]
@@ -85,8 +84,8 @@ def test_a_guide_has_the_support_function_of_its_eight_slabs(
 
 
 @pytest.mark.parametrize("reverse", [False, True])
-def test_a_pad_has_the_support_function_of_its_octahedron(reverse, drawn, rng):
-    """max(|w_T|, |w_RX| / B, |w_RY| / A) g."""
+def test_support_function_of_a_pad_is_that_of_octahedron(reverse, drawn, rng):
+    """The support function is g max(|w_T|, |w_RX| / B, |w_RY| / A)."""
     wrenches = rng.normal(size=(40, 6)) * [B, A, 0, 0, 0, 1]
     posture = one_joint(drawn, "planar", PAD, reverse)
     expected = G_PAD * (np.abs(wrenches[:, [0, 1, 5]]) / [B, A, 1]).max(axis=1)
@@ -94,12 +93,12 @@ def test_a_pad_has_the_support_function_of_its_octahedron(reverse, drawn, rng):
 
 
 def positions(posture, screws):
-    """Largest cone of each platform screw (k, 6): at most 1 inside the clearances."""
+    """Return the gauge of each platform screw, (k,), which is <= 1 if reachable."""
     lin, joints = linearise(posture), solve_assembly(posture).joints
     columns = np.hstack([joints.cones, joints.free])
     A_all = np.vstack([lin.rows, lin.platform]) @ columns
     right = np.hstack([np.zeros((len(screws), len(lin.rows))), screws])
-    # rows and columns scaled, so that the solution is exact
+    # scaling of the columns reduces rounding errors
     size = np.abs(A_all).max(axis=0)
     found = np.linalg.lstsq(A_all / size, right.T, rcond=1e-9)[0].T / size
     return np.abs(found[:, : joints.cones.shape[1]]).max(axis=1)
@@ -109,20 +108,20 @@ def positions(posture, screws):
     ("prismatic", GUIDE, guide_slabs(), [2.5e-4, 2.5e-4, 5e-4, C, C, 0]),
     ("planar", PAD, pad_slabs(), [G_PAD / B, G_PAD / A, 0, 0, 0, G_PAD]),
 ])  # fmt: skip
-def test_every_small_screw_is_inside_exactly_if_it_is_inside_the_slabs(
+def test_reachable_screws_are_those_that_satisfy_inequalities(
     kind, clearance, slabs, box, drawn, rng
 ):
-    """Screws are sampled in the bounding box, of which the octahedron is one sixth."""
+    """Screws are sampled in a box; the octahedron of a pad is one sixth of this box."""
     screws = rng.uniform(-1, 1, size=(200_000, 6)) * box
     inside = (np.abs(screws @ slabs.T) <= 1).all(axis=1)
     found = positions(one_joint(drawn, kind, clearance), screws) <= 1
-    assert np.mean(found != inside) < 1e-4  # at the boundary rounding decides
+    assert np.mean(found != inside) < 1e-4  # screws on the boundary may differ
     if kind == "planar":
         assert found.mean() == pytest.approx(1 / 6, abs=0.004)
 
 
 def held(drawn, error, kind, clearance):
-    """A block in a guide or on a pad; a spring and an error close the loop."""
+    """Return a loop of a spring, a guide or pad, and a fixed joint with an error."""
     K = f"joint_stiffness = {STIFFNESS}"
     off = f"geometric_error = {[float(x) for x in error]}"
     return home_posture(drawn(
@@ -140,10 +139,10 @@ def errors_of(seed):
     ("prismatic", GUIDE, guide_slabs(), [5]), ("planar", PAD, pad_slabs(), [2, 3, 4])
 ])  # fmt: skip
 @pytest.mark.parametrize("seed", range(3))
-def test_energy_of_a_forced_guide_equals_that_of_its_inequalities_solved_by_cvxpy(
+def test_energy_of_guide_and_pad_agrees_with_cvxpy(
     seed, kind, clearance, slabs, free, drawn
 ):
-    """cvxpy minimises v K v / 2, where v + clearance + error closes the loop."""
+    """The energy is the minimum of v K v / 2 with v + clearance + error = 0."""
     import cvxpy as cp
 
     error, unit = errors_of(seed), np.array([1e-3] * 3 + [1e-6] * 3)
@@ -166,7 +165,7 @@ FEET = ((-0.15, 0.0, 0.0), (0.15, 0.02, 0.0))
 
 
 def on_two_guides(drawn, error, *keys, passive=True):
-    """A table on two parallel guides along z; the second has an error."""
+    """Return a table on two parallel guides along z, the second with an error."""
     driven = () if passive else ("actuated = true",)
     slide = f"clearance = {{ {GUIDE} }}"
     off = f"geometric_error = {[float(x) for x in error]}"
@@ -178,14 +177,12 @@ def on_two_guides(drawn, error, *keys, passive=True):
 
 
 def two_guide_slabs():
-    """(16, 6) rows on the table's screw at the origin."""
+    """Return the inequalities of both guides for a screw at the origin, (16, 6)."""
     return np.vstack([guide_slabs() @ np.linalg.inv(at(foot)) for foot in FEET])
 
 
 @pytest.mark.parametrize("method", ["compiled", "reference"])
-def test_margin_of_two_rigid_guides_equals_that_of_a_linear_programme(
-    method, drawn, rng
-):
+def test_margin_of_two_guides_agrees_with_linear_programme(method, drawn, rng):
     """The margin is the minimum t with |slabs (x - error)| <= t for both guides."""
     for _ in range(3):
         error = rng.normal(size=6) * ([4e-4] * 3 + [4e-5] * 3)
@@ -202,20 +199,20 @@ def test_margin_of_two_rigid_guides_equals_that_of_a_linear_programme(
         assert found.margin == pytest.approx(least.fun, rel=1e-6)
 
 
-def test_pose_errors_of_two_rigid_guides_equal_those_of_a_linear_programme(drawn, rng):
+def test_pose_errors_of_two_guides_agree_with_linear_programme(drawn, rng):
     """The table can reach all screws that are possible in both guides."""
     posture = on_two_guides(drawn, np.zeros(6), passive=False)
     slabs = two_guide_slabs()
     wrenches = rng.normal(size=(20, 6)) * [0.1, 0.1, 0.1, 1, 1, 0]
     held_z = np.array([[0, 0, 0, 0, 0, 1.0]])
-    # the drive holds the first guide along z: no turn about x or y moves its point
+    # the drive fixes the displacement along z at the first guide
     held_z = held_z @ np.linalg.inv(at(FEET[0]))
     expected = [support(w, slabs, held_z) for w in wrenches]
     np.testing.assert_allclose(heights(posture, wrenches), expected, rtol=1e-6)
     found = bound_pose_error(
         solve_assembly(posture), tolerance_translation=1e-9, tolerance_rotation=1e-9
     )
-    # the largest of 400 random directions is about 0.05 rad off: 1 - 0.05^2 / 2
+    # maximum over 400 random directions, which is at most 2 % too small
     sphere = rng.normal(size=(400, 3))
     sphere /= np.linalg.norm(sphere, axis=1, keepdims=True)
     for (low, high), part in (
@@ -229,8 +226,8 @@ def test_pose_errors_of_two_rigid_guides_equal_those_of_a_linear_programme(drawn
         assert reach >= low * (1 - 0.02)
 
 
-def test_energy_of_two_guides_on_springs_equals_that_of_their_inequalities(drawn, rng):
-    """The pair is overconstrained, and the errors exceed the gaps."""
+def test_energy_of_two_guides_agrees_with_cvxpy(drawn, rng):
+    """The two guides are overconstrained, and the errors exceed the gaps."""
     import cvxpy as cp
 
     K = np.array([2e4, 3e4, 1e4, 2e7, 1e7, 0.0])
@@ -255,7 +252,7 @@ def test_energy_of_two_guides_on_springs_equals_that_of_their_inequalities(drawn
 @pytest.mark.parametrize(("kind", "clearance"), [
     ("prismatic", GUIDE), ("planar", PAD)
 ])  # fmt: skip
-def test_both_exact_methods_agree_on_a_forced_guide(kind, clearance, drawn):
+def test_exact_methods_agree_for_guide_and_pad(kind, clearance, drawn):
     posture = held(drawn, 4 * errors_of(1), kind, clearance)
     one, other = (solve_exact(posture, method=m) for m in ("compiled", "reference"))
     assert one.energy == pytest.approx(other.energy, rel=1e-9)
@@ -264,10 +261,8 @@ def test_both_exact_methods_agree_on_a_forced_guide(kind, clearance, drawn):
 @pytest.mark.parametrize(("kind", "clearance"), [
     ("prismatic", GUIDE), ("planar", PAD)
 ])  # fmt: skip
-def test_finite_motions_of_a_guide_differ_from_small_ones_by_second_order(
-    kind, clearance, drawn
-):
-    """With errors and clearances scaled by s, the energies differ by O(s^3)."""
+def test_exact_energy_of_a_guide_differs_by_third_order(kind, clearance, drawn):
+    """If errors and clearances are scaled by s, the energy difference is O(s^3)."""
     posture, changes = held(drawn, 4 * errors_of(1), kind, clearance), []
     for scale in (1.0, 0.5, 0.25):
         found = solve_exact(scaled(posture, scale))
@@ -279,24 +274,24 @@ def test_finite_motions_of_a_guide_differ_from_small_ones_by_second_order(
 
 
 @pytest.mark.exudyn
-def test_crosscheck_of_a_guide_passes(drawn):
-    """The simulation closes both chains of contacts by finite rotations."""
+def test_multibody_simulation_of_a_guide_agrees(drawn):
+    """The multibody simulation includes finite rotations of both chains."""
     posture = held(drawn, 4 * errors_of(1), "prismatic", GUIDE)
     check = crosscheck(posture, (1.0, 0.5, 0.25), clearances=True)
     assert check.passed, check.checks
 
 
-def test_uniform_positions_on_a_pad_fill_the_octahedron_evenly(drawn):
-    """Mean squares of TZ / g, B RX / g, A RY / g are 2 / (4 5) = 0.1."""
+def test_random_positions_on_a_pad_are_uniform_in_octahedron(drawn):
+    """The mean squares of TZ / g, B RX / g and A RY / g are 0.1."""
     posture = one_joint(drawn, "planar", PAD)
     screws = uniform_screws(posture, 1500)[:, [0, 1, 5]] / [G_PAD / B, G_PAD / A, G_PAD]
     assert np.abs(screws).sum(axis=1).max() <= 1 + 1e-9
-    # a square has a variance of 24 6 / 5040 - 0.01 = 0.0186
+    # the tolerance is four standard deviations of the mean square
     np.testing.assert_allclose((screws**2).mean(axis=0), 0.1, atol=4 * 0.0036)
 
 
-def test_uniform_positions_in_a_guide_agree_with_rejection_sampling(drawn, rng):
-    """Mean squares of the five small motions, against samples of the slabs."""
+def test_random_positions_in_a_guide_agree_with_rejection_sampling(drawn, rng):
+    """The mean squares of the five components are compared."""
     found = uniform_screws(one_joint(drawn, "prismatic", GUIDE), 1500)[:, :5]
     box = np.array([2.5e-4, 2.5e-4, 5e-4, C, C])
     drawn_there = rng.uniform(-1, 1, size=(400_000, 5)) * box
@@ -307,7 +302,7 @@ def test_uniform_positions_in_a_guide_agree_with_rejection_sampling(drawn, rng):
 
 
 def uniform_screws(posture, count):
-    """(count, 6) platform screws of uniform positions in the clearances."""
+    """Return platform screws for uniform positions in the clearances, (count, 6)."""
     prepared = linear_response(posture)
     draws = prepared.solve(np.zeros((count, len(posture.robot.frames), 6)))
     rngs = [np.random.default_rng(k) for k in range(count)]
@@ -315,7 +310,7 @@ def uniform_screws(posture, count):
 
 
 @pytest.mark.parametrize("version", [1, 2])
-def test_guide_has_the_same_clearance_in_both_file_formats(version, drawn, tmp_path):
+def test_clearance_of_a_guide_is_equal_in_both_file_formats(version, drawn, tmp_path):
     posture = on_two_guides(drawn, [3e-4, 2e-4, 1e-4, 4e-5, -4e-5, 0], passive=False)
     write_robot(posture.robot, tmp_path / "frames.toml")
     convert(tmp_path / "frames.toml", tmp_path / "again.toml", version=version)
@@ -327,9 +322,7 @@ def test_guide_has_the_same_clearance_in_both_file_formats(version, drawn, tmp_p
 
 @pytest.mark.parametrize(("kind", "clearance"), [("prismatic", GUIDE), ("planar", PAD)])
 @pytest.mark.parametrize("reverse", [False, True])
-def test_every_frame_of_a_contact_belongs_to_the_drawn_joint(
-    drawn, kind, clearance, reverse
-):
+def test_contact_frames_are_assigned_to_their_joint(drawn, kind, clearance, reverse):
     robot = one_joint(drawn, kind, clearance, reverse).robot
     names = {joint_of(robot, row) for row in range(len(robot.frames))}
     assert names == {"j", "table"}

@@ -1,4 +1,4 @@
-"""Tests of helical joints with a screw and a nut."""
+"""Helical joints with a screw and a nut."""
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ from forcefit.assembly.statistics.monte_carlo import run_draws
 from tests.screws_for_tests import DIFFERENTIAL, LIFT, NUT
 
 METHODS = ["compiled", "reference"]
-LEAD = 0.005 / (2 * np.pi)  # [m/rad] of the lift
+LEAD = 0.005 / (2 * np.pi)  # [m/rad] lead of the screw
 
 
 @pytest.fixture
@@ -34,29 +34,29 @@ def read(tmp_path):
     return robot
 
 
-def test_screw_lift_has_one_degree_of_freedom_and_three_redundant_constraints(read):
-    """Column and screw both constrain two tilts and the distance between the axes."""
+def test_screw_lift_has_one_degree_of_freedom(read):
+    """The column and the screw constrain the same two rotations and one translation."""
     found = mobility(home_posture(read()))
     assert (found.freedoms, found.platform_freedoms) == (1, 1)
     assert (found.freedoms_drives_locked, found.redundant_constraints) == (0, 3)
 
 
-def test_one_turn_of_the_screw_moves_the_table_by_its_lead(read):
-    """Turning about +z, a right-handed screw lowers the table."""
+def test_rotation_of_screw_by_360_degrees_moves_table_by_pitch(read):
+    """A rotation of a right-hand screw about +z lowers the table."""
     for text, step in ((LIFT, -0.005), (LIFT.replace('"5 mm"', '"-5 mm"'), 0.005)):
         pose = place_robot(read(text), joints={"bearing": 2 * np.pi}).pose()
         expected = [0.3, 0, 0.4 + step, 0, 0, 0]
         assert list(pose.values()) == pytest.approx(expected, abs=1e-14)
 
 
-def test_full_height_of_the_table_requires_eighty_turns_of_the_screw(read):
+def test_height_of_400_mm_requires_80_screw_rotations(read):
     at = place_robot(read(), pose={"tz": 0.8})
     angle = at.coordinates[at.robot.index("bearing")]
     assert angle == pytest.approx(-80 * 2 * np.pi, rel=1e-12)
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_compliance_of_the_table_is_lead_squared_over_drive_stiffness(method, read):
+def test_platform_compliance_is_lead_squared_over_drive_stiffness(method, read):
     C = platform_stiffness(home_posture(read()), method=method).compliance
     expected = np.zeros((6, 6))
     expected[5, 5] = LEAD**2 / 200
@@ -65,8 +65,8 @@ def test_compliance_of_the_table_is_lead_squared_over_drive_stiffness(method, re
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_energy_under_a_load_equals_that_of_the_drive_spring(method, read):
-    """The energy is F^2 lead^2 / (2 k), also for finite motions."""
+def test_energy_of_loaded_lift_equals_energy_of_drive_spring(method, read):
+    """The energy is F^2 lead^2 / (2 k)."""
     at, load = home_posture(read()), [0, 0, 0, 0, 0, 1000.0]
     found = solve_assembly(at, load, method=method)
     energy = 1e6 * LEAD**2 / 400
@@ -76,21 +76,21 @@ def test_energy_under_a_load_equals_that_of_the_drive_spring(method, read):
     assert solve_exact(at, load).energy == pytest.approx(energy, rel=1e-9)
 
 
-def test_weight_of_the_table_turns_the_drive_by_its_moment(read):
-    """The drive carries m g times the lead."""
+def test_drive_rotation_under_weight_equals_hand_calculation(read):
+    """The moment is m g times the lead."""
     found = solve_assembly(home_posture(read()), gravity=[0, 0, -9.81])
     turn = found.joint_screws[found.posture.robot.index("bearing"), 2]
     assert turn == pytest.approx(8 * 9.81 * LEAD / 200, rel=1e-12)
 
 
-def test_frequency_of_the_table_equals_that_of_its_mass_on_the_screw(read):
+def test_natural_frequency_of_the_lift_equals_hand_calculation(read):
     found = natural_modes(home_posture(read()))
     expected = np.sqrt(200 / LEAD**2 / 8) / (2 * np.pi)
     assert found.frequencies == pytest.approx([expected], rel=1e-9)
 
 
-def test_rotation_error_of_the_screw_lowers_the_table_by_its_lead(read):
-    """The result is exact for any rotation, because all axes are parallel."""
+def test_rotation_error_of_screw_moves_table_by_lead(read):
+    """The linear model is exact, because all axes are parallel."""
     robot, errors = read(), np.zeros((6, 6))
     errors[robot.index("bearing"), 2] = 0.3
     at = home_posture(robot.with_errors(errors))
@@ -101,8 +101,8 @@ def test_rotation_error_of_the_screw_lowers_the_table_by_its_lead(read):
     np.testing.assert_allclose(drawn.platform_screw[:, 5], [-0.3 * LEAD, 0.3 * LEAD])
 
 
-def test_differential_screw_moves_by_the_difference_of_its_pitches(read):
-    """One turn advances the screw by 5 mm and moves the table back by 4 mm."""
+def test_differential_screw_moves_by_difference_of_pitches(read):
+    """A rotation by 360 degrees moves the table by 5 mm - 4 mm."""
     robot = read(DIFFERENTIAL)
     pose = place_robot(robot, joints={"coarse": 2 * np.pi}).pose()
     assert pose["tz"] == pytest.approx(0.101, abs=1e-14)
@@ -113,10 +113,10 @@ def test_differential_screw_moves_by_the_difference_of_its_pitches(read):
 @pytest.mark.parametrize(("guide", "row", "most"), [
     ("revolute", 2, 25e-6 / 0.004 * 2 * np.pi), ("prismatic", 5, 25e-6),
 ])  # fmt: skip
-def test_clearance_of_a_nut_allows_an_axial_motion_or_a_rotation_along_the_thread(
+def test_axial_clearance_of_a_nut_permits_translation_or_rotation(
     guide, row, most, read
 ):
-    """Tr 16 x 4, 50 um from flank to flank: 25 um, or 39.3 mrad with TZ held."""
+    """An axial clearance of +-25 um permits 39.3 mrad for a pitch of 4 mm."""
     robot = read(NUT.replace('"revolute"', f'"{guide}"'))
     bound = bound_pose_error(solve_assembly(home_posture(robot)))
     error = bound.rotation_error if row == 2 else bound.translation_error
@@ -124,8 +124,8 @@ def test_clearance_of_a_nut_allows_an_axial_motion_or_a_rotation_along_the_threa
     assert np.ravel(error) == pytest.approx([most, most], rel=1e-3)
 
 
-def test_uniform_positions_of_a_nut_fill_its_axial_clearance(read):
-    """(0, b) uniform: mean of |TZ| b / 2, with 400 draws to 3 sigma, b / 23."""
+def test_random_positions_of_a_nut_are_uniform(read):
+    """The mean of |TZ| is half the axial clearance."""
     at = home_posture(read(NUT.replace('"revolute"', '"prismatic"')))
     sources = tolerance_sources(at.robot, [0, 0, 0, 0, 0, 1e-12])
     data = run_draws(Experiment(at, sources, clearance="uniform"), 400)
@@ -141,8 +141,8 @@ SPRUNG = LIFT.replace("pitch =", (
 
 
 @pytest.mark.parametrize("seed", [1, 2])
-def test_compiled_reference_and_printed_energies_of_a_loaded_lift_agree(seed, read):
-    """In the problem as printed, the thread is an additional constraint."""
+def test_energies_of_three_methods_agree_for_a_loaded_lift(seed, read):
+    """In the problem of the paper, the thread is an additional constraint."""
     robot, rng = read(SPRUNG), np.random.default_rng(seed)
     robot = robot.with_errors(rng.normal(size=(len(robot.frames), 6)) * 1e-4)
     at, load = home_posture(robot), rng.normal(size=6) * 100
@@ -155,8 +155,8 @@ def test_compiled_reference_and_printed_energies_of_a_loaded_lift_agree(seed, re
     assert expected.energy > 1e-3
 
 
-def test_lifts_of_different_pitch_have_readings_by_their_own_pitch(read):
-    """An error of 1 mrad moves each table in proportion to its lead."""
+def test_predicted_reading_is_proportional_to_pitch(read):
+    """A rotation error of 1 mrad moves the table by 1 mrad times the lead."""
     for pitch in (0.005, 0.009):
         robot = read(LIFT.replace('"5 mm"', str(pitch)))
         errors = np.zeros((6, 6))
@@ -166,8 +166,8 @@ def test_lifts_of_different_pitch_have_readings_by_their_own_pitch(read):
         assert found[5] == pytest.approx(-1e-3 * pitch / (2 * np.pi), rel=1e-9)
 
 
-def test_whole_turns_of_a_passive_nut_count_against_its_limits(read):
-    """Unlike a revolute joint, a helical joint has moved after a whole turn."""
+def test_nut_rotation_above_its_limit_is_reported(read):
+    """A coordinate of 7 rad exceeds a limit of 6 rad."""
     robot = read(LIFT.replace("pitch =", "limits = [-6.0, 6.0]\npitch ="))
     at = place_robot(robot, joints={"bearing": -7.0})
     assert limits_passed(robot, at.coordinates) == "nut at 7 rad, limits -6 to 6"

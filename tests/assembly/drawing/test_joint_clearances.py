@@ -1,6 +1,6 @@
-"""Joint clearances compared with closed forms, sampling and other solvers.
+"""Joint clearances, compared with hand calculations, sampling and other solvers.
 
-Expected values are derived by hand from the offset of the axis at height z,
+The hand calculations use the displacement of the axis at height z,
 ``e(z) = (TX + z RY, TY - z RX)``.
 """
 
@@ -29,7 +29,7 @@ PAD = "pad = { gap = 1e-5, length = 0.06, width = 0.04 }"
 
 @pytest.fixture
 def one_joint(tmp_path):
-    """Return a function that reads a robot of one joint between base and table."""
+    """Return a function that reads a robot with one joint."""
 
     def read(kind, clearance, at=(0, 0, 0), keys="axis = [0, 0, 1]", reverse=False):
         ends = ("table", "base") if reverse else ("base", "table")
@@ -57,13 +57,13 @@ def one_joint(tmp_path):
 
 
 def reach(posture):
-    """Largest translation error [m], lower and upper bound."""
+    """Return the lower and upper bound of the largest translation error [m]."""
     found = bound_pose_error(solve_assembly(posture), tolerance_translation=1e-9)
     return found.translation_error
 
 
 def heights(posture, directions):
-    """Support function of the set of platform screws along wrenches (k, 6)."""
+    """Return the support function of the reachable screws for wrenches, (k, 6)."""
     reachable = reachable_screws(solve_assembly(posture), "frozen")
     return np.array([reachable.support(w).height for w in np.array(directions)])
 
@@ -72,10 +72,10 @@ def heights(posture, directions):
 @pytest.mark.parametrize(("height", "expected"), [
     (0.0, 10e-6), (0.02, 10e-6), (0.1, 50e-6), (-0.1, 50e-6)
 ])  # fmt: skip
-def test_motion_of_a_shaft_in_a_bore_is_limited_by_the_clearance_at_its_ends(
+def test_displacement_of_a_shaft_in_a_bore_equals_hand_calculation(
     kind, height, expected, one_joint
 ):
-    """At height h, the axis moves by up to c max(1, 2 |h| / L)."""
+    """The displacement of the axis at height h is at most c max(1, 2 |h| / L)."""
     posture = one_joint(kind, BORE, [0, 0, height])
     if kind == "revolute":
         assert reach(posture) == pytest.approx(expected, abs=1e-9)
@@ -85,20 +85,20 @@ def test_motion_of_a_shaft_in_a_bore_is_limited_by_the_clearance_at_its_ends(
 
 
 def bore_support(w, c=C, length=L):
-    """Most work of a wrench at O on the ends' offsets, |e(L/2)| and |e(-L/2)| <= c."""
+    """Return the support function for |e(L/2)| <= c and |e(-L/2)| <= c."""
     force, moment = w[3:5], np.array([w[1], -w[0]])
     ends = force / 2 + moment / length, force / 2 - moment / length
     return c * sum(np.linalg.norm(end) for end in ends)
 
 
 @pytest.mark.parametrize("reverse", [False, True])
-def test_small_screws_of_a_bore_equal_those_of_its_two_ends(reverse, one_joint, rng):
-    """The support function, the volume and sampled screws are compared."""
+def test_reachable_screws_of_a_bore_equal_hand_calculation(reverse, one_joint, rng):
+    """The support function, the volume and random screws are compared."""
     wrenches = rng.normal(size=(40, 6)) * [1 / L, 1 / L, 0, 1, 1, 0]
     posture = one_joint("revolute", BORE, reverse=reverse)
     found = heights(posture, wrenches)
     np.testing.assert_allclose(found, [bore_support(w) for w in wrenches], rtol=1e-7)
-    # (pi c^2)^2 / L^2, a quarter of radial = c and tilt = 2 c / L apart
+    # the volume is (pi c^2)^2 / L^2
     answer = solve_assembly(posture)
     to_screw = linearise(posture).platform @ answer.joints.cones
     volume = np.pi**2 * abs(np.linalg.det(to_screw[[0, 1, 3, 4]]))
@@ -115,8 +115,8 @@ def test_small_screws_of_a_bore_equal_those_of_its_two_ends(reverse, one_joint, 
     assert ((screws @ wrenches.T) <= found * (1 + 1e-7)).all()
 
 
-def test_largest_motion_of_a_shaft_in_a_bore_equals_that_of_finite_geometry(one_joint):
-    """The axis is a straight line through one point on each of the two rims."""
+def test_largest_displacement_in_a_bore_agrees_with_finite_geometry(one_joint):
+    """The axis is a straight line through points on the circles at both ends."""
     angles = np.linspace(0, 2 * np.pi, 61)
     rim = C * np.stack([np.cos(angles), np.sin(angles)], axis=1)
     low, high = (np.insert(rim, 2, z, axis=1) for z in (-L / 2, L / 2))
@@ -137,10 +137,10 @@ BEARINGS = (
 
 
 @pytest.mark.parametrize("reverse", [False, True])
-def test_two_bearings_limit_the_motion_of_the_axis_at_their_positions(
+def test_displacement_of_a_shaft_in_two_bearings_equals_hand_calculation(
     reverse, one_joint
 ):
-    """e(h) is linear between e(-20 mm) <= 10 um and e(60 mm) <= 5 um."""
+    """The displacement is linear in h and limited to 10 um and 5 um in the bearings."""
     for h, expected in ((-0.02, 10e-6), (0.06, 5e-6), (0.14, 20e-6), (-0.1, 25e-6)):
         posture = one_joint("cylindrical", BEARINGS, [0, 0, h], reverse=reverse)
         for direction in ([1, 0], [0.6, 0.8]):
@@ -148,15 +148,15 @@ def test_two_bearings_limit_the_motion_of_the_axis_at_their_positions(
             assert found == pytest.approx(expected, rel=1e-7)
 
 
-def test_axial_motion_and_spin_in_a_bore_have_separate_bounds(one_joint):
+def test_axial_and_spin_bounds_of_a_bore_are_independent(one_joint):
     posture = one_joint("revolute", BORE + ', axial = "5 um", spin = "1 mrad"')
     along, turn = heights(posture, [[0, 0, 0, 0, 0, 1], [0, 0, 1, 0, 0, 0]])
     assert along == pytest.approx(5e-6, rel=1e-7)
     assert turn == pytest.approx(1e-3, rel=1e-7)
 
 
-def test_round_guide_is_free_to_slide_and_its_key_bounds_its_roll(one_joint):
-    """Key with a gap of 20 um at a radius of 20 mm: 1 mrad."""
+def test_spin_bound_limits_rotation_in_a_round_guide(one_joint):
+    """A gap of 20 um at a radius of 20 mm limits the rotation about z to 1 mrad."""
     posture = one_joint("prismatic", BORE + ", spin = 1e-3")
     turn, aside = heights(posture, [[0, 0, 1, 0, 0, 0], [0, 0, 0, 0.6, 0.8, 0]])
     assert turn == pytest.approx(1e-3, rel=1e-7)
@@ -165,10 +165,8 @@ def test_round_guide_is_free_to_slide_and_its_key_bounds_its_roll(one_joint):
 
 
 @pytest.mark.parametrize("driven", [False, True])
-def test_nut_has_the_clearance_of_a_bore_and_a_backlash_along_its_thread(
-    driven, one_joint
-):
-    """Tr 16 x 4, 50 um from flank to flank: |TZ - h RZ| <= 25 um, h = 4 mm / 2 pi."""
+def test_clearance_of_a_nut_with_bore_equals_hand_calculation(driven, one_joint):
+    """The axial clearance is |TZ - h RZ| <= 25 um with the lead h = 4 mm / (2 pi)."""
     keys = 'axis = [0, 0, 1]\npitch = "4 mm"'
     keys += "\nactuated = true" if driven else ""
     text = BORE + ', axial = "25 um"'
@@ -179,7 +177,7 @@ def test_nut_has_the_clearance_of_a_bore_and_a_backlash_along_its_thread(
     assert mobility(posture).drives == driven
 
 
-def test_only_the_main_frame_of_a_driven_joint_is_its_drive(one_joint):
+def test_driven_joint_with_contacts_has_one_driven_frame(one_joint):
     keys = "axis = [0, 0, 1]\nactuated = true\nposition = 0.1\nlimits = [0, 1]"
     for text in (BORE, GUIDE):
         posture = one_joint("prismatic", text, keys=keys)
@@ -190,8 +188,8 @@ def test_only_the_main_frame_of_a_driven_joint_is_its_drive(one_joint):
 
 
 @pytest.mark.parametrize("axis2", [[0, 1, 0], [1, 1, 0]])
-def test_a_cross_adds_the_clearances_of_its_two_bearings(axis2, one_joint):
-    """c = a = 10 um, L = 30 mm: 20 um along each axis, 4 c / L = 1.33 mrad about n."""
+def test_clearances_of_universal_joint_bearings_add_up(axis2, one_joint):
+    """The clearances are 20 um along each axis and 1.33 mrad about the normal."""
     clearance = 'radial = "10 um", axial = "10 um", length = "30 mm"'
     keys = f"axis = [1, 0, 0]\naxis2 = {axis2}"
     posture = one_joint("universal", clearance, keys=keys)
@@ -201,16 +199,14 @@ def test_a_cross_adds_the_clearances_of_its_two_bearings(axis2, one_joint):
     assert normal == pytest.approx(20e-6, rel=1e-7)
     assert about == pytest.approx(4 * 10e-6 / 30e-3, rel=1e-7)
     for along, other in ((a1, a2), (a2, a1)):
-        # the other pair adds its axial gap and its disc, by their angle
+        # axial and radial clearance of the other bearing, projected on this direction
         c = abs(along @ other)
         expected = 10e-6 * (1 + c + np.sqrt(1 - c**2))
         found = heights(posture, [[0, 0, 0, *along]])[0]
         assert found == pytest.approx(expected, rel=1e-7)
 
 
-def test_ball_joint_moves_up_to_its_gap_in_every_direction_and_turns_freely(
-    one_joint, rng
-):
+def test_ball_joint_has_clearance_in_all_directions(one_joint, rng):
     posture = one_joint("spherical", 'ball = "10 um"', keys="")
     assert reach(posture) == pytest.approx(C, abs=1e-9)
     directions = rng.normal(size=(10, 3))
@@ -219,8 +215,8 @@ def test_ball_joint_moves_up_to_its_gap_in_every_direction_and_turns_freely(
     assert mobility(posture).freedoms == 3
 
 
-def test_a_guide_may_have_different_gaps_and_axes(one_joint):
-    """Gaps 10 um along x, the direction of axis2, and 4 um along y."""
+def test_guide_has_different_gaps_along_x_and_y(one_joint):
+    """The gaps are 10 um along x, which is the direction of ``axis2``, and 4 um."""
     text = GUIDE.replace("1e-5", '["10 um", "4 um"]')
     keys = "axis = [0, 0, 1]\naxis2 = [0, 1, 0]"
     posture = one_joint("prismatic", text, keys=keys)
@@ -234,8 +230,8 @@ def test_a_guide_may_have_different_gaps_and_axes(one_joint):
     ("spherical", 'ball = "10 um"'), ("prismatic", GUIDE), ("planar", PAD),
     ("revolute", BEARINGS),
 ])  # fmt: skip
-def test_contacts_do_not_change_the_mobility(kind, clearance, one_joint, tmp_path):
-    """The mobility is also preserved in a written file with frames."""
+def test_mobility_does_not_depend_on_contacts(kind, clearance, one_joint, tmp_path):
+    """The mobility is preserved if the robot is written to a file with frames."""
     keys = "axis = [0, 0, 1]\naxis2 = [0, 1, 0]"
     bare, own = (mobility(one_joint(kind, text, keys=keys)) for text in ("", clearance))
     assert vars(bare) == vars(own)
@@ -250,7 +246,7 @@ def test_contacts_do_not_change_the_mobility(kind, clearance, one_joint, tmp_pat
 
 @pytest.fixture
 def held_shaft(tmp_path):
-    """Return a function that reads a shaft in a bore, sprung, and off by an error."""
+    """Return a function that reads a loop of a spring, a bore and an error."""
 
     def read(error, clearance):
         file = tmp_path / "held.toml"
@@ -291,10 +287,8 @@ STIFFNESS = [2e3, 3e3, 1e3, 2e6, 1e6, 4e6]
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_energy_of_a_forced_bore_equals_that_of_its_two_ends_solved_by_cvxpy(
-    seed, held_shaft
-):
-    """Least v K v / 2 of a spring's screw v; v + clearance + error close the loop."""
+def test_energy_of_a_bore_agrees_with_cvxpy(seed, held_shaft):
+    """The energy is the minimum of v K v / 2 with v + clearance + error = 0."""
     import cvxpy as cp
 
     rng = np.random.default_rng(seed)
@@ -313,8 +307,8 @@ def test_energy_of_a_forced_bore_equals_that_of_its_two_ends_solved_by_cvxpy(
     assert found.energy == pytest.approx(problem.value * 1e-6, rel=1e-6)
 
 
-def test_energy_of_a_bore_equals_that_of_a_pin_in_two_bushes(held_shaft, rng):
-    """Bushes at +-20 mm: radial 10 um, tilt 10 um / 20 mm, as one pair of discs."""
+def test_energy_of_a_bore_equals_that_of_two_bushes(held_shaft, rng):
+    """The bushes at +-20 mm have a radial clearance of 10 um."""
     for _ in range(4):
         error = rng.normal(size=6) * [1e-3, 1e-3, 1e-3, 2e-5, 2e-5, 2e-5]
         bushes = solve_bushes(held_shaft(error, 'radial = "10 um", tilt = "0.5 mrad"'))
@@ -323,15 +317,15 @@ def test_energy_of_a_bore_equals_that_of_a_pin_in_two_bushes(held_shaft, rng):
 
 
 @pytest.mark.exudyn
-def test_crosscheck_of_a_bore_passes(held_shaft):
-    """The simulation moves the two frames of the bore by finite rotations."""
+def test_multibody_simulation_of_a_bore_agrees(held_shaft):
+    """The multibody simulation includes finite rotations of the contact frames."""
     error = [4e-3, -7e-3, 2e-3, 9e-5, -6e-5, 7e-5]
     check = crosscheck(held_shaft(error, BORE), (1.0, 0.5, 0.25), clearances=True)
     assert check.passed, check.checks
 
 
 @pytest.mark.parametrize("clearance", [BORE, 'ball = "10 um"'])
-def test_both_exact_methods_agree_with_contacts(clearance, held_shaft):
+def test_exact_methods_agree_for_bore_and_ball(clearance, held_shaft):
     posture = held_shaft([4e-3, -7e-3, 2e-3, 90e-6, -60e-6, 70e-6], clearance)
     one, other = (solve_exact(posture, method=m) for m in ("compiled", "reference"))
     assert one.energy == pytest.approx(other.energy, rel=1e-9)
@@ -341,10 +335,8 @@ def test_both_exact_methods_agree_with_contacts(clearance, held_shaft):
 
 
 @pytest.mark.parametrize("clearance", [BORE, 'ball = "10 um"'])
-def test_exact_model_differs_from_the_linear_model_by_second_order(
-    clearance, held_shaft
-):
-    """If errors and clearances are halved, the difference is divided by four."""
+def test_exact_solution_with_contacts_differs_by_second_order(clearance, held_shaft):
+    """If errors and clearances are scaled by s, the difference is O(s^2)."""
     error = np.array([4e-3, -7e-3, 2e-3, 90e-6, -60e-6, 70e-6])
     posture, sizes = held_shaft(error, clearance), []
     for scale in (1.0, 0.5, 0.25):
@@ -358,7 +350,7 @@ def test_exact_model_differs_from_the_linear_model_by_second_order(
 
 
 def drawn_positions(posture, model, count=3000):
-    """(k, 6) platform screws of a clearance model."""
+    """Return random platform screws for a clearance model, (count, 6)."""
     prepared = linear_response(posture)
     draws = prepared.solve(np.zeros((count, len(posture.robot.frames), 6)))
     rngs = [np.random.default_rng([5, k]) for k in range(count)]
@@ -367,7 +359,7 @@ def drawn_positions(posture, model, count=3000):
     return screws
 
 
-def test_uniform_positions_in_a_ball_have_a_uniform_cubed_radius(one_joint):
+def test_random_positions_in_a_ball_joint_are_uniform(one_joint):
     from scipy import stats
 
     at = drawn_positions(one_joint("fixed", 'ball = "10 um"'), "uniform")[:, 3:] / C
@@ -376,7 +368,7 @@ def test_uniform_positions_in_a_ball_have_a_uniform_cubed_radius(one_joint):
     assert stats.kstest(at[:, 2] / radius / 2 + 0.5, "uniform").pvalue > 1e-3
 
 
-def test_contact_positions_in_a_ball_are_uniform_on_its_surface(one_joint):
+def test_contact_positions_of_a_ball_joint_are_uniform_on_sphere(one_joint):
     from scipy import stats
 
     at = drawn_positions(one_joint("fixed", 'ball = "10 um"'), "contact")[:, 3:] / C
@@ -385,9 +377,10 @@ def test_contact_positions_in_a_ball_are_uniform_on_its_surface(one_joint):
         assert stats.kstest(x / 2 + 0.5, "uniform").pvalue > 1e-3
 
 
-def test_uniform_positions_in_a_bore_have_uniform_ends(one_joint):
-    """Standard deviations c / 2 sqrt 2 and c / (sqrt 2 L) of each axis; their sizes
-    have a correlation of -0.52.
+def test_standard_deviations_in_a_bore_equal_hand_calculation(one_joint):
+    """The standard deviations are c / (2 sqrt 2) and c / (sqrt 2 L).
+
+    The magnitudes of tilt and shift have a correlation of -0.52.
     """
     at = drawn_positions(one_joint("fixed", BORE), "uniform")
     tilt, shift = at[:, :2], at[:, 3:5]

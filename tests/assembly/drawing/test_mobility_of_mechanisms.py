@@ -1,7 +1,7 @@
 """Mobility and redundant constraints of mechanisms from the literature.
 
-The expected counts were computed in another program from the singular values of the
-joint screws.  Where the closures are independent, they agree with Kutzbach's formula.
+The expected numbers were computed by another program from the singular values of the
+joint screws.
 """
 
 import numpy as np
@@ -23,7 +23,7 @@ X, Y, Z = np.eye(3)
 
 
 def joint(kind, first, second, at, axis=Z, axis2=None, driven=False):
-    """Return a joint named after its bodies."""
+    """Return a joint whose name consists of the names of its bodies."""
     axis = unit(np.array(axis, float))
     across = perpendicular(axis) if axis2 is None else perpendicular(axis, axis2)
     axis2 = across if axis2 is None else unit(np.array(axis2, float))
@@ -40,7 +40,7 @@ def mechanism(platform, at, *joints):
 
 
 def turn(angle, axis=Z):
-    """(3, 3) about an axis."""
+    """Return the rotation by an angle [rad] about an axis, (3, 3)."""
     K = np.cross(np.eye(3), axis)
     return np.eye(3) - np.sin(angle) * K + (1 - np.cos(angle)) * K @ K
 
@@ -60,10 +60,11 @@ def four_bar():
 
 
 def bennett(turned=0.0):
-    """Bennett's linkage of twists 50 and 100 deg, one axis turned [rad] off its own.
+    """Return Bennett's linkage with twist angles of 50 and 100 deg.
 
-    Its angles at home are those of the closed form, tan(q1 / 2) tan(q2 / 2) =
-    sin((beta + alpha) / 2) / sin((beta - alpha) / 2), q3 = -q1, q4 = -q2.
+    One axis can be rotated by an angle [rad].  The joint angles satisfy tan(q1 / 2)
+    tan(q2 / 2) = sin((beta + alpha) / 2) / sin((beta - alpha) / 2), q3 = -q1 and
+    q4 = -q2.
     """
     alpha, beta, a = np.deg2rad(50), np.deg2rad(100), 0.2
     b = a * np.sin(beta) / np.sin(alpha)
@@ -80,12 +81,12 @@ def bennett(turned=0.0):
         R = R @ turn(q)
         p = p + R @ (length * X)
         R = R @ turn(twist, X)
-    assert np.abs(p).max() < 1e-12  # the loop closes
+    assert np.abs(p).max() < 1e-12  # the loop is closed
     return mechanism("two", [0.1, 0.2, 0.3], *joints)
 
 
 def sarrus():
-    """Two legs of three parallel axes each, along x and along y."""
+    """Return a Sarrus linkage with two legs of three parallel axes."""
     legs = []
     for name, axis, side in (("a", X, Y), ("b", Y, X)):
         legs += [
@@ -97,7 +98,7 @@ def sarrus():
 
 
 def agile_eye():
-    """All axes through one point; arcs of a right angle."""
+    """Return a spherical robot whose axes intersect at one point."""
     joints = []
     for k, axis in enumerate(np.eye(3)):
         middle, last = np.roll(axis, 1), np.roll(axis, 2)
@@ -111,7 +112,7 @@ def agile_eye():
 
 
 def three_upu(outer, radius=0.08):
-    """Outer axes tangential (Tsai) or radial (SNU); radius of the platform [m]."""
+    """Return a 3-UPU robot with given outer joint axes and platform radius [m]."""
     joints = []
     for k, R in enumerate(thirds()):
         low, high = np.array([0.24, 0, 0]), np.array([radius, 0, 0.45])
@@ -126,7 +127,7 @@ def three_upu(outer, radius=0.08):
 
 
 def delta(rods):
-    """Rods between balls; or parallelograms of four hinges at the arms' ends."""
+    """Return a delta robot with ball joints, or with revolute joints otherwise."""
     joints = []
     for k, R in enumerate(thirds()):
         foot, elbow, end = ([0.2, 0, 0], [0.5, 0, -0.3], [0.1, 0, -0.9])
@@ -151,9 +152,10 @@ def delta(rods):
 
 
 def gough(first, shift=(0, 0, 0), rotation=np.eye(3), axis_along=False):  # noqa: B008
-    """6-UPS or 6-SPS, its platform moved.
+    """Return a 6-UPS or 6-SPS robot with a displaced platform.
 
-    The cross's first axis is level, or along the leg where the platform is not moved.
+    The first axis of a universal joint is horizontal, or parallel to the leg in the
+    home pose if ``axis_along`` is true.
     """
     joints = []
     for k, (a, corner) in enumerate(zip(*points(), strict=True)):
@@ -172,7 +174,8 @@ def gough(first, shift=(0, 0, 0), rotation=np.eye(3), axis_along=False):  # noqa
     return mechanism("platform", 0.53 * Z, *joints)
 
 
-# freedoms, of the platform, with drives locked, of the platform, redundant constraints
+# degrees of freedom of the mechanism and of the platform, first with free and then with
+# locked drives; number of redundant constraints
 MECHANISMS = {
     "four_bar": (four_bar, (1, 1, 0, 0, 3)),
     "bennett": (bennett, (1, 1, 0, 0, 3)),
@@ -198,16 +201,15 @@ def counts(posture):
 
 
 @pytest.mark.parametrize("name", MECHANISMS)
-def test_mechanisms_have_the_degrees_of_freedom_given_in_the_literature(name):
+def test_mechanisms_have_degrees_of_freedom_of_the_literature(name):
     make, expected = MECHANISMS[name]
     assert counts(home_posture(make())) == expected
 
 
-def test_seoul_robot_has_three_degrees_of_freedom_away_from_home():
-    """The platform is moved by 0.13 m; for equal triangles, all legs stay parallel.
+def test_snu_robot_has_three_degrees_of_freedom_outside_home_pose():
+    """The legs remain parallel, because base and platform are equal triangles.
 
-    Two motions remain free with locked drives, so that two of their three constraints
-    are redundant.
+    With locked drives, the platform has two degrees of freedom.
     """
     pose = {"tx": 0.1, "ty": 0.08, "tz": 0.45, "rx": 0.0, "ry": 0.0, "rz": 0.0}
     at = place_robot(three_upu(X, 0.24), pose)
@@ -215,20 +217,20 @@ def test_seoul_robot_has_three_degrees_of_freedom_away_from_home():
     assert mobility(at).overconstraint == 0
 
 
-def test_tsai_robot_has_the_same_degrees_of_freedom_away_from_home():
+def test_tsai_robot_has_three_degrees_of_freedom_outside_home_pose():
     at = place_robot(three_upu(Y), {"tx": 0.05, "ty": 0.02, "tz": 0.5})
     assert counts(at) == (3, 3, 0, 0, 0)
     rotation = [at.pose()[key] for key in ("rx", "ry", "rz")]
     assert rotation == pytest.approx([0.0] * 3, abs=1e-9)
 
 
-def test_four_bar_with_lengths_that_violate_bennetts_condition_is_rigid():
-    """Rotating one axis by 0.1 rad changes two twist angles."""
+def test_bennett_linkage_with_wrong_twist_angle_is_rigid():
+    """One axis is rotated by 0.1 rad, which changes two twist angles."""
     assert counts(home_posture(bennett(0.1)))[0] == 0
 
 
-def test_leg_can_rotate_at_home_if_universal_joint_axes_lie_along_it():
-    """At home: 9 degrees of freedom, 3 redundant constraints; nearby: 6 and none."""
+def test_legs_can_rotate_if_universal_joint_axes_are_parallel_to_legs():
+    """The robot has 9 degrees of freedom in the home pose and 6 in other poses."""
     robot = gough("universal", axis_along=True)
     home = home_posture(robot)
     assert (mobility(home).freedoms, mobility(home).overconstraint) == (9, 3)

@@ -133,7 +133,7 @@ def weight_on_the_ground(robot):
 
 @pytest.mark.parametrize("ending", ["urdf", "xml"])
 def test_total_weight_is_equal_after_two_conversions(ending, tmp_path):
-    """The total weight is equal, because beams with a density become masses."""
+    """Beams with a density become masses."""
     there, back = tmp_path / f"robot.{ending}", tmp_path / "back.toml"
     convert("arm6", there)
     convert(there, back)

@@ -97,8 +97,8 @@ def four_bar(closing, folder):
 
 LINKS = '<link1 link="c" xyz="0.4 0 0"/><link2 link="d" xyz="0 0.2 0" rpy="0 0 0"/>'
 CLOSING = {
-    # the last number of each entry is that of redundant constraints by Gruebler's
-    # formula: 1 - (18 - 3 * 5) + number of constraints of the joint
+    # the number of redundant constraints by Gruebler's formula is
+    # 1 - (18 - 3 * 5) + number of constraints of the joint
     "spherical": (f'<loop_joint name="l" type="spherical">{LINKS}</loop_joint>', 1),
     "ball": (f'<drake:loop_joint name="l" type="ball">{LINKS}</drake:loop_joint>', 1),
     "continuous": (

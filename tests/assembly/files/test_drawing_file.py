@@ -576,8 +576,9 @@ REFUSED = {
         'expected exactly one of "beam" | "curve" | "stiffness" | "mesh" | "library"'),
     "the name of another joint's frame": (
         'name = "slide"', 'name = "lower.second"',
-        'joint "leg1.lower.second": found "leg1.lower.second" as the name of a frame '
-        'that joint "leg1.lower" also has; expected a different name'),
+        'joint "leg1.lower.second": found "leg1.lower.second" as the name of a frame, '
+        'which is also the name of a frame of joint "leg1.lower"; expected a different '
+        "name"),
     "copies": (
         "count = 3", "count = 0",
         'leg "leg".repeat.count: found 0, expected a whole number >= 1'),

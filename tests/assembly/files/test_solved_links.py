@@ -89,7 +89,9 @@ OF_A_SHAPE = {
 
 def refuse(*given, **named):
     """Fail if a solver reads a file or solves a finite-element model."""
-    raise AssertionError(f"below the loading of a robot: {given[:1]}")
+    raise AssertionError(
+        f"a file was read or a finite-element model solved: {given[:1]}"
+    )
 
 
 @pytest.fixture(scope="module")
