@@ -1,10 +1,10 @@
-"""Questions of every kind, and their answers as numbers that can be stored.
+"""Regression tests: compute results of many functions and store them as numbers.
 
-    python -m tests.answers_for_tests [NAME ...]    # stores all answers, or these
+    python -m tests.answers_for_tests [NAME ...]    # stores all results, or the named
 
-Stored numbers prove nothing about mechanics; the laws beside them do.  They tell that a
-change which was to change nothing changed nothing.  Left out is what rounding decides:
-what changes where the inputs are moved by 1e-12, or on an older processor.
+The stored numbers show whether a refactoring has changed a result.  Numbers that depend
+on rounding are not stored: those that change if the inputs change by 1e-12, or if the
+processor has no wide vector instructions.
 """
 
 import dataclasses
@@ -51,33 +51,33 @@ from tests.robots_for_tests import NUMBERS, irsbot2_with
 from tests.tolerances_for_tests import plan_for
 
 STORED = Path(__file__).with_name("answers.json")
-ROOT = Path(__file__).parents[1]  # wherever that is checked out
-NUDGE = 1e-12  # relative, of inputs
-# differs from one run or machine to the next, or is the size of rounding
+ROOT = Path(__file__).parents[1]  # root folder of the repository
+NUDGE = 1e-12  # relative change of the inputs
+# names of values that depend on the run or on the machine, or are rounding errors
 LEFT_OUT = (
     "seconds", "version", "sha256", "created", "path", "solver", "residual", "gap",
     "excess", "stationarity", "mismatch", "linearisation_error", "cuts",
-    "behind",  # eigenvectors are of either sign, and a rank that numbers decide
+    "behind",  # eigenvectors of arbitrary sign, with a rank that rounding can change
 )  # fmt: skip
-# fields of results that repeat what was asked, or what is worked out on the way
+# fields of results that contain inputs or intermediate results
 NO_ANSWERS = {"robot", "linearisation", "joints", "plan", "sources"}
-STEADY = 3e-8  # relative change of an answer so moved that is none
-SMALLEST = 1e-8  # in SI: what is smaller is compared with it
-PRINTED = "--print"  # the answers, instead of storing them
-# a processor without wide vectors: sums in other orders
+STEADY = 3e-8  # largest relative change attributed to rounding
+SMALLEST = 1e-8  # [SI units] smallest scale for relative changes
+PRINTED = "--print"  # print the results instead of storing them
+# environment that emulates a processor without wide vector instructions
 OLDER = {
     "OPENBLAS_CORETYPE": "Nehalem", "NPY_DISABLE_CPU_FEATURES": "X86_V3",
     "PYTHONWARNINGS": "ignore",
 }  # fmt: skip
-FEW = 6  # numbers that are stored one by one; of more, two sums
-LONG = 200  # letters, of which the numbers are stored
+FEW = 6  # largest array whose numbers are stored individually
+LONG = 200  # [characters] only the numbers in longer texts are stored
 NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e-?\d+)?(?![\w.])")
 
 Leaf = str | list[float]
 
 
 def leaves(answer: Any) -> dict[str, Leaf]:
-    """Words and numbers of an answer, gathered by their names; of many two sums."""
+    """Return the texts and numbers in a result by name; long arrays are reduced."""
     gathered: dict[str, list[Any]] = {}
     _gather(answer, "", gathered, set())
     found: dict[str, Leaf] = {}
@@ -94,7 +94,7 @@ def leaves(answer: Any) -> dict[str, Leaf]:
 
 
 def _gather(value: Any, place: str, to: dict[str, list], above: set[int]) -> None:
-    """Words and arrays of a tree of objects, under the names that lead to them."""
+    """Collect the texts and arrays in nested objects by their path."""
     if isinstance(value, str):
         to.setdefault(f"{place}:", []).append(value.replace(f"{ROOT}{os.sep}", ""))
     if value is None or isinstance(value, str) or id(value) in above:
@@ -108,7 +108,7 @@ def _gather(value: Any, place: str, to: dict[str, list], above: set[int]) -> Non
         for name, one in value.items():
             passing = any(word in str(name) for word in LEFT_OUT)
             if name not in left_out and not passing:
-                # what is named by its number or its frame is gathered
+                # values whose keys are numbers or frame names share one path
                 own = name if str(name).isidentifier() else ""
                 _gather(one, f"{place}/{own}", to, above)
         return
@@ -118,7 +118,7 @@ def _gather(value: Any, place: str, to: dict[str, list], above: set[int]) -> Non
     elif scipy.sparse.issparse(value):
         array = value.tocoo().data
     if array is not None and array.dtype.kind in "bif":
-        # how it is shaped counts as well
+        # the shape is stored as well
         shaped = np.r_[array.ravel().astype(float), array.shape]
         to.setdefault(place, []).append(shaped if array.ndim else shaped[:1])
     elif isinstance(value, list | tuple):
@@ -127,7 +127,7 @@ def _gather(value: Any, place: str, to: dict[str, list], above: set[int]) -> Non
 
 
 def numbers(array: np.ndarray, place: str) -> dict[str, Leaf]:
-    """Few numbers as they are; of many their count, the norm and a weighted sum."""
+    """Return a short array, or the length, norm and weighted sum of a long one."""
     if len(array) <= FEW:
         return {place: array.tolist()}
     known = np.where(np.isfinite(array), array, 0.0)
@@ -139,18 +139,18 @@ def numbers(array: np.ndarray, place: str) -> dict[str, Leaf]:
 
 
 def machine(name: str, nudge: float) -> Robot:
-    """A built-in robot with errors of its own."""
+    """Return a built-in robot with random geometric errors."""
     robot = load_robot(name)
     rng = np.random.default_rng(sum(map(ord, name)))
     scales = [1e-3, 1e-3, 1e-3, 5e-4, 5e-4, 5e-4]
     errors = rng.uniform(-1, 1, (len(robot.frames), 6)) * scales
-    if name == "irsbot2":  # most of its bodies are rigid: nothing would close
+    if name == "irsbot2":  # errors of rigid bodies would prevent assembly
         errors[[frame.link is None for frame in robot.frames]] = 0.0
     return robot.with_errors(errors * (1 + nudge))
 
 
 def linear(name: str, nudge: float) -> Any:
-    """Energy, margins and largest pose errors, without a load."""
+    """Compute energy, margins and largest pose errors without a load."""
     posture = place_robot(machine(name, nudge))
     along = [1.0, 0.5, 0.2, 1e-2, -2e-2, 3e-2]
     errors = pose_error_of(posture, point=(0.01, -0.02, 0.03), direction=along, **CLOSE)
@@ -162,7 +162,7 @@ def linear(name: str, nudge: float) -> Any:
 
 
 def loaded(name: str, nudge: float) -> Any:
-    """Linear and exact, in the workspace's middle, under a load and gravity."""
+    """Compute linear and exact results under a load and gravity."""
     where = {key: (low + 2 * high) / 3 for key, (low, high) in WORKSPACE[name].items()}
     posture = place_robot(machine(name, nudge), where)
     load, gravity = np.array(LOAD) / 4, (0.0, -1.0, -9.81)
@@ -173,7 +173,7 @@ def loaded(name: str, nudge: float) -> Any:
 
 
 def drawn(clearance: str, nudge: float) -> Any:
-    """A few draws of the paper's errors."""
+    """Compute results for a few random draws of the errors of IRSBot-2."""
     posture = place_robot(load_robot("irsbot2"))
     experiment = Experiment(
         posture, sources_of(nudge), 3, clearance, stiffness="contact",
@@ -193,14 +193,14 @@ def drawn(clearance: str, nudge: float) -> Any:
 
 
 def sources_of(nudge: float) -> Any:
-    """Distributions of the paper's errors."""
+    """Return the error distributions of IRSBot-2."""
     path = ROOT / "examples" / "irsbot2_errors.toml"
     sources = read_sources(path, load_robot("irsbot2"))
     return dataclasses.replace(sources, limit=sources.limit * (1 + nudge))
 
 
 def allocated(limits: dict[str, float], asked: float, nudge: float) -> Any:
-    """Tolerances of the paper's robot at two postures, and its present errors."""
+    """Allocate tolerances of IRSBot-2 at two postures; assess its declared errors."""
     robot = irsbot2_with(NUMBERS["cases"][0], 0.2 * (1 + nudge))
     postures = [place_robot(robot, {"tx": x, "tz": -0.5}) for x in (0.0, 0.1)]
     frames = [f.name for f in robot.frames if f.link is not None][:2]
@@ -213,7 +213,7 @@ def allocated(limits: dict[str, float], asked: float, nudge: float) -> Any:
 
 
 def bar(section: dict[str, float], interface: str, nudge: float) -> Any:
-    """A straight bar by finite elements: K_E, error, mass, stress, both its ends."""
+    """Compute stiffness, mass and stress of a straight bar by finite elements."""
     material = Material(7e10, 0.33, density=2700.0)
     options = FemOptions(accuracy=0.5, interface=interface)
     sizes = {name: size * (1 + nudge) for name, size in section.items()}
@@ -243,7 +243,7 @@ QUESTIONS: dict[str, Callable[[float], Any]] = {
 
 
 def close(was: Leaf | None, now: Leaf | None, relative: float) -> bool:
-    """Whether numbers are the same but for rounding, and words the same."""
+    """Return whether texts are equal and numbers equal up to rounding."""
     if not isinstance(was, list) or not isinstance(now, list) or len(was) != len(now):
         return was == now
     size = max(np.abs(np.array(was)[np.isfinite(was)]).max(initial=0.0), SMALLEST)
@@ -251,7 +251,7 @@ def close(was: Leaf | None, now: Leaf | None, relative: float) -> bool:
 
 
 def stored_anew(names: list[str]) -> dict[str, dict[str, Leaf]]:
-    """Of each answer the leaves that rounding does not decide."""
+    """Return the values of each result that do not depend on rounding."""
     words = [sys.executable, "-m", "tests.answers_for_tests", PRINTED, *names]
     older = subprocess.run(
         words, env=os.environ | OLDER, stdout=subprocess.PIPE, check=True
@@ -270,12 +270,12 @@ def stored_anew(names: list[str]) -> dict[str, dict[str, Leaf]]:
 
 
 def rounded(value: Leaf) -> Leaf:
-    """As many digits as are compared, and three more."""
+    """Round numbers to 9 significant digits, three more than are compared."""
     return [float(f"{x:.9g}") for x in value] if isinstance(value, list) else value
 
 
 def main() -> None:
-    """Store answers."""
+    """Compute and store results."""
     names = [name for name in sys.argv[1:] if name != PRINTED] or [*QUESTIONS]
     if PRINTED in sys.argv:
         answers = {name: leaves(QUESTIONS[name](0.0)) for name in names}
@@ -289,7 +289,7 @@ def main() -> None:
 
 
 def written(answers: dict[str, dict[str, Leaf]]) -> str:
-    """JSON in which changes are seen line by line."""
+    """Format results as JSON with one value per line, for readable diffs."""
     parts = []
     for name, answer in answers.items():
         lines = (f"{json.dumps(k)}: {json.dumps(v)}" for k, v in answer.items())

@@ -1,8 +1,8 @@
-"""Accessibility of a page in a browser, by axe-core: WCAG and good practice.
+"""Check the accessibility of a page in a browser with axe-core.
 
-A frame within a page is not read: axe-core waits for an answer of each frame, which a
-frame that is loaded or removed in the meantime never gives.  The scenes that the
-gallery shows in frames are read as pages of their own.
+Frames within a page are not checked, because axe-core may wait forever for a frame that
+is loaded or removed during the check.  The scenes that the gallery shows in frames are
+checked as separate pages.
 """
 
 from importlib.resources import files
@@ -18,7 +18,7 @@ RUN = (
 
 
 def violations(tab, impacts=("serious", "critical")):
-    """Rules of these impacts that a page breaks, and where; skips without axe-core."""
+    """Return the violated rules of a page; skip the test if axe-core is missing."""
     pytest.importorskip("axe_core_python", reason="axe-core is absent")
     script = files("axe_core_python").joinpath("axe.min.js").read_text("utf-8")
     tab.set_script_timeout(60)

@@ -1,4 +1,4 @@
-"""A drive about z and a bar along x, measured at some angles; what may be wrong."""
+"""Simulated measurements of a bar that one drive turns about z."""
 
 import numpy as np
 
@@ -21,7 +21,7 @@ LENGTH = 0.8
 
 def bar(load=None, measured=None, link=None, rows=8, spread=2.0, spring=None,
         **covariates):  # fmt: skip
-    """A drive about z and a bar along x, at ``rows`` angles; readings, or zeros."""
+    """Return a campaign of a bar along x on a drive about z, at ``rows`` angles."""
     robot = Robot("bar", "tip", (
         Frame("drive", joint="revolute", actuated=True, joint_stiffness=spring),
         Frame("tip", "drive", [LENGTH, 0, 0], link=link),
@@ -43,7 +43,7 @@ def bar(load=None, measured=None, link=None, rows=8, spread=2.0, spring=None,
 
 
 def along(campaign):
-    """(R, 3) direction of the bar."""
+    """Return the direction of the bar in each row, (R, 3)."""
     q = campaign.coordinates[:, 0]
     return np.column_stack([np.cos(q), np.sin(q), 0 * q])
 
@@ -69,25 +69,28 @@ def fit_of(campaign, longer):
 
 
 def gives_way(M, k):
-    """The bar under a moment, its drive of stiffness k: turn M/k, arc M L/k."""
+    """Return readings under a moment M if the drive has stiffness k.
+
+    The drive turns by M/k, and the tip moves by M L/k.
+    """
     across = np.cross([0, 0, 1], along(bar()))
     seen = np.hstack([np.tile([0, 0, M / k], (8, 1)), M * LENGTH / k * across])
     return bar([0, 0, M, 0, 0, 0], seen)
 
 
 def machine(campaign, *hypotheses, start=0.0):
-    """The bar with the unknowns of some hypotheses, fitted to all of its rows."""
+    """Fit the unknowns of some hypotheses to all rows of a campaign."""
     parts = [Acting(h, np.full(len(h.slots), start)) for h in hypotheses]
     unknowns = Unknowns(campaign.robot, tuple(parts))
     return fit_machine(campaign, unknowns, np.ones(len(campaign), bool))
 
 
 def columns_of(campaign):
-    """Columns of all effects and functions about the declared robot."""
+    """Return the derivative columns of all effects and functions."""
     return Columns(campaign, Derivatives(with_second_order(conditions_of(campaign))))
 
 
 def numbers(fit):
-    """Name, value and standard deviation of the first effect's parameters."""
+    """Return name, value and standard deviation of each fitted parameter."""
     found = parameters_of(fit, fit.unknowns.effects[0])
     return [(one.name, one.value, one.std) for one in found]

@@ -1,4 +1,4 @@
-"""Questions about beams, for ``answers_for_tests.py``: compliances and stresses."""
+"""Compliances and stresses of beams for ``answers_for_tests.py``."""
 
 import tempfile
 from collections.abc import Callable
@@ -31,7 +31,7 @@ SHAPES = {
 
 
 def sections(nudge: float) -> Any:
-    """Stresses of sections; compliances of straight and of curved beams."""
+    """Compute stresses in cross sections and compliances of beams."""
     a = 0.02 * (1 + nudge)
     found = {
         "round": [round_section(a, nu, hole) for nu in (0, NU) for hole in (0, 0.007)],
@@ -90,7 +90,7 @@ up = [0, 1, 0]
 
 
 def written(nudge: float) -> Any:
-    """Compliance of a curved beam given by a file."""
+    """Compute the compliance of a curved beam defined in a file."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "curve.toml"
         path.write_text(CURVE.format(start=repr(0.02 * (1 + nudge))))
@@ -98,7 +98,7 @@ def written(nudge: float) -> Any:
 
 
 def shapes(nudge: float) -> Any:
-    """Compliances of beams of each simple shape."""
+    """Compute the compliance of a beam of each shape."""
     return {
         name: curve_compliance(
             shape_beam(name, {key: s * (1 + nudge) for key, s in sizes.items()}, NU),

@@ -1,4 +1,4 @@
-"""What the tests of built-in robots share: workspaces, errors, compliances."""
+"""Workspaces and functions shared by the tests of built-in robots."""
 
 import itertools
 from dataclasses import replace
@@ -8,7 +8,7 @@ import numpy as np
 from forcefit.assembly.kinematics.posture import place_robot
 from forcefit.assembly.linear.energy import solve_assembly
 
-# boxes of platform poses, about those the robots are used in
+# typical workspace of each robot: range of each pose component [m, rad]
 WORKSPACE = {
     "irsbot2": {"tx": (-0.3, 0.3), "tz": (-0.6, -0.35)},
     "four_bar": {"tx": (0.02, 0.38)},
@@ -27,35 +27,35 @@ WORKSPACE = {
 }  # fmt: skip
 
 
-# widths asked of brackets that are compared digit by digit [rad, m]
+# tight gaps between bounds [rad, m], so that stored bounds can be compared
 CLOSE = {"tolerance_rotation": 1e-11, "tolerance_translation": 1e-11}
 LOAD = [3.0, -2.0, 1.0, 40.0, -30.0, 20.0]  # [N m, N]
 
 
 def random_pose(name, rng):
-    """A platform pose in the robot's workspace."""
+    """Return a random platform pose in the workspace of a robot."""
     return {key: rng.uniform(*box) for key, box in WORKSPACE[name].items()}
 
 
 def drives(robot):
-    """Names of the actuated joints."""
+    """Return the names of the actuated joints."""
     return [frame.name for frame in robot.frames if frame.actuated]
 
 
 def joints_of(posture):
-    """Coordinates of the actuated joints by name."""
+    """Return the coordinates of the actuated joints by name."""
     robot = posture.robot
     return {n: posture.coordinates[robot.index(n)] for n in drives(robot)}
 
 
 def only_drives_give(robot):
-    """The robot with rigid bodies and no clearance."""
+    """Return the robot with elastic joints only, and without clearances."""
     bare = (replace(f, link=None, clearance=None) for f in robot.frames)
     return replace(robot, frames=tuple(bare))
 
 
 def only_play(robot):
-    """The robot with nothing elastic at all."""
+    """Return the robot with clearances but without elasticity."""
     kept = {f.name: f.clearance for f in robot.frames}
     frames = (
         replace(f, link=None, joint_stiffness=None, clearance=kept[f.name])
@@ -65,13 +65,13 @@ def only_play(robot):
 
 
 def platform_compliance(posture):
-    """(6, 6) platform screws of unit loads: 1 N m and 1 N each."""
+    """Return the platform screws due to unit loads (1 N m, 1 N) as columns, (6, 6)."""
     loaded = (solve_assembly(posture, load) for load in np.eye(6))
     return np.column_stack([answer.platform_screw for answer in loaded])
 
 
 def drive_jacobian(posture, step=1e-4):
-    """(6, drives) platform screw per unit of each drive, by central differences."""
+    """Return the platform Jacobian by central differences, (6, drives)."""
     robot, here = posture.robot, joints_of(posture)
     R = posture.platform[:3, :3]
     columns = []
@@ -87,7 +87,12 @@ def drive_jacobian(posture, step=1e-4):
 
 
 def farthest_corner(lines, plays):
-    """Largest turn and shift of the platform if each line gives by plus or minus."""
+    """Return the largest rotation and translation if all clearances are at a bound.
+
+    Args:
+        lines: (k, k) map from the platform screw to the clearances.
+        plays: (k,) bound of each clearance.
+    """
     signs = np.array(list(itertools.product([-1, 1], repeat=len(plays))))
     screws = np.linalg.solve(lines, (signs * plays).T).T
     turns, shifts = np.split(

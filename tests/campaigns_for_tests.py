@@ -1,4 +1,4 @@
-"""Campaigns the tests share: folders, and readings in memory."""
+"""Measurement campaigns shared by several tests, in folders and in memory."""
 
 import numpy as np
 
@@ -40,10 +40,16 @@ NOISE = "[noise]\nrotation = 1e-5\nposition = 5e-6\n"
 
 def write_campaign(folder, head=HEAD, rows=ROWS, robot=ARM, toml=None, noise=NOISE,
                    extra=""):  # fmt: skip
-    """A folder with campaign.toml, measurements.csv and robot.toml; returns it.
+    """Write campaign.toml, measurements.csv and robot.toml, and return the folder.
 
-    ``toml`` replaces values of the campaign's keys (None drops one), ``extra`` follows
-    the table of noise.
+    Args:
+        folder: folder to write.
+        head: header line of the measurements.
+        rows: lines of the measurements.
+        robot: text of the robot file.
+        toml: values that replace those of the campaign file; None omits a key.
+        noise: text of the ``[noise]`` table.
+        extra: text at the end of the campaign file.
     """
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "robot.toml").write_text(robot)
@@ -57,7 +63,10 @@ def write_campaign(folder, head=HEAD, rows=ROWS, robot=ARM, toml=None, noise=NOI
 
 
 def campaign_of(measured, sigma=1.0, repeat=None, loads=None, **covariates):
-    """A campaign of readings (R, 6); rows of one ``repeat`` share a configuration."""
+    """Return a campaign with given readings (R, 6).
+
+    Rows with equal ``repeat`` have the same configuration.
+    """
     rows = len(measured)
     robot = Robot("post", "top", (Frame("top", translation=[0, 0, 1.0]),))
     repeat = np.arange(rows) if repeat is None else np.asarray(repeat)

@@ -1,9 +1,9 @@
-"""What several test files need."""
+"""Fixtures and settings of all tests."""
 
 import os
 
-# before numpy: on matrices as small as these a second thread only waits, but busily,
-# and the tests take twice the processor time
+# This must be set before numpy is imported.  For small matrices, additional threads
+# would double the processor time.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import sys
@@ -19,12 +19,11 @@ from hypothesis import settings
 from forcefit.commands import app as command
 from tests.schemas_for_tests import check_schema
 
-# a command is the same whenever it is called: its options are read from the signatures
-# once, not in each of a thousand tests
+# The option parser is created only once, which saves time in a thousand tests.
 typer.main.get_command = cache(typer.main.get_command)
 
-# The same cases in every run: a commit is judged by what it changes, not by luck.
-# Others, on purpose: pytest --hypothesis-profile search --hypothesis-seed N
+# Every run uses the same random examples, so that a failure is due to a change.
+# For new examples, run: pytest --hypothesis-profile search --hypothesis-seed N
 settings.register_profile("repeatable", derandomize=True)
 settings.register_profile("search", derandomize=False)
 settings.load_profile("repeatable")
@@ -32,13 +31,13 @@ settings.load_profile("repeatable")
 
 @pytest.fixture
 def rng() -> np.random.Generator:
-    """Random numbers that are the same in every run."""
+    """Return a random generator with a fixed seed."""
     return np.random.default_rng(20)
 
 
 @pytest.fixture
 def write_file(tmp_path: Path) -> Callable[[str | bytes], Path]:
-    """A function that writes a robot file and returns its path."""
+    """Return a function that writes a robot file and returns its path."""
 
     def write(content: str | bytes) -> Path:
         path = tmp_path / "robot.toml"
@@ -50,17 +49,20 @@ def write_file(tmp_path: Path) -> Callable[[str | bytes], Path]:
 
 @pytest.fixture
 def run(capsys, monkeypatch):
-    """Run the command in this process: exit status, standard output, error output."""
+    """Return a function that runs ``forcefit`` in this process.
+
+    The function returns the exit status, standard output and standard error.
+    """
 
     def call(*words):
         monkeypatch.setattr(sys, "argv", ["forcefit", *map(str, words)])
-        # pytest's own choice of warnings stays
+        # keeps the warning filters of pytest
         monkeypatch.setattr(sys, "warnoptions", ["default"])
         with pytest.raises(SystemExit) as done:
             command.main()
         out, err = capsys.readouterr()
         if done.value.code in {0, 1}:
-            check_schema(tuple(sys.argv[1:]), out)  # under the present names
+            check_schema(tuple(sys.argv[1:]), out)  # argv contains the new names
         return done.value.code, out, err
 
     return call

@@ -1,8 +1,9 @@
-"""A four-bar with toleranced lengths, and its worked numbers by hand.
+"""Four-bar linkage with toleranced lengths, and its error coefficients.
 
-Crank 0.1 m at 60 deg (driven), coupler 0.25, rocker 0.2, ground 0.3 m; the platform is
-the coupler at a point 50 mm off its middle.  Projected on the rocker's direction e4,
-the coupler turns by -(e2.e4 da + e3.e4 db - dc - ex.e4 dd)/(b sin(theta4 - theta3)).
+The lengths are 0.1 m (crank, driven, at 60 deg), 0.25 m (coupler), 0.2 m (rocker) and
+0.3 m (ground).  The platform is a point at a distance of 50 mm from the middle of the
+coupler.  Projecting the loop equation on the rocker direction e4 gives the coupler
+rotation -(e2.e4 da + e3.e4 db - dc - ex.e4 dd)/(b sin(theta4 - theta3)).
 """
 
 import math
@@ -28,7 +29,11 @@ axis = [0, 0, 1]
 
 
 def four_bar_file(clearance=""):
-    """Text of the robot file; clearance such as ``radial = 10e-6`` in each pin."""
+    """Return the text of the robot file.
+
+    Args:
+        clearance: clearance of each pin, for example ``radial = 10e-6``.
+    """
     B = (A_LENGTH / 2, A_LENGTH * math.sqrt(3) / 2)
     dx, dy = D_LENGTH - B[0], -B[1]
     size = math.hypot(dx, dy)

@@ -1,6 +1,6 @@
-"""Built-in robots and others of the literature as files of ``format = 2``.
+"""Built-in robots, described by bodies and joints in robot files of format 2.
 
-The numbers are points and axes of the home pose, from the robots' dimensions.
+The points and axes refer to the home pose and are computed from the dimensions.
 """
 
 import math
@@ -14,12 +14,12 @@ from forcefit.assembly.robots.planar import arm_angle
 
 
 def row(values):
-    """A TOML array of numbers."""
+    """Format numbers as a TOML array."""
     return "[" + ", ".join(repr(float(v)) for v in np.ravel(values)) + "]"
 
 
 def table(kind, **keys):
-    """``[[kind]]`` with its keys; arrays become lists, ``_from`` is ``from``."""
+    """Format a TOML table ``[[kind]]`` with the given keys."""
     lines = [f"[[{kind}]]"]
     for key, value in keys.items():
         if isinstance(value, np.ndarray):
@@ -45,7 +45,7 @@ def head(name, platform, at):
 
 
 def beam(link, up=None):
-    """The ``link`` of a beam of the library."""
+    """Format the value of the key ``link`` of a body."""
     section = ", ".join(f"{k} = {v!r}" for k, v in link.section.items())
     if up is not None:
         section += f", up = {row(up)}"
@@ -59,7 +59,7 @@ def beam(link, up=None):
 
 
 def bounds(clearance):
-    """The ``clearance`` of a joint."""
+    """Format the value of the key ``clearance`` of a joint."""
     given = {k: v for k, v in vars(clearance).items() if v is not None}
     return "{ " + ", ".join(f"{k} = {v!r}" for k, v in given.items()) + " }"
 
@@ -69,7 +69,7 @@ def _flat(point):
 
 
 def _planar_leg(kind, foot, angle, tip, leg, robot_joints=""):
-    """Drive, elbow and two elastic arms whose beams' height is across, in the plane."""
+    """Return the TOML tables of a planar leg with a drive, an elbow and two beams."""
     elbow = foot + leg.near * np.array([math.cos(angle), math.sin(angle)])
     across = np.array([-math.sin(angle), math.cos(angle), 0.0])
     along = (tip - elbow) / np.linalg.norm(tip - elbow)
@@ -135,7 +135,7 @@ def drawn_hexapod():
 
 
 def drawn_delta():
-    """A leg and its copies: arm, bar across its end, two rods between balls."""
+    """Return a robot file of a Delta robot whose legs are copies of one leg."""
     P = DeltaParameters()
     home = np.array([0.0, 0.0, P.home])
     angle = drive_angle(P, AZIMUTHS[0], home)

@@ -1,5 +1,4 @@
-"""Questions about effects and functions, for ``answers_for_tests.py``: what each adds
-to the readings of a campaign."""
+"""Readings changed by effects and functions, for ``answers_for_tests.py``."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -23,14 +22,14 @@ NAMES = ("encoder_offset", "base_compliance_drift")
 
 
 def rows(name: str, nudge: float, count: int = 12) -> Any:
-    """Conditions of the first rows of a campaign."""
+    """Return the conditions of the first rows of a campaign."""
     campaign = read_campaign(CAMPAIGNS / name)
     campaign = replace(campaign, loads=campaign.loads * (1 + nudge))
     return conditions_of(campaign.take(np.arange(len(campaign)) < count))
 
 
 def sized(effect: Any, robot: Any, places: tuple[str, ...]) -> dict[str, float]:
-    """Parameters of an effect at 0.7 of their usual size, less at later places."""
+    """Return parameters of an effect that decrease from one frame to the next."""
     values = {}
     for k, place in enumerate(places):
         for u in effect.unknowns(robot):
@@ -41,7 +40,7 @@ def sized(effect: Any, robot: Any, places: tuple[str, ...]) -> dict[str, float]:
 
 
 def effects(name: str, nudge: float) -> Any:
-    """Readings with each effect of the library."""
+    """Predict readings with each effect of the library."""
     conditions = rows(name, nudge)
     robot, found = conditions.robot, {}
     for key, effect in LIBRARY.items():
@@ -55,7 +54,7 @@ def effects(name: str, nudge: float) -> Any:
 
 
 def finite_effects(name: str, nudge: float) -> Any:
-    """Readings with finite motions and each effect of the library."""
+    """Predict readings with finite motions and each effect of the library."""
     conditions = replace(rows(name, nudge, 2), exact=True)
     robot, found = conditions.robot, {}
     for key, effect in LIBRARY.items():
@@ -105,7 +104,7 @@ FUNCTIONS = [
 
 
 def functions(nudge: float) -> Any:
-    """Readings with functions of every form, place and kind."""
+    """Predict readings with functions of all forms."""
     conditions = with_history(rows("base_compliance_drift", nudge))
     return {
         f"function_{k}": predict(apply_functions(conditions, [one])).deviation

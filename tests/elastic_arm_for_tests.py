@@ -1,4 +1,4 @@
-"""An arm of three elastic drives and two tubes, and rows at which it is read."""
+"""Serial arm with three elastic drives and tubular links, and its campaign."""
 
 from dataclasses import replace
 
@@ -15,7 +15,7 @@ DRIVES = ("j1", "j2", "j3")
 
 
 def arm(link=TUBE, **effects):
-    """No drive is parallel to the next; effects of its file."""
+    """Return an arm whose consecutive drive axes are not parallel."""
     turning = {"joint": "revolute", "actuated": True, "joint_stiffness": SPRING}
     robot = Robot("arm", "tool", (
         Frame("j1", **turning),
@@ -27,13 +27,13 @@ def arm(link=TUBE, **effects):
 
 
 def with_errors(robot, wider=1.0):
-    """The robot with errors of every frame, of up to 0.1 mrad and 50 um."""
+    """Return the robot with random errors of up to 0.1 mrad and 50 um per frame."""
     drawn = np.random.default_rng(1).uniform(-1, 1, (len(robot.frames), 6))
     return robot.with_errors(drawn * np.repeat([1e-4, 5e-5], 3) * wider)
 
 
 def commanded(robot, rows=12, seed=2, reach=1.5):
-    """Rows of the arm, all around, loaded, while it warms; readings are zero."""
+    """Return a campaign with random postures and loads; all readings are zero."""
     rng = np.random.default_rng(seed)
     q = rng.uniform(-reach, reach, (rows, 3))
     bare = robot.without_effects().with_errors(np.zeros((4, 6)))

@@ -1,4 +1,4 @@
-"""Robots of others that tests read where they lie; a test without them is skipped."""
+"""URDF files of other projects; tests are skipped if the files are missing."""
 
 from pathlib import Path
 
@@ -8,7 +8,7 @@ EXAMPLES = Path(__file__).parents[2] / "shared" / "data" / "example_parallel_rob
 
 
 def example(name):
-    """The URDF of an example, or a word why the test is skipped."""
+    """Return the path of the URDF file of an example, or skip the test."""
     path = EXAMPLES / name / "robot.urdf"
     if not path.is_file():
         pytest.skip(f"no {path}: example_parallel_robots is not here")

@@ -1,6 +1,7 @@
-"""Questions about what is seldom needed, for ``answers_for_tests.py``: meshes that are
-refined, surfaces that are repaired, motions that are finite, poses that clearances
-leave free."""
+"""Results of less common functions, for ``answers_for_tests.py``.
+
+They include refined meshes, repaired surfaces, finite motions and undetermined poses.
+"""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -32,7 +33,7 @@ from tests.solids_for_tests import cylinder
 
 
 def refined(nudge: float) -> Any:
-    """A bar on meshes that become finer, to one accuracy and to another."""
+    """Solve a bar by finite elements with mesh refinement, to two accuracies."""
     section = {"width": 0.3 * (1 + nudge), "height": 0.3}
     material = Material(7e10, 0.31, density=2700.0)
     return [
@@ -42,7 +43,7 @@ def refined(nudge: float) -> Any:
 
 
 def repaired(nudge: float) -> Any:
-    """Surfaces turned inside out, mixed up, hollow, of corners that nearly agree."""
+    """Check surfaces with reversed triangles, a cavity or unmerged corners."""
     points, triangles = cylinder(0.02, 0.1 * (1 + nudge), 24)
     rng = np.random.default_rng(4)
     found = []
@@ -63,7 +64,7 @@ def repaired(nudge: float) -> Any:
 
 
 def finite(name: str, nudge: float) -> Any:
-    """Finite motions of rows with loads, errors, contacts and beams in pieces."""
+    """Predict readings with loads, errors, contacts and subdivided beams."""
     robot = without_joint_clearances(load_robot(name))
     rng = np.random.default_rng(7)
     home = np.array([f.position if f.actuated else np.nan for f in robot.frames])
@@ -100,7 +101,7 @@ def finite(name: str, nudge: float) -> Any:
 
 
 def left_free(name: str, nudge: float) -> Any:
-    """The nearest pose, bodies of pose errors, stiffnesses of a few draws."""
+    """Compute nearest poses, sets of possible pose errors, and random stiffnesses."""
     where = {key: (2 * low + high) / 3 for key, (low, high) in WORKSPACE[name].items()}
     robot = load_robot(name)
     rng = np.random.default_rng(8)

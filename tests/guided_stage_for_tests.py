@@ -1,6 +1,6 @@
-"""A stage of two guides, one with fits, and a pad, as a drawing."""
+"""Robot file of a two-axis stage with two guides and a pad."""
 
-# two crossed rails carry a tool whose sole lies between two planes of the base
+# A tool moves on two crossed rails.  Its sole lies between two planes of the base.
 STAGE = """
 format = 2
 name = "stage"

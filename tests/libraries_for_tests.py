@@ -1,4 +1,4 @@
-"""A build file of a library, and the stiffness of its bars in closed form."""
+"""Build file of a link library, and the exact stiffness of its round bars."""
 
 from forcefit.stiffness.beam.beam import beam_compliance
 from forcefit.stiffness.beam.sections import round_section

@@ -1,4 +1,4 @@
-"""Planar linkages of tests whose positions have closed forms."""
+"""Planar linkages with closed-form kinematics."""
 
 import math
 
@@ -23,7 +23,7 @@ CRANK, COUPLER, ROCKER, GROUND = 0.3, 0.7, 0.6, 0.8
 
 
 def four_bar_angles(q, mode=1.0):
-    """Coupler and rocker angles of the four-bar by the law of cosines."""
+    """Return the coupler angle, the rocker angle and the end of the coupler."""
     elbow = np.array([CRANK * math.cos(q), CRANK * math.sin(q)])
     to_rocker = np.array([GROUND, 0.0]) - elbow
     far = float(np.hypot(*to_rocker))
@@ -34,7 +34,7 @@ def four_bar_angles(q, mode=1.0):
 
 
 def four_bar(q=0.5, mode=1.0, order=None):
-    """Planar four-bar whose platform is the end of its coupler."""
+    """Return a planar four-bar linkage whose platform is the end of the coupler."""
     coupler, rocker, _ = four_bar_angles(q, mode)
     frames = [
         frame("crank", **driven(q)),
@@ -49,7 +49,7 @@ def four_bar(q=0.5, mode=1.0, order=None):
 
 
 def five_bar():
-    """Two driven proximal bars, two passive distal ones: reaches (x, y)."""
+    """Return a planar five-bar linkage with two driven proximal bars."""
     robot = []
     x, y, b, l1, l2 = 0.0, 0.5, 0.1, 0.35, 0.4
     for side, name in ((1, "right"), (-1, "left")):
@@ -68,16 +68,16 @@ def five_bar():
     return Robot("five_bar", "right.tip", tuple(robot), closure)
 
 
-SLIDER_CRANK = 0.2, 0.3  # [m] crank and rod
+SLIDER_CRANK = 0.2, 0.3  # [m] lengths of the crank and the rod
 
 
 def slider_crank(angle, rod=None, error=0.0):
-    """A crank and a rod whose end slides along x, driven there.
+    """Return a slider-crank mechanism that is driven at the slider along x.
 
     Args:
-        angle: [rad] of the crank against the slide.
-        rod: link of the rod, rigid without one.
-        error: [m] by which the rod is too long.
+        angle: angle of the crank from the x axis [rad].
+        rod: stiffness of the rod, or None for a rigid rod.
+        error: length error of the rod [m].
     """
     crank, length = SLIDER_CRANK
     down = math.asin(crank * math.sin(angle) / length)

@@ -1,4 +1,4 @@
-"""Small robots of stiff and soft beams for tests of the simulation."""
+"""Robots of one or two beams for tests of the multibody simulation."""
 
 import numpy as np
 
@@ -11,11 +11,12 @@ from forcefit.validation.multibody.simulation import (
 E, NU = 60e9, 0.3
 ROUND = BeamLink({"radius": 0.04}, E, NU)
 FLAT = BeamLink({"width": 0.02, "height": 0.05}, E, NU)
-UNIT = np.array([1, 1, 1, 0.4, 0.4, 0.4])  # m for rad, of beams about 0.4 m long
+# scale that makes rotations and translations of a 0.4 m long beam comparable
+UNIT = np.array([1, 1, 1, 0.4, 0.4, 0.4])
 
 
 def coaxial(error, length=0.4):
-    """Two equal beams, clamped `2 length` apart, that miss each other by an error."""
+    """Return two equal coaxial beams that an error separates at their common end."""
     frames = (
         Frame("a", translation=[length, 0, 0], link=ROUND, geometric_error=error),
         Frame("wall", translation=[2 * length, 0, 0]),
@@ -25,13 +26,13 @@ def coaxial(error, length=0.4):
 
 
 def random_stiffness(rng, soft=1e3):
-    """Symmetric, well conditioned once radians are counted as 0.4 m."""
+    """Return a random stiffness that is well conditioned after scaling by ``UNIT``."""
     A = rng.normal(size=(6, 6))
     return soft * (A @ A.T + np.eye(6)) * np.outer(UNIT, UNIT) / UNIT[3] ** 2
 
 
 def tip_stiffness(frame):
-    """K_E of a frame's beam by unit loads; base axes are the frame's own here."""
+    """Return K_E of the beam of a frame, computed by applying unit loads."""
     alone = Frame("f", translation=frame.translation, link=frame.link)
     posture = home_posture(Robot("one", "f", (alone,)))
     rows = [

@@ -1,4 +1,4 @@
-"""One term of the virtual-joint model broken at a time; each must be detected."""
+"""Mutations of the virtual joint model, each of which a test must detect."""
 
 import numpy as np
 
@@ -15,7 +15,7 @@ def _scaled(where, name, factor):
 
 
 def _lever(change):
-    """The adjoint's block [p_j - p]x R, changed."""
+    """Change the block [p_j - p]x R of the adjoint matrix."""
 
     def mutate(monkeypatch):
         import forcefit.assembly.kinematics.posture
@@ -47,7 +47,7 @@ def _signs(change):
 
 
 def _beam(row, column, factor):
-    """One entry of K_E^-1 of every beam, in section axes."""
+    """Scale one entry of the compliance of every beam, in section axes."""
 
     def mutate(monkeypatch):
         import forcefit.stiffness.beam.beam
@@ -68,7 +68,7 @@ def _beam(row, column, factor):
 
 
 def _shifted_errors(monkeypatch):
-    """Eq. (14) as printed: errors read at the parent frame instead of the frame."""
+    """Apply errors at the parent frame instead of the frame, as printed in eq. (14)."""
     from forcefit.assembly.kinematics.posture import Posture
     from forcefit.stiffness.screws import screw_map
 

@@ -1,4 +1,4 @@
-"""Commands run as where packages are not installed."""
+"""Run commands as if some packages were not installed."""
 
 import os
 import subprocess
@@ -10,7 +10,7 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 ROOT = Path(__file__).parents[1]
-# read by every Python that starts, so that processes of their own lack the packages too
+# sitecustomize.py, which also hides the packages from child processes
 _HIDING = """
 import os, sys
 from importlib.machinery import PathFinder
@@ -34,7 +34,13 @@ sys.meta_path[sys.meta_path.index(PathFinder)] = Hiding
 
 
 def run_without(folder, hidden, *words, shown=()):
-    """``forcefit WORDS`` where packages are hidden, or all but those shown.
+    """Run ``forcefit`` as if packages were not installed.
+
+    Args:
+        folder: folder for ``sitecustomize.py``.
+        hidden: names of the hidden packages, separated by blanks.
+        words: command-line arguments.
+        shown: if given, all packages except these and the standard library are hidden.
 
     Returns:
         Exit status, standard output, standard error.
@@ -50,7 +56,7 @@ def run_without(folder, hidden, *words, shown=()):
 
 
 def modules_of(*distributions):
-    """Modules of distributions, and of all that they require."""
+    """Return the modules of distributions and of their requirements."""
     waiting, seen = [canonicalize_name(name) for name in distributions], set()
     while waiting:
         name = waiting.pop()

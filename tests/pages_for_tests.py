@@ -1,4 +1,4 @@
-"""Reading a page as a program does: its tables, numbers, figures and results."""
+"""Parse the tables, numbers, figures and results of an HTML report."""
 
 import html
 import json
@@ -9,7 +9,7 @@ from html.parser import HTMLParser
 
 @dataclass
 class Cell:
-    """A cell, or a number in a sentence: what is shown, and the SI value behind it."""
+    """Table cell or number, with its displayed text and its value in SI units."""
 
     text: str
     value: float | None
@@ -18,7 +18,7 @@ class Cell:
 
 @dataclass
 class ParsedPage(HTMLParser):
-    """A page's pieces, in their order."""
+    """Parsed content of a page, in order of appearance."""
 
     tables: list = field(default_factory=list)
     numbers: list = field(default_factory=list)
@@ -35,7 +35,7 @@ class ParsedPage(HTMLParser):
         given = dict(attrs)
         self.tags.add(tag)
         links = (given.get(k) for k in ("src", "href", "action", "data"))
-        # a link to a section of the page itself begins with a hash
+        # links within the page begin with a hash
         own = ("data:", "#")
         self.fetched += [one for one in links if one and not one.startswith(own)]
         value = given.get("data-v")
@@ -72,7 +72,7 @@ class ParsedPage(HTMLParser):
             self._number.text += data
 
     def table(self, *heads):
-        """The one table whose columns begin so."""
+        """Return the only table whose first headings are ``heads``."""
         (one,) = (
             table
             for table in self.tables
@@ -82,14 +82,14 @@ class ParsedPage(HTMLParser):
 
 
 def parse(text):
-    """A page's pieces."""
+    """Parse a page."""
     page = ParsedPage()
     page.feed(text)
     return page
 
 
 def tiles(text):
-    """Answer and note of each conclusion at the top of a page, by its title."""
+    """Return the answer and the note of each tile at the top of a page, by title."""
     found = re.findall(
         r"<div class=tile><p class=title>(.*?)</p><p class=answer>(.*?)</p>"
         r"<p class=note>(.*?)</p></div>", text,

@@ -1,7 +1,7 @@
-"""Measured data of a planar arm worked out by hand: two beams, two drives, one plane.
+"""Simulated measurements of a planar arm with two drives and two beams.
 
-Finite rotations of the joints, cantilevers by Euler and Bernoulli: nothing of the model
-that a diagnosis uses.
+The simulation is independent of forcefit.  Joint rotations are finite, and the links
+are Euler-Bernoulli cantilevers.
 """
 
 import numpy as np
@@ -47,13 +47,16 @@ HEAD = ",".join([
 
 
 def turned(angle, x, y):
-    """A vector of the plane, turned."""
+    """Rotate a vector in the plane."""
     c, s = np.cos(angle), np.sin(angle)
     return np.array([c * x - s * y, s * x + c * y])
 
 
 def bent(force, moment, angle, length):
-    """Tip of a cantilever under a force in base axes and a moment: x, y, turn."""
+    """Return the tip deflection (x, y) and rotation of a cantilever.
+
+    The force is given in base axes, and the result in the axes of the beam.
+    """
     along, across = turned(-angle, *force)
     y = across * length**3 / (3 * E * I) + moment * length**2 / (2 * E * I)
     turn = across * length**2 / (2 * E * I) + moment * length / (E * I)
@@ -62,7 +65,7 @@ def bent(force, moment, angle, length):
 
 def reading(q, load, temperature, offset=(0.0, 0.0), stiffness=(np.inf, np.inf),
             longer=(0.0, 0.0), expansion=(0.0, 0.0)):  # fmt: skip
-    """(6,) deviation of the tool: of drives that yield, beams that are longer."""
+    """Return the deviation of the tool, (6,) [rad, m], due to loads and errors."""
     mz, force = load[0], np.array(load[1:])
     elbow = turned(q[0], L1, 0.0)
     tool = elbow + turned(q[0] + q[1], L2, 0.0)
@@ -84,10 +87,21 @@ def reading(q, load, temperature, offset=(0.0, 0.0), stiffness=(np.inf, np.inf),
 def measure(folder, seed=0, configurations=16, passes=4, temperature=None, device=None,
             outliers=(), missing=0.0, stand=0.0, noise=1.0, force=30.0,
             **effects):  # fmt: skip
-    """A campaign in a folder, and what was read: interleaved, loads in the plane.
+    """Write a simulated campaign, and return its folder.
 
-    ``device`` is the (Rotation, shift) of an unknown measuring frame;
-    ``stand`` [sigma] yields with the square of the load; ``outliers`` are rows.
+    Args:
+        folder: folder to write.
+        seed: random seed.
+        configurations: number of configurations.
+        passes: number of passes through all configurations.
+        temperature: constant temperature [K]; by default, it varies with time.
+        device: rotation and translation of an unknown measuring frame.
+        outliers: numbers of the rows with an outlier.
+        missing: fraction of missing readings.
+        stand: size [sigma] of a deviation proportional to the squared load.
+        noise: factor on the measurement noise.
+        force: largest force [N].
+        effects: arguments of :func:`reading`.
     """
     rng = np.random.default_rng(seed)
     q = rng.uniform([-1.2, 0.4], [1.2, 2.0], (configurations, 2))
@@ -123,5 +137,5 @@ def measure(folder, seed=0, configurations=16, passes=4, temperature=None, devic
 
 
 def measured(folder, **given):
-    """The campaign of :func:`measure`, read."""
+    """Write a simulated campaign, and read it."""
     return read_campaign(measure(folder, **given))

@@ -1,8 +1,7 @@
-"""Campaigns in which a device reads three points of a platform at once.
+"""Campaigns in which a device measures three points of a platform at once.
 
-Every point moves with the platform as a rigid body: as the machine stands, as the
-machine repeats (noise that the points of a row have in common), and on top of that each
-reading has noise of the device.
+The platform moves as a rigid body.  Its repeatability error is the same for all points
+of a row, and each reading has an additional error of the device.
 """
 
 from collections.abc import Mapping, Sequence
@@ -25,15 +24,15 @@ TARGETS = {
     "B": np.array([-0.05, 0.06, 0.02]),
     "C": np.array([0.0, -0.07, 0.03]),
 }
-DEVICE = 5e-6  # [m] noise of every reading
-MACHINE = np.repeat([2e-4, 2e-5], 3)  # [rad, m] by which the machine repeats
+DEVICE = 5e-6  # [m] standard deviation of the device error
+MACHINE = np.repeat([2e-4, 2e-5], 3)  # [rad, m] repeatability of the machine
 
 
 def simulated(
     robot: Robot, wanted: Mapping[str, float] | Sequence[tuple[Hidden, float]],
     design: CampaignDesign, seed: int, noise: float,
 ) -> Synthetic:  # fmt: skip
-    """A simulated machine, its effects so many times the noise ``noise`` [m]."""
+    """Simulate a machine with effects given as multiples of ``noise`` [m]."""
     size = Noise(rotation=10 * noise, position=noise)
     return generate_campaign(robot, wanted, design, size, seed, "springs")
 
@@ -42,16 +41,16 @@ def write_points(
     made: Synthetic, folder: Path, seed: int, *, common: NDArray = MACHINE,
     device: float = DEVICE, stated: float = DEVICE,
 ) -> Campaign:  # fmt: skip
-    """Write what a device reads of three points, and read the campaign back.
+    """Write a campaign with simulated readings of three points, and read it.
 
     Args:
-        made: the machine, with its exact deviations.
-        folder: new.
-        seed: of the noise.
-        common: (6,) [rad, m] standard deviations of the platform's motion about the
-            points' centre, one draw a row; its base axes.
-        device: [m] noise of every reading.
-        stated: [m] the same as the campaign states it.
+        made: simulated machine with its exact deviations.
+        folder: new folder.
+        seed: random seed of the noise.
+        common: standard deviations (6,) [rad, m] of the platform's repeatability error,
+            about the centre of the points in base axes.
+        device: standard deviation of the device error [m].
+        stated: standard deviation declared in the campaign [m].
 
     Returns:
         The campaign.

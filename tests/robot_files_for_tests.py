@@ -1,4 +1,4 @@
-"""Two sound robot files, and parts of them that tests change."""
+"""Two valid robot files, and parts of them that tests replace."""
 
 import re
 
@@ -89,19 +89,19 @@ PLAY = "clearance = { radial = 29e-6, spin = 3.0 }"
 
 
 def mesh(surface="x.stl", tip='"z=0.5"', more=""):
-    """A mesh in TOML."""
+    """Format the key ``mesh`` in TOML."""
     return f'mesh = {{ surface = "{surface}", base = "z=0", tip = {tip}{more} }}'
 
 
 def rows(changes):
-    """6 rows of the unit matrix in TOML, some entries (counted from 1) changed."""
+    """Format a unit matrix (6, 6) with some entries (counted from 1) replaced."""
     K = [[changes.get((i, j), float(i == j)) for j in range(1, 7)] for i in range(1, 7)]
     return str(K)
 
 
 def assert_refused(write_file, old, new, message):
-    """The sound file with one change is refused with one line."""
-    assert FOUR_BAR.count(old) >= 1, "the row changes nothing"
+    """Check that the valid file with one change is rejected with a one-line message."""
+    assert FOUR_BAR.count(old) >= 1, "the text to replace is not in the file"
     path = write_file(FOUR_BAR.replace(old, new))
     with pytest.raises(BadInput, match=re.escape(f"{path}: {message}")) as caught:
         read_robot(path)

@@ -1,5 +1,4 @@
-"""Questions about robots of every kind, for ``answers_for_tests.py``: random ones with
-links, springs and clearances, many draws at once, kinematics, tolerances by play."""
+"""Results for random and built-in robots, for ``answers_for_tests.py``."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -44,7 +43,7 @@ from tests.tolerances_for_tests import plan_for
 
 
 def of_any_kind(seed: int, nudge: float) -> Any:
-    """Energy, certificates, margins and pose errors of a random robot."""
+    """Compute energy, margins and pose errors of a random robot."""
     rng = np.random.default_rng(seed)
     robot = random_robot(rng, legs=2 + seed % 2, branched=seed % 3 == 0)
     posture = place_robot(robot.with_errors(0.1 * robot.errors * (1 + nudge)))
@@ -72,7 +71,7 @@ def of_any_kind(seed: int, nudge: float) -> Any:
 
 
 def at_once(name: str, nudge: float) -> Any:
-    """Energies and margins of many draws at a posture, with a load and without."""
+    """Compute energies and margins for several error draws in one call."""
     robot = pressed(load_robot(name))
     where = {key: (2 * low + high) / 3 for key, (low, high) in WORKSPACE[name].items()}
     posture = place_robot(robot, where)
@@ -88,7 +87,7 @@ def at_once(name: str, nudge: float) -> Any:
 
 
 def drawn(response: LinearResponse, errors: NDArray) -> dict[str, Any]:
-    """What statistics read of draws."""
+    """Return the quantities of the draws that statistics use."""
     found = response.solve(errors)
     names = ("energy", "clearances", "multipliers", "platform_screw", "method")
     own = {name: getattr(found, name) for name in names}
@@ -96,14 +95,14 @@ def drawn(response: LinearResponse, errors: NDArray) -> dict[str, Any]:
 
 
 def margins(prepared: PostureMargins, errors: NDArray) -> dict[str, Any]:
-    """The same of margins."""
+    """Return the margins of the draws and their derivatives."""
     found = prepared.solve(errors)
     own = {name: getattr(found, name) for name in ("margin", "bound", "method")}
     return own | {"slopes": prepared.slopes(found)}
 
 
 def pressed(robot: Robot) -> Robot:
-    """The robot with a clearance at every third joint that has none."""
+    """Return the robot with an additional clearance in every third joint."""
     frames = [
         replace(f, clearance=small_clearance(2e-5 * (1 + i)))
         if i % 3 == 1 and f.clearance is None and f.joint != "fixed"
@@ -114,7 +113,7 @@ def pressed(robot: Robot) -> Robot:
 
 
 def placed(name: str, nudge: float) -> Any:
-    """Postures of many poses and of many drives; motions, singularities, pieces."""
+    """Compute postures, free motions, singularities and subdivided beams."""
     robot = load_robot(name)
     keys = ("tx", "ty", "tz", "rx", "ry", "rz")
     shares = np.random.default_rng(2).uniform(0.2, 0.8, (3, 6)) * (1 + nudge)
@@ -135,7 +134,7 @@ def placed(name: str, nudge: float) -> Any:
 
 
 def in_a_row(play: float) -> Robot:
-    """Two springy bars from two walls that meet in a joint with clearance."""
+    """Return two elastic bars that are connected by a joint with clearance."""
     link = MatrixLink(np.diag([2e3, 2e3, 2e3, 1e6, 2e6, 1e6]))
     frames = (
         Frame("one", translation=[0.5, 0, 0], link=link),
@@ -149,7 +148,7 @@ def in_a_row(play: float) -> Robot:
 
 
 def by_play(model: str, nudge: float) -> Any:
-    """Tolerances for limits of pose errors, clearances anywhere a model puts them."""
+    """Allocate tolerances with a given clearance model."""
     robot = in_a_row(1e-4 * (1 + nudge))
     plan = plan_for(
         robot, [("one", 3), ("two", 4), ("two", 1)], [1, 2, 0.5],
@@ -163,7 +162,7 @@ def by_play(model: str, nudge: float) -> Any:
 
 
 def shown(nudge: float) -> Any:
-    """What pages show of present errors and of draws, and what progress is told."""
+    """Return the texts, scenes and progress messages for declared and random errors."""
     robot = in_a_row(1e-4)
     errors = np.zeros((6, 6))
     errors[[0, 2], :] = [[1e-4, 0, 5e-5, 4e-5, 3e-5, 0], [0, 2e-4, 0, 1e-5, 0, 2e-5]]

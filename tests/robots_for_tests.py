@@ -1,4 +1,4 @@
-"""Robots the tests share: the paper's with the reference draws, and tiny ones."""
+"""Robots shared by several tests: IRSBot-2, small robots and random robots."""
 
 import json
 from dataclasses import replace
@@ -16,13 +16,13 @@ NUMBERS = json.loads((Path(__file__).parent / "irsbot2_numbers.json").read_text(
 
 
 def paper_frame(key):
-    """Frame name of the reference's ``leg1_frame8``; its index counts from 1."""
+    """Return the frame name for a key such as ``leg1_frame8``, counted from 1."""
     leg, index = key.split("_frame")
     return f"{leg}.{NAMES[int(index) - 1]}"
 
 
 def irsbot2_with(case, scale=1.0):
-    """The paper's robot with the errors of one reference draw."""
+    """Return IRSBot-2 with the errors of one draw of the reference data."""
     robot = irsbot2()
     errors = np.zeros((len(robot.frames), 6))
     for key, value in case["dl"].items():
@@ -31,7 +31,7 @@ def irsbot2_with(case, scale=1.0):
 
 
 def irsbot2_over(x, z):
-    """The paper's robot with the first draw, and its postures at x by z [m]."""
+    """Return IRSBot-2 with the first draw, and its postures on a grid (x, z) [m]."""
     robot = irsbot2_with(NUMBERS["cases"][0])
     poses = np.full((len(x) * len(z), 6), np.nan)
     poses[:, 0], poses[:, 2] = (axis.ravel() for axis in np.meshgrid(x, z))
@@ -39,7 +39,7 @@ def irsbot2_over(x, z):
 
 
 def with_bodies(robot, rng, heaviest=5.0, off=0.2):
-    """The robot with a body of a kilogram and more [kg] on each frame, ``off`` [m]."""
+    """Return the robot with random masses [kg] and centres of mass."""
     return replace(robot, frames=tuple(
         replace(f, mass=rng.uniform(1, heaviest),
                 centre_of_mass=rng.normal(size=3) * off)
@@ -48,7 +48,7 @@ def with_bodies(robot, rng, heaviest=5.0, off=0.2):
 
 
 def with_bounded_motion(robot, rng):
-    """Every passive joint's own motion within some 1e-4 rad or m."""
+    """Limit the motion of each passive joint to about 1e-4 rad or m."""
 
     def bounded(frame):
         if not frame.passive or frame.compliant:
@@ -62,10 +62,9 @@ def with_bounded_motion(robot, rng):
 
 
 def coaxial_beams(gap, stiffnesses=(1e6, 1e6), length=0.5, clearance=None):
-    """Two links on the x axis that meet end to end, ``gap`` [6] apart.
+    """Return two coaxial elastic links with a gap (6,) [rad, m] between their ends.
 
-    Link 1 starts at the base, link 2 at a mount 2 lengths away and runs back.  Both
-    are springs of 6 equal diagonal terms, read where they meet.
+    The stiffness matrix of each link at its end is a multiple of the unit matrix.
     """
     K = [np.diag([k] * 6) for k in stiffnesses]
     frames = (
@@ -81,8 +80,8 @@ def coaxial_beams(gap, stiffnesses=(1e6, 1e6), length=0.5, clearance=None):
 
 
 def planar_four_bar(crank=0.1, coupler=0.3, rocker=0.25, ground=0.3, errors=None):
-    """Grashof four-bar in the x-y plane, crank along x at home, elastic coupler."""
-    # the coupler's far end, above the ground link, by the law of cosines
+    """Return a planar four-bar linkage with an elastic coupler."""
+    # law of cosines for the end of the coupler
     reach = ground - crank
     x = (coupler**2 - rocker**2 + reach**2) / (2 * reach)
     y = np.sqrt(coupler**2 - x**2)
@@ -103,16 +102,16 @@ def planar_four_bar(crank=0.1, coupler=0.3, rocker=0.25, ground=0.3, errors=None
 
 
 def small_clearance(radial=20e-6, axial=30e-6, tilt=5e-4, spin=None):
-    """A joint's play at a usual size."""
+    """Return a joint clearance of typical size."""
     return Clearance(radial=radial, axial=axial, tilt=tilt, spin=spin)
 
 
 def in_millimetres(robot, s=1000.0):
-    """The same robot with lengths in another unit: N stays N, m becomes s units."""
+    """Return the same robot with lengths in another unit, of which 1 m contains s."""
     screw = np.array([1, 1, 1, s, s, s])
 
     def stiffness(K):
-        # w = K x with moments s times larger, shifts s times larger
+        # w = K x, in which moments and translations are s times larger
         wrench = np.array([s, s, s, 1, 1, 1])
         return K * np.outer(wrench, 1 / screw)
 
@@ -137,10 +136,10 @@ def in_millimetres(robot, s=1000.0):
 
 
 def random_robot(rng, legs=2, joints=3, link_share=0.7, branched=False):
-    """Legs of random bodies and joints from the base to one platform.
+    """Return a robot with random links, joints, clearances and errors.
 
-    Joints are fixed, revolute or prismatic, passive, driven or compliant, some with
-    play; some bodies are elastic.  The nominal closures hold by construction.
+    The joints are fixed, revolute or prismatic, and passive, driven or compliant.  The
+    loops of the nominal robot are closed.
     """
     platform = _random_transform(rng)
     frames, tips = [], []
@@ -195,7 +194,7 @@ PAPERS_FRAMES = ("elbow_a", "link_a", "elbow_b", "link_b", "loop2_platform", "ti
 
 
 def with_papers_errors(robot, seed, frames=PAPERS_FRAMES, signed=False):
-    """Errors of the paper's size: up to 2e-2 rad and 2e-4 m at its frames."""
+    """Return the robot with random errors of up to 2e-2 rad and 2e-4 m, as in the paper."""
     rng = np.random.default_rng(seed)
     size = np.array([2e-2] * 3 + [2e-4] * 3)
     errors = np.zeros((len(robot.frames), 6))
@@ -206,7 +205,7 @@ def with_papers_errors(robot, seed, frames=PAPERS_FRAMES, signed=False):
 
 
 def stack(postures):
-    """Frames and closure errors of postures, as the batch takes them."""
+    """Return the transforms and closure errors of postures as arrays."""
     return (
         np.array([p.transforms for p in postures]),
         np.array([p.mismatch for p in postures]),
@@ -214,18 +213,18 @@ def stack(postures):
 
 
 def standing(robot, T, mismatch=0.0):
-    """Postures with these transforms (k, n, 4, 4), their coordinates unknown."""
+    """Return postures with given transforms (k, n, 4, 4) and unknown coordinates."""
     T = np.asarray(T)
     return Posture(robot, np.full(T.shape[:2], np.nan), T, mismatch)
 
 
 def assemble_at(robot, T, errors=None, mismatch=0.0, method="compiled"):
-    """Least energies at such postures."""
+    """Solve the forced assembly at postures with given transforms."""
     postures = standing(robot, T, mismatch)
     return solve_assembly(postures, errors=errors, method=method)
 
 
-# what is compared of an assembly of many points
+# quantities compared between batch and single solutions
 ROWS = (
     "energy", "energy_without_clearance", "work", "platform_screw", "clearances",
     "motions", "multipliers", "elastic", "method", "duality_gap", "closure_residual",
@@ -234,11 +233,11 @@ ROWS = (
 
 
 def row(many, name):
-    """What an assembly of many points says, be it an attribute or a method."""
+    """Return the value of an attribute, or the result of a method without arguments."""
     value = getattr(many, name)
     return value() if callable(value) else value
 
 
 def proved(many):
-    """[J] certified lower bounds of the energies."""
+    """Return the certified lower bounds of the energies [J]."""
     return many.energy - many.duality_gap()

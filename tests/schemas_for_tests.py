@@ -1,4 +1,4 @@
-"""Every result that a test asks for as JSON is compared with its schema."""
+"""Check the JSON output of commands against its schema."""
 
 import json
 from functools import cache
@@ -12,25 +12,25 @@ from forcefit.results.schema import schema_of
 
 @cache
 def validator(name: str) -> Draft202012Validator:
-    """Validator of one command's output."""
+    """Return a validator for the output of a command."""
     return Draft202012Validator(schema_of(OUTPUTS[name]))
 
 
 def check_schema(words: tuple[str, ...], out: str) -> None:
-    """Compare what a command wrote as JSON with its schema.
+    """Check the JSON output of a command against its schema.
 
     Args:
-        words: after ``forcefit``.
-        out: its standard output.
+        words: command-line arguments after ``forcefit``.
+        out: standard output of the command.
     """
     if "--json" not in words:
         return
     target = words[words.index("--json") + 1]
     if not (out if target == "-" else Path(target).is_file()):
-        return  # refused
+        return  # the command rejected its input
     content = json.loads(out if target == "-" else Path(target).read_text())
     name = next(n for n in OUTPUTS if words[: len(n.split())] == tuple(n.split()))
-    if "--diagnose" in words:  # a campaign made and diagnosed
+    if "--diagnose" in words:  # the output is then that of the diagnosis
         name = "validation diagnose"
     errors = list(validator(name).iter_errors(content))
     assert not errors, f"{name}: {errors[0].json_path}: {errors[0].message[:300]}"

@@ -1,4 +1,4 @@
-"""Drawn robots with screws."""
+"""Robots with helical joints, described by bodies and joints."""
 
 LIFT = """
 format = 2
@@ -34,7 +34,7 @@ at = [0.2, 0, 0.2]
 axis = [0, 0, 1]
 """
 
-# the table goes up by the difference of the pitches
+# per turn of the screw, the platform moves by the difference of the pitches
 DIFFERENTIAL = """
 format = 2
 platform = "table"

@@ -1,4 +1,4 @@
-"""Surfaces and tetrahedra made by formula, so that no test hangs on one mesh."""
+"""Surfaces and tetrahedral meshes of simple shapes."""
 
 from dataclasses import replace
 
@@ -15,12 +15,12 @@ Z = np.array([0.0, 0.0, 1.0])
 
 
 def constants(mesh, young=60e9, poisson=0.3):
-    """(t,) [Pa] Lame's constants of a mesh of one material."""
+    """Return the Lame constants of each element of a uniform mesh, (t,) [Pa]."""
     return tuple(np.full(len(mesh.cells), one) for one in lame(young, poisson))
 
 
 def cylinder(radius=0.02, length=0.1, facets=32, tip_radius=None):
-    """Closed faceted cylinder or cone along z: points and triangles."""
+    """Return points and triangles of a closed faceted cylinder or cone along z."""
     angle = 2 * np.pi * np.arange(facets) / facets
     ring = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
     tip_radius = radius if tip_radius is None else tip_radius
@@ -40,9 +40,10 @@ def cylinder(radius=0.02, length=0.1, facets=32, tip_radius=None):
 def shouldered_shaft(
     large, small, fillet, around, rows, step=(0.05, 0.12), apart=0.004
 ):
-    """Points and triangles of a shaft along z whose radius steps down at a fillet.
+    """Return points and triangles of a shaft along z with a shoulder and a fillet.
 
-    Rings about ``apart`` [m] from each other, each turned by half a facet.
+    Consecutive rings of points have a distance of about ``apart`` [m] and are rotated
+    by half a facet.
     """
     shoulder, end = step
     turn = np.linspace(0, np.pi / 2, rows + 1)
@@ -75,7 +76,7 @@ def shouldered_shaft(
 
 
 def box_cells(counts):
-    """Six tetrahedra in each of nx by ny by nz boxes (Kuhn): grid points and cells."""
+    """Divide a unit cube into boxes of six tetrahedra each (Kuhn triangulation)."""
     sizes = np.array(counts) + 1
     grid = np.stack(np.meshgrid(*map(np.arange, sizes), indexing="ij"), axis=-1)
     corner = np.arange(np.prod(sizes)).reshape(sizes)[:-1, :-1, :-1].ravel()
@@ -88,7 +89,7 @@ def box_cells(counts):
 
 
 def outward(points, cells):
-    """Cells turned so that every volume is positive."""
+    """Reorder the nodes of tetrahedra so that all volumes are positive."""
     a, b, c, d = np.moveaxis(points[cells], 1, 0)
     turned = np.einsum("ij,ij->i", b - a, np.cross(c - a, d - a)) < 0
     cells = cells.copy()
@@ -97,13 +98,13 @@ def outward(points, cells):
 
 
 def box_solid(counts, size):
-    """A box of some size from the origin; its sides are patch 2, of no known shape."""
+    """Return the mesh of a box; its sides have no known shape."""
     unit, cells = box_cells(counts)
     return _solid(unit * size, cells, size[2], None)
 
 
 def with_plane_sides(solid):
-    """The solid with a patch, a plane, for each flat part of its side that is known."""
+    """Return the solid with a separate patch for each plane face of its side."""
     corners = solid.points[solid.faces]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normal /= np.linalg.norm(normal, axis=1)[:, None]
@@ -120,7 +121,7 @@ def with_plane_sides(solid):
 
 
 def masked_solid(counts, size, keep):
-    """A box without the grid cells whose centres are not to be kept."""
+    """Return the mesh of a box, reduced to the grid cells that ``keep`` selects."""
     unit, cells = box_cells(counts)
     points = unit * size
     box = np.floor(unit[cells].mean(axis=1) * counts + 1e-9)
@@ -130,7 +131,7 @@ def masked_solid(counts, size, keep):
 
 
 def bar_solid(rings, layers, radius, length):
-    """A round bar: discs of rings of 6, 12, 18 ... nodes, extruded; side known."""
+    """Return the mesh of a round bar, extruded from a disc; its side is a cylinder."""
     steps = [np.arange(6 * k) / (6 * k) for k in range(1, rings + 1)]
     spokes = [np.exp(2j * np.pi * t) * k / rings for k, t in enumerate(steps, 1)]
     disc = radius * np.concatenate([[0], *spokes])
@@ -142,7 +143,7 @@ def bar_solid(rings, layers, radius, length):
     ])
     a, b, c = triangles.T
     up = np.array([a, b, c]) + count
-    # a prism cut along the diagonals that start at its smallest node numbers
+    # each prism is divided by the diagonals from its smallest node numbers
     prism = [np.column_stack(t) for t in ((a, b, c, up[2]), (a, b, up[1], up[2]),
                                           (a, up[0], up[1], up[2]))]  # fmt: skip
     cells = np.concatenate([t + k * count for k in range(layers) for t in prism])
@@ -150,7 +151,7 @@ def bar_solid(rings, layers, radius, length):
 
 
 def _solid(points, cells, length, side):
-    """Base at z = 0, tip at z = length, everything else the side."""
+    """Return a solid with its base at z = 0, its tip at z = length, and one side."""
     cells = outward(points, cells)
     faces = boundary_faces(cells)
     height = points[faces][..., 2] / length
@@ -174,7 +175,7 @@ def bar(facets=32, **kwargs):
 
 
 def rounded_outline(half_sizes, corner, inset, steps):
-    """Corners (4 (steps + 1), 2) of a rectangle with round corners, from the right."""
+    """Return the points of a rectangle with rounded corners, (4 (steps + 1), 2)."""
     centers = np.array(half_sizes) - corner
     angle = np.pi / 2 * np.arange(steps + 1) / steps
     points = []
@@ -186,7 +187,14 @@ def rounded_outline(half_sizes, corner, inset, steps):
 
 
 def rounded_block(half_sizes, corner, profile, steps):
-    """Rounded outlines, inset as (inset, z) of a profile says, one above the other."""
+    """Return a block with rounded edges.
+
+    Args:
+        half_sizes: half side lengths (2,) [m].
+        corner: radius of the vertical edges [m].
+        profile: (inset, z) of each outline [m].
+        steps: number of facets of each rounded edge.
+    """
     rings = [
         np.insert(rounded_outline(half_sizes, corner, inset, steps), 2, z, axis=1)
         for inset, z in profile
@@ -207,14 +215,14 @@ def rounded_block(half_sizes, corner, profile, steps):
 
 
 def fillet_profile(radius, height, steps):
-    """(inset, z) of a fillet at the foot of a wall."""
+    """Return the profile (inset, z) of a wall with a fillet at its foot."""
     angle = np.pi / 2 * np.arange(steps + 1) / steps
     foot = [(radius * (1 - np.sin(a)), radius * (1 - np.cos(a))) for a in angle]
     return [*foot, (0.0, height)]
 
 
 def bar_of_two_boxes(width, height, near, far):
-    """A bar along z whose two halves are solids of their own, as of a STEP file."""
+    """Return a bar along z that consists of two solids, as in a STEP file."""
     levels = (0.0, near, near + far)
     corners = [[x, y, z] for z in levels for y in (0, height) for x in (0, width)]
     quads = [((0, 2, 3, 1), 0, -1), ((4, 5, 7, 6), 0, 1), ((8, 9, 11, 10), 1, -1)]
@@ -229,7 +237,7 @@ def bar_of_two_boxes(width, height, near, far):
 
 
 def rod_in_tube(inner, outer, length, facets=48):
-    """A round rod glued into a tube along z, two solids as of a STEP file."""
+    """Return a round rod bonded into a tube along z, as two solids."""
     points, triangles = cylinder(inner, length, facets)
     wide, _ = cylinder(outer, length, facets)
     shift, count = len(points), len(triangles)
@@ -248,7 +256,7 @@ def rod_in_tube(inner, outer, length, facets=48):
 
 
 def surface_of_solids(names, points, triangles, sides):
-    """The surface around solids, and the solids."""
+    """Return the outer surface of several solids, together with the solids."""
     outer = triangles[(sides < 0).any(axis=1)]
     solids = FilledSolids(names, points, triangles, sides)
     return replace(check_surface(points, outer, "part.step#*"), solids=solids)

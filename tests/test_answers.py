@@ -1,4 +1,4 @@
-"""Results equal the stored ones, see ``answers_for_tests.py``."""
+"""Results equal the stored results; see ``answers_for_tests.py``."""
 
 import json
 
@@ -8,7 +8,7 @@ from tests.answers_for_tests import QUESTIONS, STORED, close, leaves
 
 ANSWERS = json.loads(STORED.read_text())
 RELATIVE = 1e-6
-# others of their kind are asked always
+# slow results; similar results are always compared
 LONG = ("tube",)
 
 

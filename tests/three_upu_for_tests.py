@@ -1,9 +1,8 @@
-"""The 3-UPU of Seoul National University: three equal legs, modes that meet at home.
+"""3-UPU robot of Seoul National University (SNU).
 
-Each leg turns about a radial and a tangential axis at either end and slides along
-itself.  At home the axes of all universal joints lie in horizontal planes, so the
-three couples that the legs transmit are all vertical: with its drives locked the
-platform keeps two freedoms of turning, there and wherever it stands above the centre
+In the home pose, the axes of all universal joints are horizontal, so that each leg
+transmits a couple about the vertical.  With locked drives, the platform retains two
+rotational degrees of freedom in this pose and in all poses above the centre of the base
 (Zlatanov, Bonev, Gosselin 2002; Walter, Husty, Pfurner 2009).
 """
 
@@ -12,14 +11,14 @@ import numpy as np
 from forcefit.assembly.model.robot import BeamLink, Clearance, Frame, Robot
 from forcefit.stiffness.screws import rotation_vector
 
-BASE, PLATFORM, HEIGHT = 0.24, 0.08, 0.45  # [m] radii, and height of the platform
-LENGTH = float(np.hypot(BASE - PLATFORM, HEIGHT))  # [m] of a leg at home
-ERRORS = 1e-3  # [rad] and a tenth of it [m]: largest of the drawn errors
+BASE, PLATFORM, HEIGHT = 0.24, 0.08, 0.45  # [m] radii of base and platform, and height
+LENGTH = float(np.hypot(BASE - PLATFORM, HEIGHT))  # [m] length of a leg at home
+ERRORS = 1e-3  # [rad] largest angular error; the linear errors are a tenth [m]
 _PLAY = Clearance(radial=1e-5, axial=1e-5, tilt=2e-4)
 
 
 def three_upu(seed=None):
-    """The robot; with a seed, with random errors on the joints of its legs."""
+    """Return the robot; with a seed, its frames have random errors."""
     frames = []
     for leg in range(3):
         frames += _leg(f"leg{leg + 1}", 2 * np.pi * leg / 3)
@@ -33,12 +32,12 @@ def three_upu(seed=None):
 
 
 def _leg(name, angle):
-    """Six frames of a leg whose radial direction is at an angle about z."""
+    """Return the six frames of the leg at an angle about z."""
     radial = np.array([np.cos(angle), np.sin(angle), 0.0])
     tangent = np.array([-np.sin(angle), np.cos(angle), 0.0])
     along = ((PLATFORM - BASE) * radial + [0, 0, HEIGHT]) / LENGTH
     up = np.array([0.0, 0.0, 1.0])
-    poses = {  # orientation: x, y and z in base axes
+    poses = {  # orientation of each frame in base axes
         "base": np.eye(3),
         "u1": _axes(up, radial), "u2": _axes(up, tangent),
         "slide": _axes(tangent, along), "v2": _axes(up, tangent),
@@ -61,12 +60,12 @@ def _leg(name, angle):
 
 
 def _axes(x, z):
-    """Orientation of axes x and z; x is made perpendicular to z."""
+    """Return the rotation matrix with axis z and with x orthogonalised to z."""
     x = x - (x @ z) * z
     x = x / np.linalg.norm(x)
     return np.stack([x, np.cross(z, x), z], axis=1)
 
 
 def _rod(axis):
-    """The rod, which runs along the slide."""
+    """Return the beam of a leg along an axis."""
     return BeamLink({"radius": 0.015}, 2.1e11, 0.3, length=LENGTH, axis=tuple(axis))

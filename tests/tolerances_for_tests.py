@@ -1,4 +1,4 @@
-"""Small robots with errors, and plans of their tolerances."""
+"""Small robots with errors, and plans for tolerance allocation."""
 
 import numpy as np
 
@@ -7,11 +7,11 @@ from forcefit.assembly.model.robot import Clearance, Frame, MatrixLink, Robot
 from forcefit.assembly.statistics.requirement import Plan
 
 PLAY = 1e-4  # [m] radial clearance
-ARM = 0.4  # [m] from the pin of the arm to its tip
+ARM = 0.4  # [m] distance from the pin to the tip of the arm
 
 
 def arm(passive=False, joint="revolute", link=None, **clearance):
-    """A joint at the base, driven unless it is passive, and a tip across its axis."""
+    """Return an arm with one joint, whose tip is at a distance from the joint axis."""
     frames = (
         Frame("pin", joint=joint, actuated=not passive,
               clearance=Clearance(**clearance) if clearance else None),
@@ -21,7 +21,7 @@ def arm(passive=False, joint="revolute", link=None, **clearance):
 
 
 def rigid_pair(**clearance):
-    """Two rigid parts that must meet at (0.5, 0, 0), within a clearance if given."""
+    """Return two rigid bodies with a common point, with a clearance if given."""
     frames = (
         Frame("one", translation=[0.5, 0, 0]),
         Frame("two", "base", [0.5, 0, 0]),
@@ -31,7 +31,7 @@ def rigid_pair(**clearance):
 
 
 def pairs_of_bars(stiffnesses, radial=None):
-    """Pairs of elastic bars that meet at (0.5, 0, 0), each by itself."""
+    """Return independent pairs of elastic bars, each with a common end."""
     frames, closures = [], []
     for i, k in enumerate(stiffnesses):
         link = MatrixLink(np.eye(6) * k)
@@ -50,13 +50,16 @@ def silent(*_):
 
 
 def drawn_errors(robot, scale=1.0, count=6):
-    """(count, frames, 6) errors within 1e-3 rad and 1e-4 m times a scale."""
+    """Return random errors within 1e-3 rad and 1e-4 m times a scale.
+
+    The shape is (count, frames, 6).
+    """
     sources = tolerance_sources(robot, scale * np.array([1e-3] * 3 + [1e-4] * 3))
     return sources.errors(sources.draw(0, count, seed=4))
 
 
 def plan_for(robot, places, costs, limits, **options):
-    """A class for each place ``(frame, component)``."""
+    """Return a plan with a separate tolerance for each ``(frame, component)``."""
     some = tolerance_sources(robot, [1.0] * 6, tuple({f for f, _ in places}))
     keys = [
         (robot.frames[i].name, c)
