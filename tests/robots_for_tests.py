@@ -194,7 +194,7 @@ PAPERS_FRAMES = ("elbow_a", "link_a", "elbow_b", "link_b", "loop2_platform", "ti
 
 
 def with_papers_errors(robot, seed, frames=PAPERS_FRAMES, signed=False):
-    """Return the robot with random errors of up to 2e-2 rad and 2e-4 m, as in the paper."""
+    """Return the robot with random errors as in the paper (up to 2e-2 rad, 2e-4 m)."""
     rng = np.random.default_rng(seed)
     size = np.array([2e-2] * 3 + [2e-4] * 3)
     errors = np.zeros((len(robot.frames), 6))

@@ -16,7 +16,7 @@ LONG = ("tube",)
     "name",
     [pytest.param(n, marks=[pytest.mark.slow] * (n in LONG)) for n in QUESTIONS],
 )
-def test_results_equal_the_stored_results(name):
+def test_results_equal_stored_results(name):
     assert not unlike_those_stored(name)
 
 

@@ -1,4 +1,4 @@
-"""Pictures of callouts: the page shows each of them, and their outlines are zones."""
+"""Pictures of tolerance callouts in the documentation."""
 
 import re
 from pathlib import Path
@@ -22,12 +22,12 @@ def test_page_shows_the_picture_of_each_callout():
     assert {p.stem for p in (DOCS / "pictures" / "callouts").iterdir()} == set(shown)
 
 
-def test_outline_of_a_bore_zone_is_a_diamond_of_shift_and_tilt():
-    """|TX| + L/2 |RY| = 25 um for a position of 0.05 mm and a bore of 20 mm."""
+def test_bore_position_zone_is_a_diamond():
+    """A 20 mm bore with a position tolerance of 0.05 mm: |TX| + L/2 |RY| = 25 um."""
     points = outline(axis_position(50e-6, 0.020), 3, 1)  # um, mrad
     assert abs(points[:, 0]) + 10 * abs(points[:, 1]) == pytest.approx(25, rel=1e-6)
 
 
-def test_outline_of_a_round_face_is_a_circle_of_tilts():
+def test_round_face_zone_is_a_circle():
     points = outline(round_plane_position(50e-6, 0.040), 0, 1)
     assert np.linalg.norm(points, axis=1) == pytest.approx(1.25, rel=1e-6)

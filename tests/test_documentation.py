@@ -1,7 +1,7 @@
-"""Every code block of the documentation pages is run; tutorials have their own test.
+"""Run the code blocks of the documentation; ``test_tutorials.py`` runs the tutorials.
 
-Of each command line the options exist; of each page, in an empty folder with the files
-it speaks of, the commands run and the Python runs.  Options in brackets are given.
+Each page is run in an empty folder that contains the files named on the page.  Brackets
+around optional arguments are removed.
 """
 
 import re
@@ -18,9 +18,9 @@ from forcefit.commands.app import app
 from tests.test_tutorials import BLOCK, DOCS, ROOT, blocks
 
 PAGES = {path.stem: path for path in [*DOCS.glob("*.md"), ROOT / "README.md"]}
-# with the tutorials; large files
+# pages that are run with the tutorials, and a page that requires large files
 OTHERS = {"measuring_protocol", "platform_stiffness", "measured_data"}
-# commands of this repository, a cluster, and what takes minutes with more of the same
+# Commands that are not run, and options that are replaced to shorten the computation.
 NOT_RUN = ("make ", "python ", "dask ", ".ci/run")
 CLUSTER = ("dask_jobqueue", "dask_kubernetes")
 FEWER = {
@@ -42,7 +42,7 @@ NAMES = {
 
 
 def command_lines(text):
-    """The command lines of a block of ``sh``, whole, without comments or brackets."""
+    """Yield the command lines of a shell block without comments and brackets."""
     whole = re.sub(r"\\\n\s*", "", text)
     for line in whole.splitlines():
         words = shlex.split(re.sub(r"[\[\]]", "", line), comments=True)
@@ -51,7 +51,7 @@ def command_lines(text):
 
 
 def commands_of(page):
-    """Those of forcefit, of all blocks of a page."""
+    """Yield the arguments of all forcefit commands on a page."""
     for language, _, text in blocks(page):
         if language == "sh":
             for words in command_lines(text):
@@ -62,24 +62,24 @@ def commands_of(page):
 
 
 def parsed(words):
-    """The parser's context of a command, which is not called."""
+    """Parse a command line without running the command."""
     command, name = typer.main.get_command(app), words[0]
     while hasattr(command, "commands"):
         name, *words = words
         command = command.commands[name]
-    # the first context decides the names of a command's help option, which are kept
+    # the names of the help option are cached when the first context is created
     own = app.info.context_settings
     return command.make_context(name, list(words), **own)
 
 
 @pytest.mark.parametrize("name", sorted(PAGES))
-def test_commands_of_a_page_have_valid_options(name, tmp_path, monkeypatch):
+def test_documented_commands_have_valid_options(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for words in commands_of(PAGES[name]):
         parsed(words)
 
 
-def test_every_code_block_of_a_page_states_its_language():
+def test_every_code_block_has_a_language():
     """A block without a language would not be run."""
     for page in PAGES.values():
         text = page.read_text(encoding="utf-8")
@@ -115,16 +115,16 @@ translation = [0.3, 0, 0]
 """
 
 
-def test_toml_blocks_of_a_page_are_valid():
+def test_toml_blocks_are_valid():
     for page in PAGES.values():
         for language, _, text in blocks(page):
             if language == "toml":
                 tomllib.loads(text)
 
 
-# the files that pages speak of -------------------------------------------------------
+# files named on the documentation pages ---------------------------------------------
 def arm(folder, run):
-    """A machine with an effect, as a campaign and as a robot file; targets for it."""
+    """Write a campaign, a robot file with identified effects, and targets."""
     shutil.copytree(
         ROOT / "tests" / "campaigns" / "encoder_offset", folder / "CAMPAIGN"
     )
@@ -139,19 +139,19 @@ def arm(folder, run):
 
 
 def campaign(folder, run):
-    """Measurements of a machine that lacks nothing but its weight."""
+    """Write a campaign in which the model neglects the weight."""
     shutil.copytree(ROOT / "tests" / "campaigns" / "self_weight", folder / "CAMPAIGN")
 
 
 def crank(folder, run):
-    """A machine of one drive with the effects that the page writes down."""
+    """Write a robot file with one drive and the effects shown on the page."""
     effects = next(text for language, _, text in blocks(DOCS / "effects.md")
                    if language == "toml")  # fmt: skip
     (folder / "corrected.toml").write_text(CRANK + effects)
 
 
 def runs(folder, run):
-    """The pages of two runs."""
+    """Write the report pages of two runs."""
     from forcefit.page.page import Page, Provenance, page
 
     for name, worst in (("before", 2.0), ("after", 1.0)):
@@ -160,11 +160,11 @@ def runs(folder, run):
 
 
 def tracker(folder, run):
-    """A device's export of a Delta robot, with repeats, and its commands."""
+    """Write laser tracker data of a Delta robot, and the commands."""
     delta = ff.load_robot("delta")
     run("convert", "delta", "-o", folder / "delta.toml")
     platform = delta.index(delta.platform)
-    rng = np.random.default_rng(1)  # exact repeats are none
+    rng = np.random.default_rng(1)  # noise of the readings
     points = {"SMR1": [0.05, 0.0, 0.02], "SMR2": [-0.03, 0.04, 0.02]}
     home = ff.place_robot(delta).transforms[platform][:3, 3]
     lines, commands = [], ["id;pose.tx;pose.ty;pose.tz"]
@@ -190,7 +190,7 @@ def tracker(folder, run):
 
 
 def links(folder, run):
-    """A beam as other programs write it: 12 rows, and a full matrix with its nodes."""
+    """Write the stiffness matrix of a beam in the formats of other programs."""
     from scipy.io import mmwrite
 
     run("stiffness", "beam", "--length", 0.4, "--radius", 0.02, "--young", 6e10,
@@ -204,7 +204,7 @@ def links(folder, run):
 
 
 def robots(folder, run):
-    """A URDF with its loops, and the same robot in the formats that pages name."""
+    """Write a robot in URDF, MJCF, SDF and TOML."""
     run("convert", "irsbot2", "-o", folder / "robot.urdf")
     shutil.copy(folder / "robot.yaml", folder / "loops.yaml")
     run("convert", "irsbot2", "-o", folder / "scene.xml")
@@ -216,7 +216,7 @@ def robots(folder, run):
 
 
 def plans(folder, run):
-    """Errors, tolerances and postures of the paper's robot."""
+    """Write error distributions, tolerance plans, a path and a study of IRSBot-2."""
     shutil.copy(ROOT / "examples" / "irsbot2_errors.toml", folder / "errors.toml")
     for name in ("plan.toml", "mostly.toml"):
         shutil.copy(ROOT / "examples" / "tolerance_allocation" / "mostly.toml",
@@ -226,7 +226,7 @@ def plans(folder, run):
 
 
 def imperfect(folder, run):
-    """The paper's robot with an error in each link."""
+    """Write a file of IRSBot-2 with a geometric error."""
     run("convert", "irsbot2", "-o", folder / "nominal.toml")
     text = (folder / "nominal.toml").read_text()
     name, error = 'name = "leg1.link_a"\n', "geometric_error = [1e-4, 0, 0, 0, 0, 0]\n"
@@ -235,20 +235,20 @@ def imperfect(folder, run):
 
 
 def with_errors(folder, run):
-    """The robot of the gallery, which its page writes."""
+    """Run the Python block on the gallery page, which writes a robot file."""
     code = next(text for kind, _, text in blocks(DOCS / "gallery.md")
                 if kind == "python")  # fmt: skip
     exec(compile(code, "gallery", "exec"), {})
 
 
 def own_robot(folder, run):
-    """The robot of the tutorial."""
+    """Write the robot file of the tutorial."""
     text = _block("tutorials/own_robot", "my_robot.toml")
     (folder / "my_robot.toml").write_text(text)
 
 
 def _block(page, title):
-    """The file of that title on a page."""
+    """Return the code block with a given title on a page."""
     return next(t for _, name, t in blocks(DOCS / f"{page}.md") if name == title)
 
 
@@ -266,7 +266,7 @@ STAGE = {
 @pytest.mark.slow
 @pytest.mark.exudyn
 @pytest.mark.parametrize("name", sorted(set(PAGES) - OTHERS))
-def test_commands_of_a_page_run_without_error(name, tmp_path, monkeypatch, run):
+def test_documented_commands_run_without_error(name, tmp_path, monkeypatch, run):
     commands = list(commands_of(PAGES[name]))
     if not commands:
         pytest.skip("the page has no commands")
@@ -285,17 +285,15 @@ def test_commands_of_a_page_run_without_error(name, tmp_path, monkeypatch, run):
 
 
 def titled(name, folder):
-    """Write the files that a page shows."""
+    """Write the files shown on a page."""
     for _, title, text in blocks(PAGES[name]):
         if title:
             (folder / title).write_text(text, encoding="utf-8")
 
 
-@pytest.mark.parametrize("name", sorted(set(PAGES) - {"README"}))  # has its own
-def test_python_blocks_of_a_page_print_the_documented_output(
-    name, tmp_path, monkeypatch, capsys
-):
-    """All blocks of a page share one session."""
+@pytest.mark.parametrize("name", sorted(set(PAGES) - {"README"}))
+def test_python_blocks_print_the_documented_output(name, tmp_path, monkeypatch, capsys):
+    """All blocks of a page share one session.  The README has a separate test."""
     (tmp_path / "examples").symlink_to(ROOT / "examples")
     monkeypatch.chdir(tmp_path)
     titled(name, tmp_path)
@@ -307,16 +305,16 @@ def test_python_blocks_of_a_page_print_the_documented_output(
         elif language == "output" and printed is not None:
             same(text, printed)
         else:
-            printed = None  # what follows is a command's
+            printed = None  # the next output block belongs to a command
 
 
 NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]\d+)?")
 
 
 def same(shown, printed):
-    """The same words, and the same numbers where a page does not round them off."""
+    """Check that two texts have equal words, and numbers equal to 0.1 %."""
     assert NUMBER.sub("#", shown).split() == NUMBER.sub("#", printed).split()
     for mine, yours in zip(shown.splitlines(), printed.splitlines(), strict=True):
-        if "certificate" not in mine:  # rounding
+        if "certificate" not in mine:  # rounding errors
             numbers = [[float(n) for n in NUMBER.findall(t)] for t in (mine, yours)]
             assert numbers[0] == pytest.approx(numbers[1], rel=1e-3, abs=1e-12)

@@ -1,7 +1,6 @@
-"""Worked examples on measured data; tests are skipped where the data are missing.
+"""Examples with published measurements; tests are skipped if the data are missing.
 
-The expected numbers come from the data's own README, found by others with other
-programs, or from robots whose errors the tests put in themselves.
+The expected numbers are taken from the README of each data set or computed here.
 """
 
 import csv
@@ -35,7 +34,7 @@ from forcefit.validation.correction.compensation import compensate
 
 
 def needs(name):
-    """Skip a test, with the reason, where a set of data is absent; none is fetched."""
+    """Skip a test if a data set is missing; nothing is downloaded."""
     folder = Path(os.environ.get("FORCEFIT_DATA", DATA)) / name
     return pytest.mark.skipif(not folder.is_dir(), reason=f"{folder}: no such folder")
 
@@ -59,15 +58,15 @@ def test_missing_data_are_downloaded_with_their_checksums(tmp_path, monkeypatch)
     assert len(asked) == 3
 
 
-def test_missing_data_without_pooch_are_refused_with_the_remedy(tmp_path, monkeypatch):
-    monkeypatch.setitem(sys.modules, "pooch", None)  # importing it fails
+def test_missing_data_without_pooch_raise_an_error(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pooch", None)  # makes ``import pooch`` fail
     monkeypatch.delenv("FORCEFIT_DATA", raising=False)
     monkeypatch.setattr(campaign_folder, "DATA", tmp_path)
     with pytest.raises(BadInput, match=r"expected the measured data .*pip install"):
         data_folder("ipa_ur10")
 
 
-def test_base_pose_of_exact_positions_is_recovered(rng):
+def test_base_pose_is_recovered_from_exact_positions(rng):
     """Kabsch's algorithm is exact for exact data."""
     turn = Rotation.random(9, rng=rng).as_matrix()
     T = transform(rng.normal(size=(9, 3)), turn)
@@ -75,13 +74,13 @@ def test_base_pose_of_exact_positions_is_recovered(rng):
     np.testing.assert_allclose(base_pose(T, base @ T), base, atol=1e-13)
 
 
-def test_last_direction_of_motion_is_kept_during_a_rest():
+def test_direction_of_motion_is_kept_during_rest():
     q = np.array([0.0, 0.0, 0.2, 0.2, 0.2001, -0.5, -0.5])
     assert last_direction(q).tolist() == [0, 0, 1, 1, 1, -1, -1]
 
 
-def test_cable_lengths_equal_the_inverse_kinematics_of_the_robot(rng):
-    """The study's norms against the closure solver of 28 frames."""
+def test_cable_lengths_equal_distances_to_the_anchors(rng):
+    """The distances to the anchors equal the coordinates from the closure solver."""
     robot = cable_robot()
     points = rng.uniform([-0.7, -0.7, 0.0], [0.6, 0.7, 1.4], (8, 3))
     postures, reasons = place_many(robot, np.hstack([points, np.zeros((8, 3))]))
@@ -92,17 +91,17 @@ def test_cable_lengths_equal_the_inverse_kinematics_of_the_robot(rng):
     np.testing.assert_allclose(found, lengths, atol=1e-9)
 
 
-# -- the data -------------------------------------------------------------------------
+# -- measured data --------------------------------------------------------------------
 
 
 def spread(height):
-    """Rms about the mean."""
+    """Return the root mean square deviation from the mean."""
     return float(np.std(height))
 
 
 @needs("voron_frame_expansion")
 def test_voron_example_reproduces_the_published_spreads(tmp_path):
-    """80 and 43 um in run a, as stated in the README of the data."""
+    """The README of the data gives 80 and 43 um for run a."""
     a = read_campaign(convert_voron(tmp_path)["run_a"])
     height, warm = a.measured[:, 5], a.covariates["temperature"]
     declared = -0.530 * 23.4e-6 * warm
@@ -111,13 +110,13 @@ def test_voron_example_reproduces_the_published_spreads(tmp_path):
 
 
 def test_hangprinter_data_have_41_samples(tmp_path):
-    """The samples are stored with their converter, under their licence."""
+    """The data are stored in the repository."""
     assert len(read_campaign(convert_hangprinter(tmp_path))) == 41
 
 
 @needs("hilti_trailblazer")
-def test_hilti_robot_from_urdf_has_the_known_mass_and_points(tmp_path):
-    """Its masses are summed by hand; 444 points as stated in its README."""
+def test_hilti_robot_has_the_known_mass_and_points(tmp_path):
+    """The README gives 444 points; the mass is the sum of the masses in the URDF."""
     flat = read_campaign(convert_hilti(tmp_path)["flat"])
     assert len(flat) == 444
     total = sum(frame.mass for frame in flat.robot.frames)
@@ -128,14 +127,14 @@ def test_hilti_robot_from_urdf_has_the_known_mass_and_points(tmp_path):
 @pytest.mark.slow
 @needs("ipa_ur10")
 def test_ur10_series_have_the_known_numbers_of_poses(tmp_path):
-    """The numbers of poses are those of their README."""
+    """The expected numbers of poses are given in the README of the data."""
     folders = convert_ipa(tmp_path)
     counts = {name: len(read_campaign(folder)) for name, folder in folders.items()}
     assert counts == {"A": 11911, "B": 1495}
 
 
 def test_ur10_flange_equals_the_denavit_hartenberg_product():
-    """The robot file's flange against a product of matrices written out here."""
+    """The flange pose is compared with the product of the DH matrices."""
     folder = Path(ipa_ur10.__path__[0])
     robot = read_robot(folder / "ur10.toml")
     dh = (
@@ -156,8 +155,14 @@ def test_ur10_flange_equals_the_denavit_hartenberg_product():
 
 
 def serial_table(path, q, length=0.031):
-    """A row of the data set's columns, of a UR5 with all angles given [degrees]."""
-    # arm straight along -x at zero, the wrist down and back: the maker's drawing
+    """Write a table with one UR5 row, in which only the first joint angle q varies.
+
+    Args:
+        path: file to write.
+        q: first joint angle [deg].
+        length: distance of the reflector from the flange [m].
+    """
+    # at zero angles, the arm is straight along -x (drawing of the manufacturer)
     reach, height = 0.425 + 0.39225, 0.089159 - 0.09465
     aside = 0.10915 + 0.0823 + length
     x, y = -reach * np.cos(np.radians(q)), -reach * np.sin(np.radians(q))
@@ -188,18 +193,18 @@ def test_serial_robot_table_is_found_by_path_or_by_name(tmp_path):
 
 
 @needs("serial_robots")
-def test_targets_of_serial_robots_equal_their_forward_kinematics(tmp_path):
-    """The converter refuses targets that are 0.1 mm off."""
+def test_serial_robot_targets_equal_forward_kinematics(tmp_path):
+    """The converter rejects targets with a deviation of more than 0.1 mm."""
     for path in data_folder("serial_robots").glob("*.csv"):
         campaign = read_campaign(convert_serial(path, tmp_path / path.stem))
         assert len(campaign) in {1000, 216}
 
 
 def reached_by_the_file(path):
-    """(R, 3) targets and (R, 3) positions read [m], by the tracker's six decimals.
+    """Return the targets and the measured positions in a file, each (R, 3) [m].
 
-    Of target + difference and target - difference the one whose cells all have six
-    decimals [mm] is what the tracker wrote.
+    The sign of the differences in the file is not documented.  The tracker writes six
+    decimals [mm], which only target + difference or target - difference has.
     """
     with path.open(newline="", encoding="utf-8-sig") as lines:
         rows = list(csv.DictReader(lines))
@@ -217,7 +222,7 @@ def reached_by_the_file(path):
 
 
 @needs("serial_robots")
-def test_target_plus_deviation_equals_the_tracker_position(tmp_path):
+def test_target_plus_deviation_equals_measured_position(tmp_path):
     for path in data_folder("serial_robots").glob("*.csv"):
         campaign = read_campaign(convert_serial(path, tmp_path / path.stem))
         target, reached = reached_by_the_file(path)
@@ -226,11 +231,11 @@ def test_target_plus_deviation_equals_the_tracker_position(tmp_path):
 
 
 @needs("serial_robots")
-def test_compensate_as_read_halves_the_deviation_of_the_arm(tmp_path):
-    """Only the position of the tracker is corrected in the readings: a rigid motion.
+def test_compensation_halves_the_position_error(tmp_path):
+    """Only the rigid displacement of the tracker frame is compensated.
 
-    Deviations change little over a few mm, so an arm sent to c instead of its target
-    is read at c + deviation.  With the sign reversed the error would double.
+    The deviation changes little over a few mm.  An arm commanded to c instead of the
+    target therefore reaches c + deviation.  With a wrong sign, the error would double.
     """
     (path,) = data_folder("serial_robots").glob("*UR5*.csv")
     campaign = read_campaign(convert_serial(path, tmp_path / "ur5")).take(range(100))

@@ -1,6 +1,6 @@
-"""Damaged files and words: every command works, or prints one line with the reason.
+"""Random invalid input: every command works or prints a one-line message.
 
-Thousands, of every command: ``python benchmarks/fuzz.py``.
+For thousands of inputs to all commands, run ``python benchmarks/fuzz.py``.
 """
 
 import os
@@ -14,7 +14,7 @@ from benchmarks.fuzz_foreign import FOREIGN, write_foreign
 from benchmarks.fuzz_machines import MACHINES, write_machines
 from benchmarks.fuzz_seeds import COMMANDS, write_seeds
 
-# quick ones, that read no file which another command makes
+# fast commands that do not depend on the output of another command
 QUICK = (
     "assembly solve bar.toml --quantities", "assembly solve rounded", "convert bar.sdf",
     "convert tied", "stiffness beam", "stiffness convert long",
@@ -24,7 +24,7 @@ QUICK = (
 
 @pytest.fixture
 def sound_files(tmp_path, monkeypatch):
-    """A folder of sound files; what an input changes of the process is restored."""
+    """Return a folder of valid input files, and restore the signal handlers."""
     folder = tmp_path / "sound"
     folder.mkdir()
     write_seeds(folder)
@@ -40,7 +40,7 @@ def sound_files(tmp_path, monkeypatch):
         signal.signal(number, handler)
 
 
-def test_damaged_inputs_are_refused_in_one_line_and_leave_no_file(sound_files):
+def test_damaged_input_has_a_one_line_message_and_no_output(sound_files):
     commands = [
         (weight, command) for weight, command in [*COMMANDS, *FOREIGN, *MACHINES]
         if command.startswith(QUICK)

@@ -17,12 +17,12 @@ MODULES = ("forcefit", "forcefit.stiffness", "forcefit.assembly", "forcefit.vali
 CONTRACTS = LINTER["contracts"]
 (OWNED,) = (c["forbidden_modules"] for c in CONTRACTS if "large packages" in c["name"])
 HEAVY = {*OWNED, "pyvista", "matplotlib"} - {"typer"}
-# of use to sweeps, statistics, files and drawings, not to one posture
+# packages that are not needed to solve one posture
 FOR_MANY = (
     "dask", "h5py", "pandas", "rich", "scipy.interpolate", "scipy.ndimage",
     "scipy.optimize", "scipy.spatial", "scipy.stats", "vtkmodules",
 )  # fmt: skip
-# a file, the import added to it, and how import-linter reports it, by contract
+# for each contract: file, import added to it, and text in the linter report
 BROKEN = {
     "layers of forcefit": [
         ("stiffness/link.py", "import forcefit.assembly.model.robot",
@@ -78,7 +78,7 @@ BROKEN = {
 
 
 def lint(tree):
-    """Exit status of import-linter in a tree, and its report."""
+    """Return the exit status and the report of import-linter."""
     code = "from importlinter.cli import lint_imports as f; exit(f(no_cache=True))"
     run = [sys.executable, "-c", code]
     wide = os.environ | {"COLUMNS": "200"}
@@ -87,7 +87,7 @@ def lint(tree):
 
 
 def in_memory(code, tree):
-    """Modules in memory after a fresh Python ran some code."""
+    """Return the modules that a new Python process has imported after some code."""
     code = f"{code}\nimport sys; print(*sys.modules, file=sys.stderr)"
     run = [sys.executable, "-c", code]
     answer = subprocess.run(run, cwd=tree, capture_output=True, text=True, check=True)
@@ -95,7 +95,7 @@ def in_memory(code, tree):
 
 
 def loaded(modules, tree):
-    """Heavy packages in memory after modules were imported in a fresh Python."""
+    """Return the heavy packages imported by modules in a new Python process."""
     return sorted(HEAVY & in_memory(f"import {modules}", tree))
 
 
@@ -105,7 +105,7 @@ def test_every_import_of_the_project_is_allowed():
 
 
 def test_every_forbidden_import_is_reported(tmp_path):
-    """A copy of the sources violates each contract, in one run."""
+    """All contracts are violated in a copy of the sources."""
     for package in FOLDERS:
         only = shutil.ignore_patterns("*.so", "*.cpp", "*.h", "__pycache__")
         shutil.copytree(ROOT / package, tmp_path / package, symlinks=True, ignore=only)
@@ -138,7 +138,7 @@ def test_module_imports_no_heavy_package(module):
 
 
 @pytest.mark.slow
-def test_importing_all_modules_imports_no_heavy_package():
+def test_all_modules_import_no_heavy_package():
     files = [path for folder in FOLDERS for path in (ROOT / folder).rglob("*.py")]
     names = [".".join(path.relative_to(ROOT).with_suffix("").parts) for path in files]
     modules = sorted(
@@ -163,10 +163,7 @@ def test_importing_all_modules_imports_no_heavy_package():
     ],
 )  # fmt: skip
 def test_command_imports_only_the_packages_that_it_uses(words, left_out):
-    """Imports decide the start-up time; benchmarks/startup.py measures it.
-
-    Several in one process: what none of them is to import, none has.
-    """
+    """Additional imports would slow down the start; see benchmarks/startup.py."""
     code = f"""
 import sys
 from forcefit.commands import app as command

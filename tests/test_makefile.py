@@ -1,4 +1,4 @@
-"""The environment that `make` sets up uses the Python that is named."""
+"""``make`` creates a virtual environment with the requested Python version."""
 
 import os
 import shutil
@@ -14,13 +14,13 @@ pytestmark = pytest.mark.skipif(shutil.which("make") is None, reason="no make")
 
 
 def commands(folder, *stamps):
-    """What `make test` would do with an environment that has these stamps."""
+    """Return the commands of ``make test`` if ``.venv`` contains given stamp files."""
     for name in ("Makefile", "pyproject.toml", "CMakeLists.txt"):
         shutil.copyfile(ROOT / name, folder / name)
     (folder / ".venv").mkdir()
     for stamp in stamps:
         (folder / ".venv" / stamp).touch()
-    # where make itself runs the tests, its variables are not those of this call
+    # variables of an outer make that runs this test are removed
     outer = ("MAKEFLAGS", "MAKEOVERRIDES", "MFLAGS", "PYTHON", "VENV")
     own = {name: value for name, value in os.environ.items() if name not in outer}
     return subprocess.run(
@@ -30,7 +30,7 @@ def commands(folder, *stamps):
 
 
 @pytest.mark.parametrize("stamp", ["ready", "ready-3.9", "unfinished"])
-def test_environment_of_another_python_is_created_again(tmp_path, stamp):
+def test_environment_of_a_different_python_is_recreated(tmp_path, stamp):
     assert f"{sys.executable} -m venv --clear .venv" in commands(tmp_path, stamp)
 
 
@@ -41,14 +41,14 @@ def test_environment_is_reused_if_the_python_version_is_unchanged(tmp_path):
     assert "pytest" in found
 
 
-def test_package_is_built_again_if_its_sources_are_newer(tmp_path):
+def test_package_is_rebuilt_if_its_sources_are_newer(tmp_path):
     found = commands(tmp_path, f"empty-{OWN}")
     assert "venv --clear" not in found
     assert "pip install" in found
 
 
 @pytest.mark.skipif(shutil.which("sh") is None, reason="no shell")
-def test_newest_python_is_listed_in_pyproject_and_runs():
+def test_newest_python_runs_and_is_listed_in_pyproject():
     found = subprocess.run(
         ["sh", ".ci/newest_python"], capture_output=True, text=True, cwd=ROOT,
         check=True,

@@ -1,4 +1,4 @@
-"""The map in the docs names existing functions and all packages."""
+"""The page ``docs/map.md`` names existing functions and all packages."""
 
 import re
 from importlib import import_module
@@ -35,7 +35,7 @@ def test_every_package_folder_is_on_the_map():
 
 
 def test_every_public_name_is_in_the_reference():
-    """A page an area; what is not public comes last on its page."""
+    """Each page lists public names first, followed by names in their modules."""
     owned, others = [], []
     for path in DOCS.glob("api_*.md"):
         parts = path.read_text("utf-8").partition("## In their modules")
@@ -50,14 +50,14 @@ def test_every_public_name_is_in_the_reference():
         assert name not in dir(ff)
 
 
-def test_every_docs_page_is_in_the_site():
-    """Pages missing in mkdocs.yml would not be published."""
+def test_every_docs_page_is_listed_in_mkdocs():
+    """A page that is missing in mkdocs.yml would not be published."""
     listed = (DOCS.parent / "mkdocs.yml").read_text("utf-8")
     pages = {path.relative_to(DOCS).as_posix() for path in DOCS.rglob("*.md")}
     assert {page for page in pages if f": {page}\n" not in listed} == set()
 
 
-def test_dir_of_the_package_lists_exactly_the_public_names():
+def test_dir_lists_exactly_the_public_names():
     assert set(dir(ff)) == set(ff.__all__)
     for name in dir(ff):
         assert getattr(ff, name) is not None

@@ -1,4 +1,4 @@
-"""The notebooks of the examples: without outputs, and their cells run in order."""
+"""Example notebooks are stored without outputs and run without errors."""
 
 import json
 import re
@@ -14,14 +14,14 @@ NOTEBOOKS = {path.stem: path for path in (ROOT / "examples/notebooks").glob("*.i
 
 
 def cells(name):
-    """Cells of code of a notebook."""
+    """Return the code cells of a notebook."""
     book = json.loads(NOTEBOOKS[name].read_text(encoding="utf-8"))
     assert (book["nbformat"], book["nbformat_minor"]) == (4, 5)
     return [cell for cell in book["cells"] if cell["cell_type"] == "code"]
 
 
 def variables(name, folder, monkeypatch):
-    """The variables after all cells, which are one session."""
+    """Run all cells of a notebook, and return the variables."""
     matplotlib = pytest.importorskip("matplotlib")
     matplotlib.use("Agg")
     monkeypatch.chdir(folder)
@@ -39,8 +39,8 @@ def test_notebook_has_no_stored_outputs(name):
 
 
 @pytest.mark.parametrize("name", sorted(NOTEBOOKS))
-def test_notebook_uses_the_public_names_only(name):
-    """Modules of the packages may move; ``forcefit`` and its names stay."""
+def test_notebook_uses_only_public_names(name):
+    """Names in the modules of the packages may change."""
     source = "\n".join("".join(cell["source"]) for cell in cells(name))
     modules = re.findall(r"^(?:from|import) ([\w.]+)", source, re.MULTILINE)
     assert "forcefit" in modules
@@ -49,7 +49,7 @@ def test_notebook_uses_the_public_names_only(name):
     }
 
 
-def test_page_of_notebooks_lists_every_notebook():
+def test_notebooks_page_lists_every_notebook():
     page = (ROOT / "docs/notebooks.md").read_text(encoding="utf-8")
     listed = re.findall(r"\[(\w+)\.ipynb\]\(notebooks/\1\.ipynb\)", page)
     assert sorted(listed) == sorted(NOTEBOOKS)
@@ -57,20 +57,18 @@ def test_page_of_notebooks_lists_every_notebook():
 
 @pytest.mark.slow
 @pytest.mark.exudyn
-def test_notebook_for_a_custom_robot_ends_with_a_report(tmp_path, monkeypatch):
-    """A planar loop of five bars: 2 freedoms, 3 constraints out of the plane."""
+def test_custom_robot_notebook_writes_a_report(tmp_path, monkeypatch):
+    """A planar five-bar has 2 degrees of freedom and 3 redundant constraints."""
     found = variables("own_robot", tmp_path, monkeypatch)
     assert (found["mobility"].freedoms, found["mobility"].overconstraint) == (2, 3)
     assert not found["zone"].assemblable
-    assert found["results"].passed  # checked by a multibody simulation
+    assert found["results"].passed  # includes a multibody simulation
     assert (tmp_path / "study" / "report.html").is_file()
 
 
 @pytest.mark.slow
-def test_rotations_in_the_notebook_of_the_seoul_robot_equal_the_closed_form(
-    tmp_path, monkeypatch
-):
-    """The corners of three slabs: 48.033 mrad at 20 mm; as 1/distance near home."""
+def test_seoul_robot_notebook_agrees_with_closed_form(tmp_path, monkeypatch):
+    """The rotation is 48.033 mrad at 20 mm, and proportional to 1/distance."""
     pytest.importorskip("xarray")
     found = variables("seoul", tmp_path, monkeypatch)
     assert found["mobility"].freedoms == 5
@@ -80,12 +78,10 @@ def test_rotations_in_the_notebook_of_the_seoul_robot_equal_the_closed_form(
 
 
 @pytest.mark.slow
-def test_deflection_in_the_notebook_of_a_cad_link_equals_that_of_a_cone(
-    tmp_path, monkeypatch
-):
-    """Bending and shear of a cone by hand, which a rigid end stiffens by 1 to 2 %.
+def test_cad_link_notebook_agrees_with_cone_deflection(tmp_path, monkeypatch):
+    """Deflection of a cone: F L^3 / (3 E I) R / r + F L / (k G pi R r).
 
-    F L^3 / (3 E I) R / r + F L / (k G pi R r); mass pi L / 3 (R^2 + R r + r^2) rho.
+    A rigid end increases the stiffness by 1 to 2 %.
     """
     found = variables("link_from_cad", tmp_path, monkeypatch)
     F, L, R, r, E, nu = 100.0, 0.35, 0.045, 0.025, 7e10, 0.33
@@ -98,7 +94,7 @@ def test_deflection_in_the_notebook_of_a_cad_link_equals_that_of_a_cone(
     assert found["arm"].mass == pytest.approx(2700 * volume, rel=1e-4)
     # Saint-Venant's torsion is exact for a round bar with rigid faces
     assert found["twist"] == pytest.approx(1, abs=2e-4)
-    # K of a solid bar is at most that of a bar shorter by its radius
+    # a rigid end stiffens a bar by less than a reduction of its length by its radius
     assert 1 < found["stretch"] < 0.452 / (0.452 - 0.04)
     assert sum(frame.link is not None for frame in found["solids"].frames) == 4
     assert (found["ratio"] > 1).all()
@@ -106,10 +102,8 @@ def test_deflection_in_the_notebook_of_a_cad_link_equals_that_of_a_cone(
 
 
 @pytest.mark.slow
-def test_numbers_in_the_notebook_of_a_campaign_equal_those_of_the_command(
-    tmp_path, monkeypatch, run
-):
-    """Held-out errors of the command; commands compensate what the machine deviates."""
+def test_campaign_notebook_agrees_with_the_command(tmp_path, monkeypatch, run):
+    """The errors on held-out rows are equal; compensation removes the deviation."""
     pytest.importorskip("xarray")
     found = variables("campaign_to_machine", tmp_path, monkeypatch)
     code, text, _ = run(
@@ -121,20 +115,14 @@ def test_numbers_in_the_notebook_of_a_campaign_equal_those_of_the_command(
     for when in ("before", "after"):
         assert vars(getattr(found["diagnosis"], when)) == pytest.approx(printed[when])
     assert found["diagnosis"].verdict == "explained"
-    # noise of the campaign's file, and none of the deviation with the offsets
+    # only the measurement noise of 5 um remains after the identification
     assert printed["after"]["position"] == pytest.approx(5e-6, rel=0.1)
     assert found["after"] < 1e-3 < 100 < found["before"]  # [um]
 
 
 @pytest.mark.slow
-def test_bounds_in_the_notebook_of_drawing_tolerances_contain_all_draws(
-    tmp_path, monkeypatch
-):
-    """No machine exceeds the bound; parts of the drawing are as in the robot file.
-
-    The shares sum to the support along the direction of the value attained, which is
-    at least that value, and at most the bound.
-    """
+def test_tolerance_notebook_bounds_exceed_all_draws(tmp_path, monkeypatch):
+    """The sum of the shares lies between the attained value and the bound."""
     pytest.importorskip("xarray")
     found = variables("drawing_tolerances", tmp_path, monkeypatch)
     worst = found["worst"]
@@ -149,10 +137,8 @@ def test_bounds_in_the_notebook_of_drawing_tolerances_contain_all_draws(
 
 
 @pytest.mark.slow
-def test_stiffness_in_the_notebook_of_maps_agrees_with_the_sum_over_struts(
-    tmp_path, monkeypatch
-):
-    """K = sum of k w w'; the robot is symmetric about the plane x = 0."""
+def test_map_notebook_agrees_with_the_sum_over_struts(tmp_path, monkeypatch):
+    """K is the sum of k w w^T over the struts, and symmetric about the plane x = 0."""
     pytest.importorskip("xarray")
     found = variables("stiffness_maps", tmp_path, monkeypatch)
     assert found["error"].max() < 1e-9
@@ -165,18 +151,16 @@ def test_stiffness_in_the_notebook_of_maps_agrees_with_the_sum_over_struts(
 
 
 @pytest.mark.slow
-def test_numbers_in_the_notebook_of_the_paper_equal_the_reference(
-    tmp_path, monkeypatch
-):
-    """Two or three digits of another program, as in tests of the paper's study."""
+def test_paper_notebook_agrees_with_reference_values(tmp_path, monkeypatch):
+    """The reference values, computed by a different program, have 2 or 3 digits."""
     pytest.importorskip("xarray")
     found = variables("paper_figures", tmp_path, monkeypatch)
     assert (len(found["frames"]), found["mobility"].freedoms) == (21, 2)
     assert int(found["reached"].sum()) == 1113
     assert found["share"] == pytest.approx(15.9, abs=0.1)
     for name, row in found["reference"].items():
-        # half a unit of the second digit
+        # the reference is rounded to two digits
         assert found["found"][name] == pytest.approx(row[2:], rel=0.05), name
     alone = found["alone"]
-    # the bounds are as accurate as in the paper, to 1 um
+    # bounds are computed to 1 um, as in the paper
     assert np.nanmax(np.abs(alone - alone[::-1])) <= 1e-6

@@ -1,4 +1,4 @@
-"""The check of private words finds them in sources and pages, and no other words."""
+"""Tests of ``.ci/plain_words.py``, which finds private words in texts."""
 
 import runpy
 from pathlib import Path
@@ -8,7 +8,7 @@ WORDS = {"side row": "held-out", "gizmo": "candidate model"}
 
 
 def found(text, *names):
-    """Return what the check finds in a text."""
+    """Return the private words found in a text."""
     return list(CHECK["find_words"](text, WORDS, names))
 
 
@@ -38,5 +38,5 @@ def test_comments_and_docstrings_are_reported_with_their_lines():
     assert CHECK["comments"](source) == expected
 
 
-def test_cpp_comments_keep_their_lines():
+def test_cpp_comments_keep_their_line_numbers():
     assert CHECK["comments"]("int x;  // note\nint y;", python=False) == " note\n"

@@ -10,7 +10,7 @@ README = (ROOT / "README.md").read_text(encoding="utf-8")
 
 
 def python_example():
-    """The README's lines of Python."""
+    """Return the Python example in the README."""
     (code,) = re.findall(r"```python\n(.*?)```", README, flags=re.S)
     return code
 
@@ -23,7 +23,7 @@ def test_readme_python_example_runs_within_20_lines():
     assert done.returncode == 0, done.stderr
     zone, energy, *_ = lines = done.stdout.splitlines()
     assert len(lines) == 4
-    # an example in which nothing is forced would show nothing
+    # the example must require forces for its assembly
     assert zone.startswith("assembles by clearance: False, margin ")
     assert float(energy.split()[1]) > 1.0  # mJ
 

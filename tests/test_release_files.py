@@ -1,4 +1,4 @@
-"""Files that a release needs: citation, recipes, templates, the test of the wheel."""
+"""Files of a release: citation, conda recipe and issue templates."""
 
 import re
 import tomllib
@@ -11,7 +11,7 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
 
 
 def names_and_bounds(lines):
-    """Requirements without blanks, by name."""
+    """Return the version bounds of requirements by name."""
     pairs = (re.match(r"([\w-]+)\s*(.*)", line) for line in lines)
     return {m[1]: m[2] for m in pairs if m}
 
@@ -20,7 +20,7 @@ def test_citation_names_the_paper_of_the_method():
     yaml = pytest.importorskip("yaml")
     citation = yaml.safe_load((ROOT / "CITATION.cff").read_text("utf-8"))
     (paper,) = citation["references"]
-    # as on the first page of the authors' copy, hal-01941644
+    # authors as in the preprint hal-01941644
     assert [a["family-names"] for a in paper["authors"]] == [
         "Corradi", "Caro", "Chablat", "Cardou",
     ]  # fmt: skip
@@ -28,7 +28,7 @@ def test_citation_names_the_paper_of_the_method():
     assert " ".join(paper["title"].split()) in " ".join(citation["abstract"].split())
 
 
-def test_conda_recipe_has_the_bounds_of_pyproject():
+def test_conda_recipe_has_the_version_bounds_of_pyproject():
     yaml = pytest.importorskip("yaml")
     recipe = yaml.safe_load((ROOT / "conda/recipe.yaml").read_text("utf-8"))
     conda = names_and_bounds(recipe["requirements"]["run"])

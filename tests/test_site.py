@@ -1,4 +1,4 @@
-"""The site: formulas with the numbers of the paper; pages open from a folder."""
+"""Documentation site: formulas, scenes, search and accessibility."""
 
 import html
 import os
@@ -14,7 +14,7 @@ from tests.axe_for_tests import scheme, violations
 from tests.forcefit.page.test_browser import browser, wait
 from tests.test_tutorials import DOCS, ROOT, blocks
 
-LAST = 27  # number of the paper's last equation
+LAST = 27  # number of the last equation in the paper
 SLOW = "Multiple readback operations using getImageData"
 
 
@@ -25,12 +25,12 @@ def test_theory_page_has_each_equation_of_the_paper_once():
 
 
 def hooks():
-    """The functions of docs/hooks.py."""
+    """Return the functions of docs/hooks.py."""
     pytest.importorskip("latex2mathml", reason="formulas need the packages of [docs]")
     return runpy.run_path(str(DOCS / "hooks.py"))
 
 
-def test_formula_becomes_mathml_with_its_number():
+def test_formula_is_converted_to_mathml_with_its_number():
     text = hooks()["equation"]("x^2 \\le \\frac{1}{2}\n\\tag{2′-3′}\n")
     plain = html.unescape(text)
     assert "<msup><mi>x</mi><mn>2</mn></msup>" in plain
@@ -41,7 +41,7 @@ def test_formula_becomes_mathml_with_its_number():
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory):
-    """Folder of the site."""
+    """Build the site, and return its folder."""
     pytest.importorskip("latex2mathml", reason="the site needs the packages of [docs]")
     pytest.importorskip("material", reason="the site needs the packages of [docs]")
     folder = tmp_path_factory.mktemp("site")
@@ -54,7 +54,7 @@ def site(tmp_path_factory):
 
 
 @pytest.mark.slow
-def test_no_page_shows_the_source_of_a_formula(site):
+def test_no_page_shows_latex_source(site):
     for path in site.rglob("*.html"):
         text = path.read_text(encoding="utf-8")
         assert not re.search(r"\\mathbf|\\tag|\$<code>", text), path.name
@@ -62,12 +62,12 @@ def test_no_page_shows_the_source_of_a_formula(site):
 
 
 def pages_of(site):
-    """All pages but the one that a server shows in place of one that is missing."""
+    """Return all pages except the error page 404.html."""
     return [path for path in site.rglob("*.html") if path.name != "404.html"]
 
 
 @pytest.mark.slow
-def test_every_page_opens_from_its_folder_without_an_error(site):
+def test_every_page_opens_without_an_error(site):
     pages = pages_of(site)
     scenes = [path for path in pages if path.parent.name == "scenes"]
     assert len(pages) - len(scenes) == len(list(DOCS.rglob("*.md")))
@@ -75,7 +75,7 @@ def test_every_page_opens_from_its_folder_without_an_error(site):
     try:
         for path in pages:
             tab.get(path.as_uri())
-            # plotly.js measures its texts in a way that Chromium calls slow
+            # Chromium warns that plotly.js measures texts slowly
             log = [m for m in tab.get_log("browser") if SLOW not in m["message"]]
             assert log == [], path.name
     finally:
@@ -83,8 +83,8 @@ def test_every_page_opens_from_its_folder_without_an_error(site):
 
 
 @pytest.mark.slow
-def test_gallery_has_a_scene_of_each_robot_that_the_browser_draws(site):
-    """The built-in robots and the drawn examples; the frame out of view is removed."""
+def test_gallery_has_a_scene_of_each_robot(site):
+    """Frames outside the visible area are removed."""
     drawn = {path.stem for path in (ROOT / "examples" / "drawn").glob("*.toml")}
     expected = {*BUILT_IN} | {f"drawn_{n}" if n in BUILT_IN else n for n in drawn}
     assert {path.stem for path in (site / "scenes").iterdir()} == expected
@@ -107,8 +107,8 @@ def test_gallery_has_a_scene_of_each_robot_that_the_browser_draws(site):
 
 
 @pytest.mark.slow
-def test_search_of_the_site_finds_a_page_opened_from_a_folder(site):
-    """The page of the built-in robots names Kutzbach."""
+def test_search_works_without_a_server(site):
+    """The search term is the name Kutzbach on the page of built-in robots."""
     assert "Kutzbach" in (DOCS / "robots.md").read_text("utf-8")
     tab = browser()
     try:
@@ -127,8 +127,8 @@ def test_search_of_the_site_finds_a_page_opened_from_a_folder(site):
 
 
 @pytest.mark.slow
-def test_formulas_are_drawn_by_the_browser(site):
-    """A fraction is higher than a letter, and a matrix higher than a fraction."""
+def test_browser_displays_formulas(site):
+    """A displayed fraction is taller than a letter, and a matrix is taller still."""
     tab = browser()
     try:
         tab.get((site / "theory.html").as_uri())
@@ -143,7 +143,7 @@ def test_formulas_are_drawn_by_the_browser(site):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("colours", ["light", "dark"])
-def test_no_page_breaks_a_serious_rule_of_accessibility(site, colours):
+def test_no_page_has_a_serious_accessibility_violation(site, colours):
     tab = browser()
     try:
         scheme(tab, colours)

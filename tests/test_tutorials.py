@@ -1,8 +1,8 @@
-"""Tutorials run as written: files, commands, and printed output.
+"""Run the files, commands and Python code of the tutorials.
 
-Of a page, in its order: a block with a title is a file; ``sh`` is run; ``output`` are
-lines of which each begins or is part of a line the commands before it printed;
-``python`` blocks are one session.
+A code block with a title is written to a file.  Blocks of type ``sh`` are run.  Each
+line of an ``output`` block must occur in the output of the previous commands.  All
+``python`` blocks of a page share one session.
 """
 
 import json
@@ -18,19 +18,20 @@ ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
 BLOCK = re.compile(r'^```(\w+)(?: title="([^"]+)")?\n(.*?)^```', re.M | re.S)
 TUTORIALS = sorted(path.stem for path in (DOCS / "tutorials").glob("*.md"))
-# beside them: pages whose answers are compared
+# other pages whose printed output is checked
 FOLLOWED = ("platform_stiffness", "seoul")
 
 
 def blocks(page):
-    """Language, title and text of each block of a page."""
+    """Return language, title and text of each code block on a page."""
     return BLOCK.findall(page.read_text(encoding="utf-8"))
 
 
 def follow(page, folder):
-    """Do what a page says, in an empty folder beside the repository's files.
+    """Run the code blocks of a page in an empty folder.
 
-    Returns how many blocks were run and how many lines of output compared.
+    Returns:
+        Number of blocks run, and number of output lines compared.
     """
     for place in ("meshes", "examples"):
         (folder / place).symlink_to(ROOT / place)
@@ -53,7 +54,7 @@ def follow(page, folder):
                 compared += 1
         elif language == "python":
             session.append(text)
-            # what was defined before is defined again: cheap, and one process a block
+            # each process runs all previous blocks as well
             code = "\n".join(session)
             done = subprocess.run(
                 [sys.executable, "-c", code], cwd=folder, env=environment,
@@ -67,7 +68,7 @@ def follow(page, folder):
 @pytest.mark.slow
 @pytest.mark.exudyn
 @pytest.mark.parametrize("name", TUTORIALS)
-def test_tutorial_runs_with_the_printed_output(tmp_path, name):
+def test_tutorial_prints_the_documented_output(tmp_path, name):
     ran, compared = follow(DOCS / "tutorials" / f"{name}.md", tmp_path)
     assert ran > 2
     assert compared > 0
@@ -75,15 +76,15 @@ def test_tutorial_runs_with_the_printed_output(tmp_path, name):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", FOLLOWED)
-def test_page_runs_with_the_printed_output(tmp_path, name):
+def test_page_prints_the_documented_output(tmp_path, name):
     ran, compared = follow(DOCS / f"{name}.md", tmp_path)
     assert ran > 3
     assert compared > 1
 
 
 @pytest.mark.slow
-def test_files_of_the_measuring_protocol_are_a_valid_campaign(tmp_path):
-    """The last block of the page names a campaign that is still to be measured."""
+def test_measuring_protocol_files_are_a_valid_campaign(tmp_path):
+    """The last part of the page requires real measurements and is not run."""
     page = (DOCS / "measuring_protocol.md").read_text(encoding="utf-8")
     own, mark, _ = page.partition("When the session is complete")
     assert mark
@@ -91,4 +92,4 @@ def test_files_of_the_measuring_protocol_are_a_valid_campaign(tmp_path):
     (tmp_path / "lab").mkdir()
     follow(tmp_path / "page.md", tmp_path / "lab")
     inspected = json.loads((tmp_path / "lab" / "inspected.json").read_text())
-    assert inspected["rows"] == 5  # points that were read
+    assert inspected["rows"] == 5  # measured points

@@ -1,4 +1,4 @@
-"""The version of a build, by the rules of pyproject.toml."""
+"""Package versions computed by setuptools_scm."""
 
 import os
 import shutil
@@ -23,7 +23,7 @@ def git(folder, *words):
 
 
 def version(folder):
-    """As the build finds it."""
+    """Return the version that a build in this folder would have."""
     words = "from setuptools_scm import Configuration, _get_version as v"
     words += "; print(v(Configuration.from_file('pyproject.toml')))"
     words = [sys.executable, "-W", "ignore", "-c", words]
@@ -72,7 +72,7 @@ def test_version_before_the_first_tag_counts_the_commits(repository, tmp_path):
     assert version(shallow).startswith(f"{NEXT}.dev1+g")
 
 
-def test_version_equals_the_tag_and_later_commits_have_the_next_development_version(
+def test_version_equals_the_tag_and_increases_with_later_commits(
     repository,
 ):
     git(repository, "tag", "v7.2.0")
