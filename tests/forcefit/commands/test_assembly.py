@@ -1,4 +1,4 @@
-"""``assembly error`` at a point and along a direction; ``exact`` under gravity."""
+"""Commands ``forcefit assembly error``, ``solve`` and related commands."""
 
 import json
 from dataclasses import replace
@@ -19,7 +19,7 @@ from tests.three_upu_for_tests import three_upu
 ROBOT = ["irsbot2", "--pose", "tx=0.1,tz=-0.5"]
 
 
-def test_error_at_a_point_along_a_direction_equals_that_of_python(run):
+def test_error_along_a_direction_equals_python_result(run):
     status, out, _ = run(
         "assembly", "error", *ROBOT, "--assumption", "free", "--at", "x=0.1,z=-0.05",
         "--along", "tx=1,tz=-1", "--json", "-",
@@ -60,13 +60,11 @@ def test_solve_reports_the_linearisation_error_under_gravity(run):
     )
 
 
-def test_pose_error_under_a_load_is_the_sag_plus_the_error_from_clearances(
-    run, tmp_path
-):
-    """A pin with clearance on an elastic post under a downward load.
+def test_loaded_pose_error_is_sag_plus_clearance(run, tmp_path):
+    """A pin with clearance is mounted on an elastic post under a downward load.
 
-    The load closes the axial clearance, so that only the radial one remains; the post
-    deflects by F / k. By hand.
+    The load moves the joint to its axial bound, so that only the radial clearance
+    remains.  The post deflects by F / k.
     """
     (tmp_path / "post.toml").write_text("""
 platform = "tip"
@@ -93,7 +91,7 @@ mass = 3.0
     assert bounds["upper"] >= far * (1 - 1e-9)
     assert bounds["upper"] - bounds["lower"] <= 1e-6
     _, out, _ = run(*words, "--gravity", "z=-10", "--json", "-")
-    # the post's own mass hangs before its joint
+    # the mass of frame "post" is attached before its spring
     sag = 2e-5 + (20 + 3.0 * 10) / 1e6
     screw = json.loads(out)["platform_screw"]
     assert screw[5] == pytest.approx(-sag, rel=1e-9)
@@ -116,9 +114,8 @@ parent = "hinge"
 """
 
 
-def test_each_assumption_and_component_has_a_separate_result(run, tmp_path):
-    """A moment that the hinge's own spring carries:
-    by hand M / k, and the clearance."""
+def test_each_assumption_has_a_separate_result(run, tmp_path):
+    """The rotation under a moment is M / k of the hinge; the clearance is added."""
     file = tmp_path / "hinge.toml"
     file.write_text(HINGE)
     status, out, _ = run("assembly", "error", file, "--load", "mz=0.1")
@@ -153,16 +150,14 @@ def test_each_assumption_and_component_has_a_separate_result(run, tmp_path):
         (["solve", "--mismatch", "glue"], '--mismatch: found "glue"'),
     ],
 )  # fmt: skip
-def test_number_or_name_that_an_option_cannot_use_is_refused_by_the_option(
-    run, words, message
-):
+def test_message_about_an_invalid_value_names_the_option(run, words, message):
     status, out, err = run("assembly", words[0], "five_bar", *words[1:])
     assert (status, out) == (2, "")
     assert message in err
     assert err.count("\n") == 1
 
 
-def test_python_refuses_numbers_that_are_not_finite_or_too_large():
+def test_functions_reject_infinite_or_huge_numbers():
     posture = home_posture(load_robot("five_bar"))
     with pytest.raises(BadInput, match=r"load: found 1e\+300, expected finite numbers"):
         solve_assembly(posture, [0, 0, 0, 1e300, 0, 0])
@@ -192,7 +187,7 @@ most = [5e-4, 5e-4, 5e-4, 5e-5, 5e-5, 5e-5]
      ("solve", "--quantities", "margin"),
      ("sweep", "--grid", "tx=0,ty=0,tz=0.45", "-o", "x.nc")],
 )  # fmt: skip
-def test_every_command_reports_that_first_order_is_inconclusive_when_singular(
+def test_commands_report_inconclusive_analysis_at_singularity(
     run, tmp_path, monkeypatch, words
 ):
     monkeypatch.chdir(tmp_path)
@@ -205,7 +200,7 @@ def test_every_command_reports_that_first_order_is_inconclusive_when_singular(
 
 
 def with_a_limit(path):
-    """An orthoglide whose first slide may not stand at -0.26 m."""
+    """Write an Orthoglide whose first slide has the limits -0.4 and -0.3 m."""
     robot = load_robot("orthoglide")
     frames = tuple(
         replace(f, limits=(-0.4, -0.3)) if f.name == "x.slide" else f
@@ -221,7 +216,7 @@ def with_a_limit(path):
      ("stiffness",), ("deflection", "--along", "fz=0:-10:10"),
      ("solve", "--load", "fz=-10")],
 )  # fmt: skip
-def test_every_command_reports_a_posture_beyond_the_joint_limits(
+def test_commands_report_postures_beyond_joint_limits(
     run, tmp_path, monkeypatch, words
 ):
     monkeypatch.chdir(tmp_path)
@@ -234,9 +229,7 @@ def test_every_command_reports_a_posture_beyond_the_joint_limits(
     assert (out + err).count(said) == 1
 
 
-def test_statistics_beyond_the_joint_limits_have_exit_status_1(
-    run, tmp_path, monkeypatch
-):
+def test_statistics_beyond_joint_limits_has_exit_status_1(run, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     with_a_limit(tmp_path / "r.toml")
     (tmp_path / "errors.toml").write_text(SOURCES)

@@ -46,7 +46,7 @@ CAMPAIGN = (EXAMPLES / "campaign/campaign.toml").read_text("utf-8")
 PLAN = (EXAMPLES / "tolerance_allocation/mostly.toml").read_text("utf-8")
 ERRORS = (EXAMPLES / "irsbot2_errors.toml").read_text("utf-8")
 DRAWN = (EXAMPLES / "drawn/tricept.toml").read_text("utf-8")
-# by kind of file: a sound text, options of the command, the reader, and mistakes
+# for each file type: valid text, command options, reader, and mistakes to insert
 KINDS = {
     "robot of frames": (FOUR_BAR, (), load_robot, [
         ("translation = [0.3, 0, 0]", 'translation = [0.3, 0, "a"]'),
@@ -100,7 +100,7 @@ KINDS = {
 
 
 def written(folder, kind, mistakes):
-    """A file with mistakes; a campaign's other files are those of the example."""
+    """Write a file with mistakes; for a campaign, copy the other example files."""
     text = KINDS[kind][0]
     for sound, wrong in mistakes:
         assert text.count(sound) == 1, sound
@@ -115,14 +115,14 @@ def written(folder, kind, mistakes):
 
 
 def first_message(read, file):
-    """The message at which a reader stops."""
+    """Return the message of the error that a reader raises."""
     with pytest.raises(BadInput) as stopped:
         read(file)
     return str(stopped.value)
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_file_with_three_mistakes_has_the_three_messages_of_its_reader(tmp_path, kind):
+def test_check_reports_each_of_three_mistakes(tmp_path, kind):
     _, _, read, mistakes = KINDS[kind]
     alone = {m: first_message(read, written(tmp_path, kind, [m])) for m in mistakes}
     assert len(set(alone.values())) == len(mistakes)
@@ -134,7 +134,7 @@ def test_file_with_three_mistakes_has_the_three_messages_of_its_reader(tmp_path,
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_command_prints_every_message_and_exits_with_two(run, tmp_path, kind):
+def test_check_prints_every_message_and_exits_with_status_2(run, tmp_path, kind):
     _, options, read, mistakes = KINDS[kind]
     alone = [first_message(read, written(tmp_path, kind, [m])) for m in mistakes[:3]]
     file = written(tmp_path, kind, mistakes[:3])
@@ -148,7 +148,7 @@ def test_command_prints_every_message_and_exits_with_two(run, tmp_path, kind):
     assert sorted(found["files"][0]["messages"]) == sorted(alone)
 
 
-def test_wrong_cells_of_a_campaign_are_reported_row_by_row(tmp_path):
+def test_check_reports_every_invalid_cell(tmp_path):
     file = written(tmp_path, "campaign", [])
     table = file.with_name("measurements.csv")
     lines = table.read_text("utf-8").split("\n")
@@ -162,9 +162,7 @@ def test_wrong_cells_of_a_campaign_are_reported_row_by_row(tmp_path):
     assert [m.partition(": found")[0] for m in messages] == places
 
 
-def test_messages_about_a_wrong_unit_of_a_whole_column_stop_at_the_maximum_number(
-    tmp_path, run
-):
+def test_check_limits_the_number_of_messages(tmp_path, run):
     text = (EXAMPLES / "campaign/measurements.csv").read_text("utf-8")
     file = written(tmp_path, "campaign", [])
     header, *rows = text.strip().split("\n")
@@ -185,7 +183,7 @@ def test_messages_about_a_wrong_unit_of_a_whole_column_stop_at_the_maximum_numbe
     ("name = ", "not valid TOML"),
     ("a = 1\n", "unknown type of file"),
 ])  # fmt: skip
-def test_mistake_without_a_place_in_the_file_has_one_message(
+def test_mistake_without_a_location_has_one_message(
     run, tmp_path, text, place
 ):  # fmt: skip
     file = tmp_path / "file.toml"
@@ -196,13 +194,13 @@ def test_mistake_without_a_place_in_the_file_has_one_message(
     assert len(out.splitlines()) == 1
 
 
-def test_open_closure_is_not_reported_after_a_length_was_replaced(tmp_path):
+def test_check_reports_no_gap_caused_by_a_replaced_value(tmp_path):
     sound, wrong = KINDS["robot of frames"][3][0]
     file = written(tmp_path, "robot of frames", [(sound, wrong)])
     assert len(all_messages(lambda: load_robot(file))) == 1
 
 
-def test_body_that_a_joint_names_is_not_missing_after_a_mistake_in_its_link(tmp_path):
+def test_body_with_an_invalid_link_is_not_reported_as_missing(tmp_path):
     sound = '{ beam = { radius = "60 mm", inner_radius = "45 mm" }'
     assert sound in DRAWN
     file = tmp_path / "tricept.toml"
@@ -227,7 +225,7 @@ OTHERS = [
     (OF_IRSBOT2, ("--robot", "irsbot2")),
     ([EXAMPLES / "hexapod_errors.toml"], ("--robot", "hexapod")),
 ])  # fmt: skip
-def test_check_finds_no_mistake_in_any_example(run, files, options):
+def test_check_finds_no_mistakes_in_examples(run, files, options):
     status, out, err = run("check", *files, *options)
     assert (status, err) == (0, "")
     assert [line.split(": ")[:2] for line in out.splitlines()] == [
@@ -235,7 +233,7 @@ def test_check_finds_no_mistake_in_any_example(run, files, options):
     ]
 
 
-def test_file_that_names_frames_needs_a_robot(run):
+def test_check_requires_a_robot_for_files_with_frame_names(run):
     status, out, _ = run("check", EXAMPLES / "hexapod_errors.toml")
     assert status == 2
     assert "expected --robot ROBOT" in out
@@ -245,7 +243,7 @@ WRONG = (-1, 0, "x", [], {}, [1, "a"], True, 1e300, float("nan"), [0.0] * 6, "ba
 
 
 def damaged(content, rng):
-    """A copy of a file's content with a few values changed, keys renamed or lost."""
+    """Return a copy of file content with some values or keys changed or removed."""
     content = copy.deepcopy(content)
     for _ in range(rng.integers(1, 5)):
         inner = content
@@ -269,7 +267,7 @@ def damaged(content, rng):
 
 
 def stopped_by(read, file):
-    """The message at which a reader stops, in a list; empty for a sound file."""
+    """Return the error message of a reader in a list, empty for a valid file."""
     try:
         read(file)
     except BadInput as error:
@@ -279,9 +277,7 @@ def stopped_by(read, file):
 
 @pytest.mark.parametrize("kind", ["robot of frames", "robot of bodies", "study",
                                   "tolerance plan", "errors"])  # fmt: skip
-def test_first_message_about_any_damaged_file_is_that_of_the_reader(
-    tmp_path, rng, kind
-):
+def test_first_message_of_check_equals_that_of_the_reader(tmp_path, rng, kind):
     text, _, read, _ = KINDS[kind]
     content = tomllib.loads(text)
     file = tmp_path / "file.toml"

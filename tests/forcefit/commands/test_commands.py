@@ -30,7 +30,7 @@ def robot_file(tmp_path):
     return path
 
 
-def test_solve_writes_only_the_public_keys_to_standard_output(run, robot_file):
+def test_solve_writes_json_with_the_public_keys(run, robot_file):
     status, out, _ = run("assembly", "solve", robot_file, "--pose", "tx=0,tz=-0.5",
                          "--json", "-")  # fmt: skip
     found = json.loads(out)
@@ -50,7 +50,7 @@ def test_solve_writes_only_the_public_keys_to_standard_output(run, robot_file):
     assert len(found["closures"][-1]["wrench"]) == 6
 
 
-def test_pose_and_its_joint_values_have_equal_results(run, robot_file):
+def test_pose_and_joint_options_have_equal_results(run, robot_file):
     _, out, _ = run("assembly", "solve", robot_file, "--pose", "tx=0.1",
                     "--pose", "tz=-0.45", "--json", "-")  # fmt: skip
     by_pose = json.loads(out)
@@ -105,9 +105,9 @@ link = { beam = { radius = 0.005 }, young = 7e10, poisson = 0.3, pieces = 4 }
 
 
 def test_exact_solution_reports_a_state_beyond_a_critical_load(run, tmp_path):
-    """Euler's load is 84.8 N, with 4 pieces 82.7 N.
+    """The Euler load is 84.8 N, or 82.7 N for a column of 4 segments.
 
-    Above it the straight column is unstable, the bent one stable.
+    Above this load, the straight state is unstable, and the bent state is stable.
     """
     column = tmp_path / "column.toml"
     column.write_text(COLUMN)
@@ -133,8 +133,11 @@ def test_show_writes_a_figure(run, robot_file, tmp_path):
     assert (tmp_path / "robot.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_show_writes_the_scene_of_a_loaded_bar_as_a_page(run, write_file, tmp_path):
-    """w(L) = F L^3 / (3 E I) + F L / (k G A), k of a round bar by Cowper (1966)."""
+def test_scene_of_a_bar_shows_the_tip_deflection(run, write_file, tmp_path):
+    """The tip deflection is F L^3 / (3 E I) + F L / (k G A).
+
+    The shear coefficient k of a round bar is taken from Cowper (1966).
+    """
     bar = write_file("""
 name = "bar"
 platform = "tip"
@@ -155,7 +158,7 @@ link = { beam = { radius = 0.01 }, young = 2e11, poisson = 0.3 }
     np.testing.assert_allclose(tip["moved"][-1], [0, 0, expected], atol=1e-12)
 
 
-def test_show_refuses_an_exaggeration_of_a_page_with_a_slider(run, tmp_path):
+def test_show_rejects_exaggeration_for_html_figures(run, tmp_path):
     page = tmp_path / "robot.html"
     words = ["hexapod", "--exaggeration", 5, "--figure", page]
     status, _, err = run("assembly", "show", *words)
@@ -229,7 +232,7 @@ def test_show_refuses_an_exaggeration_of_a_page_with_a_slider(run, tmp_path):
         (["validation", "crosscheck", "irsbot2", "--scale", "1"], "--scale: found"),
     ],
 )  # fmt: skip
-def test_invalid_input_is_reported_by_one_message_and_exit_status_2(
+def test_invalid_input_has_one_message_and_exit_status_2(
     run, tmp_path, monkeypatch, words, message
 ):
     monkeypatch.chdir(tmp_path)
@@ -243,7 +246,7 @@ def test_invalid_input_is_reported_by_one_message_and_exit_status_2(
 
 
 def commands(command, words=()):
-    """Every command and group of commands with the words that call it."""
+    """Yield the words and the object of each command and command group."""
     yield words, command
     for name, inner in getattr(command, "commands", {}).items():
         yield from commands(inner, (*words, name))
@@ -273,9 +276,8 @@ def test_group_without_a_command_prints_its_help(run, group):
 
 
 @pytest.mark.parametrize("words", EVERY_COMMAND, ids=" ".join)
-def test_help_prints_every_unit_in_brackets_and_whole_sentences(run, words):
-    """No part of a text is taken for markup,
-    and lists of commands are not truncated."""
+def test_help_prints_units_in_brackets(run, words):
+    """Brackets are not interpreted as markup, and command lists are not truncated."""
     _, out, _ = run(*words, "--help")
     printed = " ".join(out.split())
     command = EVERY_COMMAND[words]
@@ -285,7 +287,7 @@ def test_help_prints_every_unit_in_brackets_and_whole_sentences(run, words):
     assert "..." not in out.partition("Commands:")[2]
 
 
-def test_version_option_prints_the_version_of_the_package(run):
+def test_version_option_prints_the_package_version(run):
     installed = version("forcefit")
     assert run("--version") == (0, f"forcefit {installed}\n", "")
     assert forcefit.__version__ == installed
@@ -307,8 +309,8 @@ def test_shell_completion_offers_commands_options_and_robots(typed, offered):
     assert done.stdout.split() == [offered]
 
 
-def test_characters_outside_the_encoding_of_the_output_are_printed_escaped(tmp_path):
-    """As in a file or a pipe on Windows."""
+def test_characters_outside_the_encoding_are_escaped(tmp_path):
+    """On Windows, files and pipes have such an encoding."""
     robot = replace(coaxial_beams([0, 0, 0, 1e-4, 0, 0]), name="Ω-4")
     write_robot(robot, tmp_path / "omega.toml")
     words = [sys.executable, "-m", "forcefit", "assembly", "solve", "omega.toml"]
@@ -320,7 +322,7 @@ def test_characters_outside_the_encoding_of_the_output_are_printed_escaped(tmp_p
     assert b"\\u03a9-4" in done.stdout
 
 
-def test_module_command_refuses_an_unknown_robot_without_a_traceback():
+def test_unknown_robot_has_no_traceback():
     done = subprocess.run([sys.executable, "-m", "forcefit", "assembly", "solve", "x"],
                           capture_output=True, text=True, check=False)  # fmt: skip
     assert done.returncode == 2
@@ -337,8 +339,8 @@ def test_module_command_refuses_an_unknown_robot_without_a_traceback():
         ["stiffness", "library", "spec.toml", "--workers", "1025"],
     ],
 )  # fmt: skip
-def test_absurdly_large_counts_are_refused(run, tmp_path, monkeypatch, words):
-    """A million processes would start one by one, for minutes."""
+def test_huge_counts_are_rejected(run, tmp_path, monkeypatch, words):
+    """Starting a million processes would take minutes."""
     monkeypatch.chdir(tmp_path)
     status, _, err = run(*words)
     assert status == 2
@@ -347,13 +349,13 @@ def test_absurdly_large_counts_are_refused(run, tmp_path, monkeypatch, words):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_warnings_of_libraries_are_shown_only_on_request(monkeypatch):
+def test_library_warnings_are_shown_only_on_request(monkeypatch):
     monkeypatch.setattr(sys, "argv", ["forcefit", "--version"])
     with warnings.catch_warnings():
         monkeypatch.setattr(sys, "warnoptions", ["default"])
         with pytest.raises(SystemExit):
             command.main()
-        with pytest.raises(UserWarning):  # as pytest is told
+        with pytest.raises(UserWarning):  # pytest turns warnings into errors
             warnings.warn("a library's", stacklevel=1)
         monkeypatch.setattr(sys, "warnoptions", [])
         with pytest.raises(SystemExit):

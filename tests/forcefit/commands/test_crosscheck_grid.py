@@ -20,8 +20,8 @@ pytestmark = pytest.mark.exudyn
 AXES = {"tx": [-0.7, 0.0, 0.2], "tz": [-0.45]}
 
 
-def test_pose_beyond_the_limits_of_a_joint_is_not_checked():
-    """The slides of an orthoglide move with its platform along each axis."""
+def test_pose_beyond_joint_limits_is_not_checked():
+    """At the second pose, a slide of the Orthoglide is beyond its limit."""
     robot = load_robot("orthoglide")
     frames = tuple(
         replace(f, limits=(-0.4, -0.3)) if f.name == "x.slide" else f
@@ -81,8 +81,8 @@ def test_crosscheck_command_checks_the_poses_of_a_grid(tmp_path, capsys, monkeyp
     assert "--grid: found together with" in capsys.readouterr().err
 
 
-def test_pose_without_a_comparable_difference_does_not_pass():
-    """The built-in robot has no errors: at every pose zero is compared with zero."""
+def test_crosscheck_without_errors_or_loads_does_not_pass():
+    """Without errors or loads, both models have zero displacements."""
     rows = check_poses(load_robot("irsbot2"), AXES, lambda p: crosscheck(p, (1.0, 0.5)))
     assert [row["passed"] for row in rows] == [None, False, False]
     assert not poses_table(rows)["passed"]

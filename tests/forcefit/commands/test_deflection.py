@@ -8,9 +8,7 @@ from forcefit.assembly.files.robot_file import write_robot
 from tests.assembly.platform_stiffness.test_deflection import shallow_arch
 
 
-def test_deflection_curve_passes_the_clearance_and_then_rises_like_a_spring(
-    run, tmp_path
-):
+def test_deflection_curve_includes_clearance_and_contact(run, tmp_path):
     picture = tmp_path / "curve.svg"
     status, out, _ = run(
         "assembly", "deflection", "hexapod", "--along", "fz=-100:100:50", "--json",
@@ -25,8 +23,8 @@ def test_deflection_curve_passes_the_clearance_and_then_rises_like_a_spring(
     assert picture.stat().st_size > 1000
 
 
-def test_followed_path_continues_past_its_limit_point(run, tmp_path):
-    """Von Mises' truss: up to the limit, back through the flat position, and down."""
+def test_followed_path_continues_beyond_limit_points(run, tmp_path):
+    """The path of a von Mises truss has two limit points."""
     column = tmp_path / "arch.toml"
     write_robot(shallow_arch().robot, column)
     picture = tmp_path / "path.svg"

@@ -1,4 +1,4 @@
-"""The option ``--drive-force``, and forces of drives in robot files."""
+"""Option ``--drive-force``, and key ``drive_force`` in robot files."""
 
 import csv
 import json
@@ -11,9 +11,9 @@ from forcefit.assembly.model.force_control import with_drive_forces
 from forcefit.assembly.model.robot import Frame, Robot
 from tests.assembly.linear.test_drive_forces import crossed_cranks
 
-# force of the coupler [N] by a moment of 12 N m on a crank of 0.3 m at 60 degrees
+# force in the coupler [N] due to 12 N m on a crank of 0.3 m at 60 degrees
 FORCE = 12 / (0.3 * np.sin(np.pi / 3))
-SHORTER = FORCE * 0.5 / (7e10 * np.pi * 0.004**2)
+SHORTER = FORCE * 0.5 / (7e10 * np.pi * 0.004**2)  # [m] shortening of the coupler
 
 
 @pytest.fixture
@@ -23,9 +23,7 @@ def path(tmp_path):
 
 
 @pytest.mark.parametrize("state", ["contact", "exact"])
-def test_solve_reports_the_forces_due_to_a_drive_force_and_names_the_drive(
-    run, path, state
-):
+def test_solve_reports_forces_due_to_a_drive_force(run, path, state):
     words = ["solve", path, "--drive-force", "rocker=12", "--state", state]
     status, out, _ = run("assembly", *words, "--json", "-")
     answer = json.loads(out)
@@ -39,19 +37,19 @@ def test_solve_reports_the_forces_due_to_a_drive_force_and_names_the_drive(
         assert remark in out
 
 
-def test_pose_errors_are_around_the_robot_under_the_force(run, path):
+def test_pose_error_includes_the_drive_force(run, path):
     status, out, _ = run(
         "assembly", "error", path, "--drive-force", "rocker=12", "--json", "-"
     )
     answer = json.loads(out)
     assert status == 0
-    assert set(answer["error"]) == {"frozen", "free"}  # budget has no load
-    # the tip of the crank stays, so the coupler's end moves by more than its shortening
+    assert set(answer["error"]) == {"frozen", "free"}  # budget does not allow a load
+    # the coupler is inclined, so that its end moves by more than its shortening
     upper = answer["error"]["frozen"]["translation"]["upper"]
     assert upper == pytest.approx(SHORTER / np.sin(np.pi / 3), rel=1e-6)
 
 
-def test_deflection_starts_at_the_shift_due_to_the_drive(run, path):
+def test_deflection_curve_includes_the_drive_force(run, path):
     words = ["deflection", path, "--drive-force", "rocker=12", "--along", "fx=0:10:5"]
     status, out, _ = run("assembly", *words, "--json", "-")
     start = json.loads(out)["deflection"][0]
@@ -71,7 +69,7 @@ def test_deflection_starts_at_the_shift_due_to_the_drive(run, path):
          "--by: found together with --drive-force"),
     ],
 )  # fmt: skip
-def test_invalid_drive_forces_are_refused_in_one_line(run, path, words, message):
+def test_invalid_drive_force_has_a_one_line_message(run, path, words, message):
     command, *options = words
     status, out, err = run("assembly", command, path, *options)
     assert (status, out) == (2, "")
@@ -79,7 +77,7 @@ def test_invalid_drive_forces_are_refused_in_one_line(run, path, words, message)
     assert err.count("\n") == 1
 
 
-def test_robot_is_not_determined_if_all_drives_apply_given_forces(run, path):
+def test_robot_with_only_force_controlled_drives_has_no_equilibrium(run, path):
     words = ["solve", path, "--drive-force", "rocker=12,crank=1", "--json", "-"]
     status, out, _ = run("assembly", *words)
     answer = json.loads(out)
@@ -90,8 +88,8 @@ def test_robot_is_not_determined_if_all_drives_apply_given_forces(run, path):
     )
 
 
-def test_force_of_a_drive_can_be_varied_in_a_sweep(run, path, tmp_path):
-    """The energy grows with its square."""
+def test_sweep_can_vary_the_drive_force(run, path, tmp_path):
+    """The energy is proportional to the squared force."""
     robot = with_drive_forces(crossed_cranks(), {"rocker": 1.0})
     write_robot(robot, tmp_path / "driven.toml")
     words = [tmp_path / "driven.toml", "--grid", "q.crank=1", "--assumption", "none",
@@ -106,7 +104,7 @@ def test_force_of_a_drive_can_be_varied_in_a_sweep(run, path, tmp_path):
     np.testing.assert_allclose(energies, [0, expected, 4 * expected], rtol=1e-9)
 
 
-def test_study_of_a_robot_with_a_force_of_a_drive_is_refused(run, tmp_path):
+def test_study_rejects_a_robot_with_drive_force(run, tmp_path):
     robot = with_drive_forces(crossed_cranks(), {"rocker": 1.0})
     write_robot(robot, tmp_path / "driven.toml")
     (tmp_path / "study.toml").write_text('robot = "driven.toml"\n')
@@ -115,8 +113,8 @@ def test_study_of_a_robot_with_a_force_of_a_drive_is_refused(run, tmp_path):
     assert "study.toml: robot: found a robot with drive_force; expected one" in err
 
 
-def test_frequencies_lack_the_stiffness_of_a_drive_that_applies_a_force(run, tmp_path):
-    """A slide of 2 kg on two elastic drives: sqrt(k / m), k without the second."""
+def test_frequency_excludes_stiffness_of_force_controlled_drive(run, tmp_path):
+    """A slide of mass m has the frequency sqrt(k / m) / (2 pi)."""
     stiff = np.diag([np.inf] * 5 + [3e6])
     rail = {"joint": "prismatic", "actuated": True}
     robot = Robot("slide", "block", (
@@ -136,7 +134,7 @@ def test_frequencies_lack_the_stiffness_of_a_drive_that_applies_a_force(run, tmp
 
 
 @pytest.mark.exudyn
-def test_crosscheck_of_a_force_agrees_with_exudyn(run, path):
+def test_drive_force_results_agree_with_exudyn(run, path):
     status, out, _ = run(
         "validation", "crosscheck", path, "--drive-force", "rocker=12", "--json", "-"
     )

@@ -1,4 +1,4 @@
-"""Files of the examples, as `pip install` alone provides them."""
+"""Command ``forcefit example``, which writes the files of examples."""
 
 import tomllib
 from pathlib import Path
@@ -29,11 +29,11 @@ def test_every_file_of_the_examples_folder_belongs_to_an_example(run, tmp_path):
 
 
 @pytest.mark.parametrize("name", EXAMPLES)
-def test_files_that_an_example_refers_to_are_written_with_it(run, tmp_path, name):
-    """Surfaces, robots and measurements that its TOML files name."""
+def test_example_includes_all_files_that_it_refers_to(run, tmp_path, name):
+    """TOML files refer to surfaces, robots and measurements."""
     run("example", name, "-o", tmp_path)
     for path in tmp_path.rglob("*.toml"):
-        if path.name == "data.toml":  # whose files are fetched
+        if path.name == "data.toml":  # lists files that are downloaded
             continue
         for value in strings(tomllib.loads(path.read_text(encoding="utf-8"))):
             if value.endswith((".stl", ".csv", ".toml")):
@@ -56,7 +56,7 @@ def test_example_command_without_a_name_lists_the_examples(run):
     assert [line.split()[0] for line in out.splitlines()] == list(EXAMPLES)
 
 
-def test_example_files_are_unchanged_on_repeat_and_edited_files_are_kept(run, tmp_path):
+def test_example_does_not_overwrite_edited_files(run, tmp_path):
     assert run("example", "irsbot2", "-o", tmp_path)[0] == 0
     before = files_of(tmp_path)
     status, out, _ = run("example", "irsbot2", "-o", tmp_path)
@@ -70,7 +70,7 @@ def test_example_files_are_unchanged_on_repeat_and_edited_files_are_kept(run, tm
     assert files_of(tmp_path) == before
 
 
-def test_wheel_includes_the_files_of_all_examples():
+def test_wheel_includes_all_examples():
     table = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     packages = table["tool"]["scikit-build"]["wheel"]["packages"]
     tops = {part.split("/")[0] for one in EXAMPLES.values() for part in one.files}

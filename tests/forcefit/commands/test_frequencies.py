@@ -9,7 +9,7 @@ from forcefit.assembly.files.robot_file import write_robot
 from forcefit.assembly.model.robot import BeamLink, Frame, Robot
 
 
-def test_frequencies_are_ascending_with_shares_of_the_parts(run):
+def test_frequencies_are_ascending_and_shares_sum_to_one(run):
     status, out, _ = run(
         "assembly", "frequencies", "delta", "--count", "4", "--json", "-"
     )
@@ -22,8 +22,7 @@ def test_frequencies_are_ascending_with_shares_of_the_parts(run):
 
 
 def test_nominal_frequencies_report_that_gravity_is_neglected(run, tmp_path):
-    """A compound pendulum has the frequency sqrt(m g l / I) / (2 pi);
-    nominally it has none."""
+    """The frequency of a pendulum, sqrt(m g l / I) / (2 pi), is due to gravity."""
     pendulum = Robot("pendulum", "tip", (
         Frame("pivot", joint="revolute", rotation=[np.pi / 2, 0, 0]),
         Frame("tip", "pivot", [0, -1.0, 0], mass=2.0,

@@ -10,7 +10,7 @@ from forcefit.commands.help import GROUPS
 
 
 def leaves(group, words=()):
-    """Every command with the words that call it."""
+    """Yield the words and the object of each command."""
     for name, inner in getattr(group, "commands", {}).items():
         yield from leaves(inner, (*words, name))
     if not hasattr(group, "commands"):
@@ -21,7 +21,7 @@ COMMANDS = dict(leaves(typer.main.get_command(command.app)))
 
 
 def titles_of_options(out):
-    """The titles of a help text that list each long option."""
+    """Return the titles of the groups that list each long option in a help text."""
     titles, title = {}, None
     for line in out.splitlines():
         if re.fullmatch(r"\S.*:", line):
@@ -32,7 +32,7 @@ def titles_of_options(out):
 
 
 @pytest.mark.parametrize("words", COMMANDS, ids=" ".join)
-def test_help_lists_every_option_once_under_a_group(run, words):
+def test_help_lists_every_option_in_one_group(run, words):
     _, out, _ = run(*words, "--help")
     found = titles_of_options(out)
     declared = {max(p.opts, key=len) for p in COMMANDS[words].params
@@ -42,8 +42,8 @@ def test_help_lists_every_option_once_under_a_group(run, words):
     assert {one[0] for one in found.values()} <= {"What", *GROUPS}
 
 
-def test_every_name_in_a_group_is_an_option_of_some_command():
-    """A name that is no longer an option must leave the table too."""
+def test_every_name_in_a_group_is_an_option():
+    """An option that is removed must also be removed from the table of groups."""
     declared = {
         name for one in COMMANDS.values() for p in one.params for name in p.opts
     }

@@ -1,4 +1,4 @@
-"""Commands with several functions: combinations of options and invalid input."""
+"""Combinations of options that are not valid, and equivalent options."""
 
 import json
 
@@ -59,7 +59,7 @@ MATERIAL = ["--young", "6e10", "--poisson", "0.3"]
          "--json: found together with --to csv"),
     ],
 )  # fmt: skip
-def test_options_that_exclude_each_other_are_reported_by_one_message(
+def test_incompatible_options_have_a_one_line_message(
     run, tmp_path, monkeypatch, words, message
 ):
     monkeypatch.chdir(tmp_path)
@@ -69,7 +69,7 @@ def test_options_that_exclude_each_other_are_reported_by_one_message(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_straight_curve_file_and_beam_options_have_equal_compliance(run, tmp_path):
+def test_beam_file_and_options_have_equal_compliance(run, tmp_path):
     (tmp_path / "c.toml").write_text(CURVE)
     by_file = run("stiffness", "beam", tmp_path / "c.toml", *MATERIAL, "--json", "-")
     options = ["--length", "0.4", "--radius", "0.02"]
@@ -82,7 +82,7 @@ def test_straight_curve_file_and_beam_options_have_equal_compliance(run, tmp_pat
                                other / np.outer(scale, scale), atol=1e-9)  # fmt: skip
 
 
-def test_margins_computed_separately_equal_those_of_the_whole_solution(run):
+def test_margins_computed_alone_equal_those_of_solve(run):
     _, whole, _ = run("assembly", "solve", "irsbot2", "--json", "-")
     status, margins, _ = run(
         "assembly", "solve", "irsbot2", "--quantities", "margin,margin_free", "--json",

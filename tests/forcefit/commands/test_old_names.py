@@ -14,7 +14,7 @@ RENAMED = [
 
 
 def options_of(command):
-    """Option names that the command declares, by those whose value follows."""
+    """Return the options of a command, and whether each option requires a value."""
     found = typer.main.get_command(app)
     for word in command.split():
         found = found.commands[word]
@@ -24,7 +24,13 @@ def options_of(command):
 
 @pytest.mark.parametrize(("old", "new"), COMMANDS.items())
 def test_old_command_is_translated_to_an_existing_command(old, new, capsys):
-    words = ["file", "--at", "radius=1", "--json", "-"]  # looking up needs a place
+    words = [
+        "file",
+        "--at",
+        "radius=1",
+        "--json",
+        "-",
+    ]  # the look-up requires parameters
     assert with_new_names([*old.split(), *words]) == [*new, *words]
     assert capsys.readouterr().err == f"forcefit: {old} is now {' '.join(new)}\n"
     with pytest.raises((KeyError, AttributeError)):
@@ -40,7 +46,7 @@ def test_old_command_is_translated_to_an_existing_command(old, new, capsys):
         (["exact", "five_bar"], ["solve", "five_bar", "--state", "exact"]),
     ],
 )
-def test_old_command_has_the_result_of_the_new_one(run, old, new):
+def test_old_command_has_the_same_result_as_the_new_command(run, old, new):
     status, out, _ = run("assembly", *old, "--json", "-")
     assert (status, out) == run("assembly", *new, "--json", "-")[:2]
     assert '"margin"' in out or '"linearisation_error"' in out
@@ -65,7 +71,7 @@ def test_old_option_is_translated_to_an_existing_option(command, old, new, capsy
     options = options_of(" ".join(present))
     assert old not in options
     assert new[0] in options
-    # with a value of its own in the table, or with that of the old option, or none
+    # a new option without a fixed value must accept the value of the old option
     assert len(new) == 1 or options[new[0]]
 
 
@@ -78,7 +84,7 @@ def test_old_value_of_compliant_is_translated_to_a_margin_quantity(old, new):
     assert with_new_names([*words, f"--compliant={old}"])[3:] == [f"--quantities={new}"]
 
 
-def test_words_after_two_dashes_and_of_other_commands_are_not_translated(capsys):
+def test_arguments_of_other_commands_are_not_translated(capsys):
     for words in (
         ["assembly", "sweep", "--", "--tangent"],
         ["validation", "validity", "r", "--stiffness"],
@@ -87,7 +93,7 @@ def test_words_after_two_dashes_and_of_other_commands_are_not_translated(capsys)
     assert capsys.readouterr().err == ""
 
 
-def test_old_flag_has_the_result_of_its_new_option(run):
+def test_old_flag_has_the_same_result_as_the_new_option(run):
     words = ["assembly", "stiffness", "four_bar", "--load", "fx=10", "--json", "-"]
     status, new, silent = run(*words, "--state", "exact")
     old_status, old, err = run(*words, "--exact")
@@ -96,7 +102,7 @@ def test_old_flag_has_the_result_of_its_new_option(run):
     assert err == "forcefit: --exact is now --state exact\n"
 
 
-def test_library_look_up_without_parameters_is_refused(run):
+def test_library_look_up_requires_parameters(run):
     status, out, err = run("stiffness", "library", "look-up", "folder")
     assert (status, out) == (2, "")
     assert "--at: missing; expected parameters such as" in err
@@ -106,7 +112,7 @@ def test_library_look_up_without_parameters_is_refused(run):
     ("old", "new"),
     [("stiffness import", "stiffness convert"), ("assembly zone", "assembly solve")],
 )
-def test_schema_of_an_old_command_is_that_of_the_new_one(run, old, new):
+def test_old_command_has_the_schema_of_the_new_command(run, old, new):
     status, expected, _ = run("schema", *new.split())
     assert status == 0
     assert run("schema", *old.split())[:2] == (0, expected)

@@ -1,5 +1,4 @@
-"""``--rest`` and ``--mismatch spring``: open closures in every command that uses
-them."""
+"""Options ``--rest`` and ``--mismatch``, which close loops with a gap."""
 
 import csv
 import json
@@ -7,7 +6,7 @@ import json
 import numpy as np
 import pytest
 
-# a beam along x, clamped at both ends, the far one shifted across it by OFF
+# A beam along x is clamped at both ends.  Its far support is displaced by OFF along y.
 OFF, LENGTH, RADIUS, YOUNG = 1e-4, 1.0, 0.01, 7e10
 GAP = f"""
 name = "gap"
@@ -25,9 +24,9 @@ translation = [{LENGTH}, {OFF}, 0]
 frames = ["tip", "post"]
 """
 BENT = 12 * YOUNG * np.pi * RADIUS**4 / 4 / LENGTH**3 * OFF**2 / 2  # [J]
-RELATIVE = 1e-3  # of the energy: shear, (radius / LENGTH)^2 of it, and the beam leans
+RELATIVE = 1e-3  # relative tolerance, because the formula neglects shear
 
-# one platform on two driven slides along x, whose coordinates differ by APART
+# The platform is connected to two driven slides along x with different coordinates.
 STIFF, APART = (2e6, 3e6), 1e-5
 SLIDE = """
 [[frame]]
@@ -59,7 +58,7 @@ ROBOTS = [
 robots = pytest.mark.parametrize(
     ("robot", "words", "key", "energy"), ROBOTS, ids=["tip", "post", "drives"]
 )
-# an error that changes nothing: 1e-15 m along the beam or the slides
+# a negligible error of 1e-15 m along the beam or the slides
 TINY = """[[errors]]
 frames = ["tip"]
 distribution = "normal"
@@ -75,10 +74,8 @@ def files(robot, tmp_path):
 
 
 @robots
-def test_statistics_of_an_open_closure_have_its_energy_in_every_draw(
-    files, run, words, key, energy
-):
-    """The gap is not a random error: each draw includes all of it."""
+def test_statistics_includes_the_gap_in_every_draw(files, run, words, key, energy):
+    """The gap is a constant error in all draws."""
     command = ["assembly", "statistics", files / "robot.toml"]
     options = ["--errors", files / "tiny.toml", "--draws", "20", "--no-margins"]
     status, _, err = run(*command, *options)
@@ -93,9 +90,7 @@ def test_statistics_of_an_open_closure_have_its_energy_in_every_draw(
 
 @robots
 @pytest.mark.parametrize("drawn", [False, True])
-def test_sweep_of_an_open_closure_has_its_energy_at_every_point(
-    files, run, words, key, energy, drawn
-):
+def test_sweep_includes_the_gap_at_every_point(files, run, words, key, energy, drawn):
     options = ["--grid", "tz=0", "-o", files / "x.nc", "--csv", files / "x.csv"]
     if drawn:
         options += ["--errors", files / "tiny.toml", "--draws", "2"]
@@ -109,9 +104,7 @@ def test_sweep_of_an_open_closure_has_its_energy_at_every_point(
 
 
 @robots
-def test_study_of_an_open_closure_has_the_energy_of_its_gap(
-    files, run, words, key, energy
-):
+def test_study_includes_the_energy_of_the_gap(files, run, words, key, energy):
     study = f'robot = "robot.toml"\noutput = "{files}/out"\n{key}\n'
     checks = "[checks]\npicture = false\ncrosscheck = false\nreference = false\n"
     (files / "study.toml").write_text(study + checks)
@@ -121,8 +114,8 @@ def test_study_of_an_open_closure_has_the_energy_of_its_gap(
     assert "gap of the closure" in results["errors"] or "drives" in results["errors"]
 
 
-def test_study_adds_its_own_errors_to_the_gap_of_a_closure(run, tmp_path):
-    """A further shift of 1e-4 m in the opposite direction closes the gap: no energy."""
+def test_study_adds_its_errors_to_the_gap(run, tmp_path):
+    """An error of the same size in the opposite direction closes the gap."""
     (tmp_path / "robot.toml").write_text(GAP)
     text = (
         f'robot = "robot.toml"\noutput = "{tmp_path}/out"\nrest = "tip"\n'
@@ -141,9 +134,7 @@ def test_study_adds_its_own_errors_to_the_gap_of_a_closure(run, tmp_path):
      ('mismatch = "glue"', "study.toml: mismatch: found"),
      ("rest = 3", "study.toml: rest: found")],
 )  # fmt: skip
-def test_study_refuses_a_rest_or_mismatch_that_it_cannot_use(
-    run, tmp_path, line, message
-):
+def test_study_rejects_invalid_rest_or_mismatch(run, tmp_path, line, message):
     (tmp_path / "robot.toml").write_text(GAP)
     (tmp_path / "study.toml").write_text(f'robot = "robot.toml"\n{line}\n')
     status, out, err = run("study", tmp_path / "study.toml")
@@ -152,10 +143,8 @@ def test_study_refuses_a_rest_or_mismatch_that_it_cannot_use(
 
 
 @robots
-def test_tolerances_accept_an_open_closure_with_rest_or_mismatch(
-    files, run, words, key, energy
-):
-    """Rigid parts never close the gap, so that no factor on it can be assembled."""
+def test_tolerances_accepts_rest_and_mismatch(files, run, words, key, energy):
+    """Without an option that closes the loop, the command fails."""
     command = ["assembly", "tolerances", files / "robot.toml", "--grid", "tz=0"]
     assert run(*command)[0] == 2
     status, out, err = run(*command, *words, "--json", "-")
@@ -164,8 +153,8 @@ def test_tolerances_accept_an_open_closure_with_rest_or_mismatch(
     assert err.count("forcefit: note: ") == 1
 
 
-def test_mismatch_at_home_remains_a_drive_error_at_other_poses(run, tmp_path):
-    """Both slides move by the same amount, so that the springs keep their preload."""
+def test_mismatch_at_home_is_a_drive_error_at_other_poses(run, tmp_path):
+    """Both slides move by the same distance, so that their preload is constant."""
     (tmp_path / "robot.toml").write_text(SLIDES)
     words = ["--mismatch", "spring", "--pose", "tx=0.42", "--json", "-"]
     status, out, _ = run("assembly", "solve", tmp_path / "robot.toml", *words)
@@ -173,7 +162,7 @@ def test_mismatch_at_home_remains_a_drive_error_at_other_poses(run, tmp_path):
     assert json.loads(out)["energy"] == pytest.approx(PRELOADED, rel=RELATIVE)
 
 
-def test_sweep_over_drive_values_is_refused_with_mismatch(run, tmp_path):
+def test_sweep_over_drive_coordinates_rejects_mismatch(run, tmp_path):
     (tmp_path / "robot.toml").write_text(SLIDES)
     words = ["--mismatch", "spring", "--grid", "q.one=0.3", "-o", tmp_path / "x.nc"]
     status, _, err = run("assembly", "sweep", tmp_path / "robot.toml", *words)
@@ -183,8 +172,10 @@ def test_sweep_over_drive_values_is_refused_with_mismatch(run, tmp_path):
 
 
 @robots
-def test_converted_robot_closes_and_has_the_same_energy(files, run, words, key, energy):
-    """Commands without the two options need a file whose loops close."""
+def test_converted_robot_has_closed_loops_and_the_same_energy(
+    files, run, words, key, energy
+):
+    """The converted file has closed loops and requires neither option."""
     target = files / "closed.toml"
     assert run("convert", files / "robot.toml", "-o", target)[0] == 2
     assert not target.exists()
@@ -194,7 +185,7 @@ def test_converted_robot_closes_and_has_the_same_energy(files, run, words, key, 
     assert json.loads(out)["energy"] == pytest.approx(energy, rel=RELATIVE)
 
 
-def test_convert_refuses_rest_for_files_of_other_programs(run, tmp_path):
+def test_convert_rejects_rest_for_urdf(run, tmp_path):
     (tmp_path / "r.urdf").write_text("<robot name='r'><link name='a'/></robot>")
     words = ["--rest", "a", "-o", tmp_path / "r.toml"]
     status, _, err = run("convert", tmp_path / "r.urdf", *words)

@@ -13,12 +13,12 @@ from forcefit.assembly.path.request import errors_along_path
 from forcefit.assembly.sweeps.dataset import open_dataset
 
 EXAMPLE = Path(__file__).parents[3] / "examples" / "hexapod_path.csv"
-PEAK = 10 / np.sqrt(3)  # largest acceleration of the quintic in D / T^2
+PEAK = 10 / np.sqrt(3)  # largest acceleration of a quintic profile [D / T^2]
 
 
 @pytest.fixture
 def slide(tmp_path):
-    """A tool of 3 kg on a bar of 0.2 m across a slide along x: one path by hand."""
+    """Write a slide along x with a 3 kg tool on a transverse bar, and a path."""
     rail = Frame("rail", joint="prismatic", rotation=[0, np.pi / 2, 0], actuated=True)
     link = BeamLink({"radius": 0.01}, 70e9, 0.3, theory="euler")
     tool = Frame("tool", "rail", [0, 0.2, 0], mass=3.0, link=link)
@@ -27,8 +27,8 @@ def slide(tmp_path):
     return tmp_path
 
 
-def test_path_of_a_slide_has_the_deflection_of_its_cantilever(run, slide):
-    """F = m a bends the bar by F L^3 / 3 E I; a = 10 / sqrt 3 D / T^2."""
+def test_path_error_equals_cantilever_deflection(run, slide):
+    """The deflection is F L^3 / (3 E I), with F = m a and a = 10 / sqrt(3) D / T^2."""
     status, out, _ = run(
         "assembly", "path", slide / "slide.toml", "--path", slide / "way.csv",
         "--profile", "quintic", "--duration", 0.05, "--points", 2001, "--json", "-",
@@ -79,8 +79,8 @@ def test_path_writes_data_figure_and_page(run, tmp_path):
     assert files["png"].read_bytes().startswith(b"\x89PNG")
 
 
-def test_path_beyond_a_limit_reports_the_results_before_the_limit(run, slide):
-    """The rail may go to 50 mm: half of a path of 100 mm, up to the highest speed."""
+def test_path_beyond_a_joint_limit_has_results_before_the_limit(run, slide):
+    """The joint limit of 50 mm is reached after half of the path."""
     file = slide / "slide.toml"
     text = file.read_text().replace(
         "actuated = true", "actuated = true\nlimits = [0, 0.05]"
@@ -106,7 +106,7 @@ def test_path_beyond_a_limit_reports_the_results_before_the_limit(run, slide):
     assert np.isfinite(data["drive_force"].values[:101]).all()
 
 
-def test_interval_spaces_the_rows_of_a_table_without_times(run, slide):
+def test_interval_option_sets_the_time_between_rows(run, slide):
     status, out, _ = run(
         "assembly", "path", slide / "slide.toml", "--path", slide / "way.csv",
         "--interval", 0.25, "--json", "-",
@@ -119,7 +119,7 @@ def test_interval_spaces_the_rows_of_a_table_without_times(run, slide):
     )
 
 
-def test_path_in_python_equals_that_of_the_command(run, slide):
+def test_errors_along_path_equals_command_result(run, slide):
     table = PathTable(("q.rail",), np.array([[0.0], [0.1]]))
     found = errors_along_path(
         slide / "slide.toml", table, profile="quintic", duration=0.05, points=51
@@ -153,7 +153,7 @@ BAD = {
 
 
 @pytest.mark.parametrize("name", BAD)
-def test_invalid_options_of_a_path_are_refused_in_one_line(run, slide, name):
+def test_invalid_path_option_has_a_one_line_message(run, slide, name):
     words, message = BAD[name]
     output = slide / "out.nc"
     status, out, err = run(
@@ -166,7 +166,7 @@ def test_invalid_options_of_a_path_are_refused_in_one_line(run, slide, name):
     assert not output.exists()
 
 
-def test_message_about_a_path_row_out_of_reach_names_the_row(run, tmp_path):
+def test_message_names_the_path_row_out_of_reach(run, tmp_path):
     file = tmp_path / "far.csv"
     file.write_text("id,time,pose.tx,pose.ty\na,0,0,0.14\nb,1,0.01,0.9\n")
     status, out, err = run("assembly", "path", "five_bar", "--path", file)
@@ -175,8 +175,8 @@ def test_message_about_a_path_row_out_of_reach_names_the_row(run, tmp_path):
     assert err.count("\n") == 1
 
 
-def test_path_through_a_point_out_of_reach_between_rows_is_refused(run, tmp_path):
-    """Both rows are within reach, the straight line between them passes the base."""
+def test_path_with_unreachable_points_between_rows_is_rejected(run, tmp_path):
+    """Both rows can be reached, but the straight line between them cannot."""
     file = tmp_path / "through.csv"
     file.write_text("pose.tx,pose.ty\n-0.16,0.06\n0.16,0.06\n")
     words = ["--profile", "quintic", "--duration", "1"]
@@ -185,7 +185,7 @@ def test_path_through_a_point_out_of_reach_between_rows_is_refused(run, tmp_path
     assert err.count("\n") == 1
 
 
-def test_path_refuses_a_drive_force_and_a_state_that_do_not_exist(run, slide):
+def test_path_rejects_unknown_drive_or_state(run, slide):
     asked = ["assembly", "path", slide / "slide.toml", "--path", slide / "way.csv",
              "--profile", "quintic", "--duration", 0.05]  # fmt: skip
     status, _, message = run(*asked, "--drive-force", "rial=3")
@@ -198,7 +198,7 @@ def test_path_refuses_a_drive_force_and_a_state_that_do_not_exist(run, slide):
 
 
 def test_path_reports_unconstrained_pose_components(run, tmp_path):
-    """A hexapod has six degrees of freedom; two columns leave four of them open."""
+    """A table with two columns constrains two of six degrees of freedom."""
     rows = "pose.tx,pose.tz\n0,0.53\n0.01,0.53\n"
     (tmp_path / "way.csv").write_text(rows)
     status, out, _ = run(
@@ -212,8 +212,8 @@ def test_path_reports_unconstrained_pose_components(run, tmp_path):
     )
 
 
-def test_path_applies_effects_under_the_given_conditions(run, slide):
-    """A bar of 0.2 m that is 5 K warmer, with 2e-5 1/K, is 20 um longer."""
+def test_path_applies_effects(run, slide):
+    """A 0.2 m bar with an expansion of 2e-5 1/K elongates by 20 um at 5 K."""
     robot = slide / "slide.toml"
     effect = '[[effect]]\nname = "thermal_expansion"\nparameters = { tool = 2e-5 }\n'
     robot.write_text(robot.read_text() + "\n" + effect)

@@ -1,4 +1,4 @@
-"""Command ``forcefit assembly stiffness``: keys of its results, exit statuses."""
+"""Command ``forcefit assembly stiffness``: JSON keys and exit statuses."""
 
 import json
 
@@ -23,7 +23,7 @@ parent = "slide"
 """
 
 
-def test_stiffness_results_have_both_matrices_under_their_keys(run):
+def test_stiffness_results_include_compliance_and_stiffness(run):
     status, out, _ = run(
         "assembly", "stiffness", "orthoglide", "--pose", "tx=0.01,ty=0,tz=0",
         "--at", "0,0,0.05",
@@ -40,7 +40,7 @@ def test_stiffness_results_have_both_matrices_under_their_keys(run):
     assert sum([*shares["links"].values(), *shares["joints"].values()]) == (
         pytest.approx(1.0)
     )
-    # the robot has clearances and no load: nothing is held
+    # without a load, the platform can move within the clearances
     (side,) = answer["contact"]
     assert len(side["free_motions"]) == 6
     np.testing.assert_array_equal(side["compliance"], np.full((6, 6), None))
@@ -66,9 +66,7 @@ def test_free_motion_has_null_compliance_and_exit_status_1(run, tmp_path):
     ["deflection", "--along", "fz=0:5:5", "--follow"],
     ["frequencies", "--state", "exact", "--load", "fz=5"],
 ])  # fmt: skip
-def test_load_on_a_free_motion_gives_exit_status_1_and_the_motion_is_named(
-    run, tmp_path, words
-):
+def test_load_along_a_free_motion_has_exit_status_1(run, tmp_path, words):
     (tmp_path / "slider.toml").write_text(SLIDER)
     status, out, err = run(
         "assembly", words[0], str(tmp_path / "slider.toml"), *words[1:]
@@ -79,8 +77,7 @@ def test_load_on_a_free_motion_gives_exit_status_1_and_the_motion_is_named(
 
 
 def test_sweep_names_the_free_motion(tmp_path):
-    """Also at singular postures of a workspace,
-    where other directions have their stiffness."""
+    """The stiffness in the other directions is computed."""
     (tmp_path / "slider.toml").write_text(SLIDER)
     asked = ask_sweep(
         str(tmp_path / "slider.toml"),
@@ -95,7 +92,7 @@ def test_sweep_names_the_free_motion(tmp_path):
     assert float(data.stiffness.sel(wrench_component="FX")) == pytest.approx(stretched)
 
 
-def test_stiffness_command_writes_its_chart(run, tmp_path):
+def test_stiffness_command_writes_a_figure(run, tmp_path):
     picture = tmp_path / "shares.png"
     status, out, _ = run(
         "assembly", "stiffness", "irsbot2", "--state", "exact", "--load", "fz=-100",
@@ -106,9 +103,8 @@ def test_stiffness_command_writes_its_chart(run, tmp_path):
     assert status in {0, 1}
 
 
-def test_stiffness_along_a_direction_has_its_value_and_shares(run):
-    """Along tz it equals the value of that axis;
-    the length of the vector has no effect."""
+def test_stiffness_along_tz_equals_that_of_the_axis(run):
+    """The values along tz equal those of this axis for a vector of any length."""
     status, out, _ = run(
         "assembly", "stiffness", "orthoglide", "--along", "tz=-2", "--json", "-"
     )
@@ -132,8 +128,7 @@ def test_load_without_an_equilibrium_has_exit_status_1(run):
 
 
 def test_stiffness_reports_a_platform_far_from_its_nominal_pose(run):
-    """10 MN move it from 0.5 m below the base to above it;
-    300 N move it by micrometres."""
+    """A load of 10 MN moves the platform from below the base to above the base."""
     for load, far in (("fz=1e7", True), ("fz=-300", False)):
         words = ["--state", "exact", "--load", load, "--json", "-"]
         _, out, _ = run("assembly", "stiffness", "irsbot2", *words)

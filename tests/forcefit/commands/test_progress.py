@@ -1,4 +1,4 @@
-"""Progress reports of commands that can take long."""
+"""Progress reports of long computations."""
 
 import logging
 
@@ -36,23 +36,20 @@ def test_progress_reports_every_step_of_an_exact_solution():
     assert steps == list(range(1, solved.iterations + 1))
 
 
-def test_progress_reports_every_load_of_a_curve():
+def test_progress_reports_every_load_of_a_deflection_curve():
     said = []
     posture = home_posture(load_robot("hexapod"))
     deflection_curve(
         posture, 5, np.array([0.0, -10.0, -20.0]), state="exact",
         progress=lambda what, done, most: said.append(what),
     )  # fmt: skip
-    # beside those that bracket what happens on the way
+    # other messages are printed while events are located
     assert set(said) >= {f"steps at load {load}" for load in (0, -10, -20)}
 
 
 @pytest.mark.parametrize("terminal", [True, False])
-def test_progress_shows_the_links_solved_while_a_robot_is_read(
-    terminal, monkeypatch, capsys
-):
-    """A line for each link whose finite elements run;
-    on a terminal a bar for all three."""
+def test_progress_shows_the_number_of_solved_links(terminal, monkeypatch, capsys):
+    """A line is printed for each link that is solved; terminals also show a bar."""
     monkeypatch.setenv("FORCE_COLOR" if terminal else "NO_COLOR", "1")
     log = logging.getLogger("forcefit.links")
     before = log.level, log.handlers
@@ -60,7 +57,7 @@ def test_progress_shows_the_links_solved_while_a_robot_is_read(
         report_loading()
         for done in range(4):
             log.debug("%d of 3 links", done, extra={"done": done, "total": 3})
-            if done == 1:  # the others are known
+            if done == 1:  # the other links are stored
                 log.info('finite elements of frame "arm", arm.stl')
     finally:
         log.level, log.handlers = before
@@ -70,8 +67,8 @@ def test_progress_shows_the_links_solved_while_a_robot_is_read(
     assert "of 3 links" not in shown
 
 
-def test_progress_bar_is_completed_when_a_link_is_refused(monkeypatch, tmp_path):
-    """The count is complete after a failure, so that no bar stays on the terminal."""
+def test_progress_bar_is_completed_after_an_error(monkeypatch, tmp_path):
+    """An incomplete bar would remain on the terminal."""
     log, told = logging.getLogger("forcefit.links"), []
     handler = logging.Handler()
     handler.emit = lambda record: told.append((record.done, record.total))

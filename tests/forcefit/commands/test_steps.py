@@ -43,7 +43,7 @@ SLOT = (
 
 @pytest.fixture
 def files(tmp_path):
-    """A function that writes the robot and a plan, and returns their paths."""
+    """Return a function that writes the robot and a plan, and returns their paths."""
 
     def write(plan):
         (tmp_path / "robot.toml").write_text(ROBOT)
@@ -53,8 +53,11 @@ def files(tmp_path):
     return write
 
 
-def test_forces_and_energies_of_steps_equal_hand_calculation_with_springs(run, files):
-    """x = sum k d / sum k; the last leg closes 53.3 um with 80 N and 2.133 mJ."""
+def test_step_forces_and_energies_equal_spring_calculation(run, files):
+    """The springs have x = sum k d / sum k.
+
+    The last leg closes a gap of 53.3 um with 80 N and 2.133 mJ.
+    """
     status, out, _ = run("assembly", "steps", *files(JOINS), "--json", "-")
     results = json.loads(out)
     assert status == 0
@@ -67,7 +70,7 @@ def test_forces_and_energies_of_steps_equal_hand_calculation_with_springs(run, f
     assert "does not change the assembled machine" in results["remarks"][0]
 
 
-def test_slot_bolted_while_clamped_is_reported_with_reading_and_spring_back(run, files):
+def test_steps_reports_reading_and_spring_back(run, files):
     status, out, _ = run("assembly", "steps", *files(SLOT), "--json", "-")
     results = json.loads(out)
     assert status == 0
@@ -79,7 +82,7 @@ def test_slot_bolted_while_clamped_is_reported_with_reading_and_spring_back(run,
     assert "springs back" in out
 
 
-def test_best_order_is_printed_with_its_bound(run, files):
+def test_best_order_has_a_bound(run, files):
     words = ("assembly", "steps", *files(JOINS), "--best", "force")
     status, out, _ = run(*words, "--json", "-")
     order = json.loads(out)["order"]
@@ -89,15 +92,15 @@ def test_best_order_is_printed_with_its_bound(run, files):
     assert "minimum force" in run(*words)[1]
 
 
-def test_quantiles_of_draws_equal_those_of_the_springs(run, files, tmp_path):
-    """Only leg 1 varies, uniformly by 30 um: the platform moves by a sixth of it."""
+def test_quantiles_equal_spring_calculation(run, files, tmp_path):
+    """One leg has a uniform error; the platform moves by a sixth of this error."""
     errors = tmp_path / "errors.toml"
     errors.write_text('[[errors]]\nframes = ["leg1"]\nmost = [0, 0, 0, 0, 0, 3e-5]\n')
     words = ("assembly", "steps", *files(JOINS), "--errors", errors, "--draws", "4000")
     status, out, _ = run(*words, "--json", "-")
     found = json.loads(out)["quantiles"]["join platform - leg3"]["translation"]
     assert status == 0
-    # |x| is uniform up to 5 um; the quantiles of 4000 draws have 0.04 um at most
+    # |x| is uniform up to 5 um; the standard error of the quantiles is 0.04 um
     assert found["0.95"] == pytest.approx(0.95 * 5e-6, abs=0.1e-6)
     assert found["0.5"] == pytest.approx(0.5 * 5e-6, abs=0.2e-6)
 
@@ -131,7 +134,7 @@ def test_quantiles_of_draws_equal_those_of_the_springs(run, files, tmp_path):
     ("steps = 3\n", "steps"),
     ("", "step: missing"),
 ])  # fmt: skip
-def test_invalid_plan_of_steps_is_reported_in_one_line(run, files, plan, text):
+def test_invalid_step_has_a_one_line_message(run, files, plan, text):
     status, out, err = run("assembly", "steps", *files(plan))
     assert status == 2
     assert text in err
@@ -139,7 +142,7 @@ def test_invalid_plan_of_steps_is_reported_in_one_line(run, files, plan, text):
     assert err.count("\n") == 1
 
 
-def test_message_about_a_step_that_cannot_be_carried_out_names_the_step(run, tmp_path):
+def test_message_names_the_step_that_fails(run, tmp_path):
     """Two rigid legs of different lengths."""
     robot = tmp_path / "robot.toml"
     robot.write_text(
@@ -155,19 +158,19 @@ def test_message_about_a_step_that_cannot_be_carried_out_names_the_step(run, tmp
     assert 'step "join tool - stop"' in out
 
 
-def test_report_has_the_table_of_the_steps(run, files, tmp_path):
+def test_steps_report_has_a_table_of_the_steps(run, files, tmp_path):
     page = tmp_path / "steps.html"
     status, _, _ = run("assembly", "steps", *files(SLOT), "--report", page)
     table = parse(page.read_text()).table("step")
     assert status == 0
     assert [row[0].text for row in table[1:]][2] == "clamp platform"
-    # the clamp holds -20 um at 1e6 N/m and 30 um at 2e6 N/m: -20 + 60 N
+    # force of two springs: -20 um at 1e6 N/m and 30 um at 2e6 N/m
     assert table[3][4].value == pytest.approx(40.0)
-    # 20 um at 1e6 N/m and 30 um at 2e6 N/m
+    # energy of the two springs [J]
     assert table[3][1].value == pytest.approx(1.1e-3)
 
 
-def test_steps_of_one_kind_and_part_are_numbered(run, files):
+def test_equal_step_names_are_numbered(run, files):
     plan = JOINS + 2 * '[[step]]\nmeasure = "platform"\ncomponents = ["tz"]\n'
     status, out, _ = run("assembly", "steps", *files(plan), "--json", "-")
     names = [step["name"] for step in json.loads(out)["steps"]]

@@ -1,4 +1,4 @@
-"""The commands of the stiffness folder: keys, messages, files."""
+"""Commands ``forcefit stiffness ...``: JSON keys, messages and files."""
 
 import json
 from pathlib import Path
@@ -24,13 +24,13 @@ PLAIN = [str(MESHES / "distal_plain.stl"), "--base", "z=0", "--tip", "z=0.452"]
 
 
 def run(*arguments):
-    """The JSON a command prints; its own errors come through."""
+    """Return the standard output of a command; exceptions are raised."""
     result = CliRunner().invoke(app, [*arguments], catch_exceptions=False)
     assert result.exit_code == 0, result.output
     return result.stdout
 
 
-def test_beam_command_writes_the_stiffness_of_the_papers_link():
+def test_beam_command_writes_stiffness():
     results = json.loads(run(*BEAM, "--radius", "0.04", "--json", "-"))
     K = np.array(results["stiffness"])
     assert K[1, 1] == pytest.approx(1015962.1690558865, rel=1e-12)
@@ -47,7 +47,7 @@ def test_beam_command_writes_the_stiffness_of_the_papers_link():
     (["--radius", "0.04", "--theory", "euler", "--along=-y"],
      round_section(0.04, 0.3), [0, -1, 0], "euler"),
 ])  # fmt: skip
-def test_beam_options_are_passed_to_the_formula(options, section, axis, theory):
+def test_beam_command_agrees_with_beam_compliance(options, section, axis, theory):
     results = json.loads(run(*BEAM, *options, "--json", "-"))
     up = [0, 1, 0] if "--up" in options else None
     C = beam_compliance(0.452, section, 6e10, 0.3, axis=axis, up=up, theory=theory)
@@ -107,7 +107,7 @@ REFUSED = {
         for more, said in rows
     ],
 )
-def test_wrong_option_is_refused_by_name_before_meshing(words, message):
+def test_message_names_the_invalid_option(words, message):
     with pytest.raises(BadInput) as caught:
         run(*words)
     assert message in str(caught.value)
@@ -132,20 +132,20 @@ def test_wrong_option_is_refused_by_name_before_meshing(words, message):
         ),
     ],
 )
-def test_stress_refuses_wrong_options_before_meshing(change, message):
+def test_stress_rejects_invalid_options(change, message):
     with pytest.raises(BadInput) as caught:
         run("stress", *PLAIN, *MATERIAL, *change)
     assert message in str(caught.value)
 
 
-def test_fea_refuses_a_file_that_is_not_a_surface(tmp_path):
+def test_fea_rejects_a_file_that_is_not_a_surface(tmp_path):
     path = tmp_path / "x.stl"
     path.write_text("solid rubbish")
     with pytest.raises(BadInput, match=r"x.stl: "):
         run("fea", str(path), *PLAIN[1:], *MATERIAL)
 
 
-def test_fea_writes_the_keys_of_the_format(tmp_path):
+def test_fea_writes_json_with_the_public_keys(tmp_path):
     target = tmp_path / "k.json"
     text = run("fea", *PLAIN, *MATERIAL, "--density", "2700", "--json", str(target))
     results = json.loads(target.read_text())
@@ -160,11 +160,11 @@ def test_fea_writes_the_keys_of_the_format(tmp_path):
 
 
 @pytest.mark.slow
-def test_compliances_of_two_materials_in_series_add_up_in_fea():
-    """Without Poisson's effect plane sections stay plane, and compliances add up: h/EI
-    for pure bending, h/GJ with G = E/2 for torsion, h/EA for tension. The accuracy
-    is 1 %. The faces between the materials are those of elements, not the plane,
-    which changes the mass by at most half a per cent.
+def test_fea_compliances_of_two_materials_add_up():
+    """With zero Poisson's ratio, the compliances h/EI, h/GJ and h/EA add up exactly.
+
+    The interface between the materials consists of element faces instead of a plane.
+    This changes the mass by at most 0.5 %.
     """
     text = run(
         "fea", *PLAIN, "--young", "6e10", "--poisson", "0", "--density", "2700",
@@ -174,7 +174,7 @@ def test_compliances_of_two_materials_in_series_add_up_in_fea():
     found = json.loads(text)
     C, half, area = np.array(found["compliance"]), 0.226, np.pi * 0.04**2
     inertia, soft = np.pi * 0.04**4 / 4, 1 / 6e10 + 1 / 1.8e11
-    # torsion: 2 (1 + nu) / E over 2 I, bending: 1 / E over I
+    # for nu = 0, torsion and bending have equal compliances: G J = E I
     expected = half * soft * np.array([1 / inertia, 1 / inertia, 1 / inertia, 1 / area])
     np.testing.assert_allclose(np.diag(C)[[0, 1, 2, 5]], expected, rtol=0.01)
     body = area * half * np.array([2700, 7800])
@@ -185,12 +185,12 @@ def test_compliances_of_two_materials_in_series_add_up_in_fea():
 
 
 @pytest.mark.slow
-def test_compare_writes_the_difference_and_a_figure(tmp_path):
+def test_compare_writes_difference_and_figure(tmp_path):
     figure = tmp_path / "k.png"
     options = ["--radius", "0.04", "--figure", str(figure), "--json", "-"]
     results = json.loads(run("compare", *PLAIN, *MATERIAL, *options))
     difference = np.array(results["difference"])
-    # 1 032 277 / 1 015 962 - 1 = 1.6 %, and the mesh adds up to 0.5 %
+    # reference values differ by 1.6 %; the mesh error is up to 0.5 %
     assert 0.016 < difference[0, 0] < 0.0212
     assert abs(difference[2, 2]) < 1e-3
     assert results["slenderness"] == pytest.approx(0.452 / 0.04)
@@ -204,9 +204,8 @@ def links():
     return beam, other
 
 
-def test_comparison_reports_a_link_that_is_two_per_cent_stiffer():
-    """K is 2 % larger at L / r = 20:
-    the end effect c of 1 + c r / L is 0.4 everywhere."""
+def test_comparison_reports_difference_and_end_effect():
+    """The factor 1 + c r / L is 1.02 at L / r = 20, so that c is 0.4."""
     comparison = compare_link(*links(), size=0.02)
     np.testing.assert_allclose(np.diag(comparison.difference), 0.02, rtol=1e-9)
     np.testing.assert_allclose(comparison.end_effect, 0.4, rtol=1e-9)
@@ -214,7 +213,7 @@ def test_comparison_reports_a_link_that_is_two_per_cent_stiffer():
 
 
 def test_comparison_figure_shows_every_nonzero_entry():
-    """Eight of the upper entries are not zero: the diagonal and two couplings."""
+    """The upper triangle has eight nonzero entries."""
     figure = plot_comparison(compare_link(*links(), size=0.02))
     bars, image = figure.axes[0], figure.axes[1]
     assert len(bars.patches) == 2 * 8
@@ -225,5 +224,5 @@ def test_comparison_figure_shows_every_nonzero_entry():
 def test_axis_option_accepts_names_and_components():
     np.testing.assert_array_equal(parse_axis("--axis", "-z"), [0, 0, -1])
     np.testing.assert_array_equal(parse_axis("--axis", "1, 2,3"), [1, 2, 3])
-    # the square of 1e300 is no double
+    # the square of 1e300 would overflow
     np.testing.assert_array_equal(parse_axis("--axis", "1e300,0,1e300"), [1, 0, 1])

@@ -19,7 +19,7 @@ most = [1e-4, 1e-4, 1e-4, 1e-5, 1e-5, 1e-5]
 """
 
 
-def test_sweep_with_all_options_writes_one_file_and_one_object(run, tmp_path):
+def test_sweep_with_all_options_writes_one_file(run, tmp_path):
     (tmp_path / "errors.toml").write_text(ERRORS)
     (tmp_path / "poses.csv").write_text("id,pose.tx,pose.ty\na,0,0.13\nb,0,0.5\n")
     words = ["five_bar", "--poses", tmp_path / "poses.csv",
@@ -41,30 +41,30 @@ def test_sweep_with_all_options_writes_one_file_and_one_object(run, tmp_path):
         assert data.ty.values.tolist() == [0.13, 0.5]
         assert data.posture.values.tolist() == ["a", "b"]
         assert float(data.linearisation_translation.max()) < 1e-6
-        # springs that are stiffer never close the same gap with less energy
+        # stiffer springs require more energy to close the same gap
         energy = data.energy.isel(posture=0).values
         assert (energy[1] >= energy[0]).all()
-        # and what planar errors within the play cost is nothing, not its rounding
+        # errors within the clearances require exactly zero energy
         assert ((energy == 0.0) | (energy > 1e-20)).all()
     assert sorted(p.name for p in tmp_path.glob("x.nc*")) == ["x.nc"]
 
 
 def messages(err):
-    """How many; beside them stderr has, of slow machines, a line of progress."""
+    """Return the number of messages; slow machines also print a progress line."""
     lines = [line for line in err.splitlines() if line != "robot: 0 of 1"]
     assert all(line.startswith("forcefit: ") for line in lines)
     return len(lines)
 
 
-def test_progress_of_a_long_step_is_printed_at_once(capsys, monkeypatch):
-    """A log file then shows it before the work ends."""
+def test_progress_line_is_printed_during_a_long_step(capsys, monkeypatch):
+    """The line appears in a log file before the computation ends."""
     import forcefit.commands.progress
 
     monkeypatch.setattr(forcefit.commands.progress, "_DELAY", 0.0)
     with forcefit.commands.progress.progress_bars() as update:
         update("points", 3, 12)
         said = ""
-        while "points: 3 of 12" not in said:  # from a thread of its own
+        while "points: 3 of 12" not in said:  # printed by a different thread
             said += capsys.readouterr().err
         assert said == "points: 3 of 12\n"
 
@@ -97,7 +97,7 @@ def test_plot_draws_a_saved_sweep_without_solving(run, tmp_path, monkeypatch):
          "no.nc: no such file; expected a data set"),
     ],
 )  # fmt: skip
-def test_invalid_input_to_a_sweep_is_reported_by_one_message_and_nothing_is_written(
+def test_invalid_sweep_input_has_one_message_and_no_output(
     run, tmp_path, monkeypatch, words, message
 ):
     monkeypatch.chdir(tmp_path)
@@ -108,7 +108,7 @@ def test_invalid_input_to_a_sweep_is_reported_by_one_message_and_nothing_is_writ
     assert list(tmp_path.iterdir()) == []
 
 
-def test_journal_of_another_sweep_is_refused(run, tmp_path):
+def test_sweep_rejects_a_journal_of_a_different_sweep(run, tmp_path):
     from forcefit.assembly.sweeps.sweep import journal_path
 
     file = tmp_path / "x.nc"
@@ -160,8 +160,10 @@ GRIDS = {
 def test_sweep_without_a_finite_value_has_a_summary_and_a_figure(
     run, tmp_path, errors, grid
 ):
-    """Errors without clearances or springs: no margin is finite, no point has an
-    energy. The figure is drawn by the sweep with errors, and from the file without."""
+    """A rigid robot with errors has neither a finite margin nor an energy.
+
+    The figure is drawn by the sweep or from the saved file.
+    """
     robot, file, picture = (tmp_path / n for n in ("r.toml", "x.nc", "x.png"))
     robot.write_text(STIFF.replace("1e-4", errors))
     axes, words = GRIDS[grid]
@@ -183,7 +185,7 @@ def test_sweep_without_a_finite_value_has_a_summary_and_a_figure(
         assert picture.read_bytes().startswith(b"\x89PNG")
 
 
-def test_sweep_prints_the_reason_of_the_first_failed_point(run, tmp_path):
+def test_sweep_prints_why_the_first_point_failed(run, tmp_path):
     robot, file = tmp_path / "r.toml", tmp_path / "x.nc"
     robot.write_text(STIFF)
     status, out, _ = run("assembly", "sweep", robot, "--grid", "q.drive=0", "-o", file)
@@ -200,7 +202,7 @@ def test_sweep_without_a_reachable_point_has_a_summary_and_a_figure(run, tmp_pat
     assert run("assembly", "plot", file, "--figure", picture, "--at", "tx=5")[0] == 0
 
 
-def test_sweep_of_listed_poses_and_designs_draws_a_map(run, tmp_path):
+def test_sweep_over_poses_and_designs_draws_a_map(run, tmp_path):
     (tmp_path / "poses.csv").write_text("id,pose.tx,pose.ty\na,0,0.13\nb,0,0.14\n")
     words = ["--vary", "elbow.link.young=2e11,7e10,1e11", "-o", tmp_path / "x.nc",
              "--figure", tmp_path / "x.svg"]  # fmt: skip
@@ -228,7 +230,7 @@ def test_sweep_of_listed_poses_and_designs_draws_a_map(run, tmp_path):
          "socket, expected a regular file"),
     ],
 )  # fmt: skip
-def test_file_of_another_program_is_refused_as_output_and_kept(
+def test_sweep_does_not_overwrite_files_of_other_programs(
     run, tmp_path, monkeypatch, words, message
 ):
     monkeypatch.chdir(tmp_path)
@@ -245,7 +247,7 @@ def test_file_of_another_program_is_refused_as_output_and_kept(
     assert {p: p.lstat().st_mtime_ns for p in tmp_path.iterdir()} == before
 
 
-def test_sweep_replaces_a_file_of_an_earlier_sweep(run, tmp_path):
+def test_sweep_overwrites_the_file_of_an_earlier_sweep(run, tmp_path):
     for grid in ("tx=0,ty=0.13", "tx=0,ty=0.14"):
         words = ["five_bar", "--grid", grid, "-o", tmp_path / "x.nc"]
         assert run("assembly", "sweep", *words)[0] == 0
@@ -255,13 +257,12 @@ def test_sweep_replaces_a_file_of_an_earlier_sweep(run, tmp_path):
 
 @pytest.mark.parametrize("kind", [SystemError, ValueError, KeyboardInterrupt])
 def test_ctrl_c_in_compiled_code_has_exit_status_130(kind, run, monkeypatch):
-    """Compiled code turns the interrupt into errors of its own;
-    those of matplotlib are ValueErrors."""
+    """Compiled code may raise a different error; matplotlib raises ValueError."""
 
     def interrupted(**_):
         try:
             os.kill(os.getpid(), signal.SIGINT)
-            time.sleep(5)  # until the signal is there
+            time.sleep(5)  # waits for the signal
         except KeyboardInterrupt:
             raise kind("Invalid bounding box") from None
 
@@ -284,12 +285,11 @@ def test_error_without_ctrl_c_is_raised_unchanged(run, monkeypatch):
         run("study")
 
 
-def test_damaged_sweep_file_is_reported_by_one_message(run, tmp_path, monkeypatch):
-    """HDF5 opens some of these files,
-    and h5netcdf then fails while the file is half open."""
+def test_damaged_sweep_file_has_one_message(run, tmp_path, monkeypatch):
+    """Some damaged files fail only after HDF5 has opened them."""
     from forcefit.commands import sweep
 
-    monkeypatch.setattr(sweep, "save_figure", lambda *_: None)  # slow, after reading
+    monkeypatch.setattr(sweep, "save_figure", lambda *_: None)  # is slow
     file = tmp_path / "x.nc"
     words = ["five_bar", "--grid", "tx=0:0.01:0.01,ty=0.13", "-o", file]
     assert run("assembly", "sweep", *words)[0] == 0
