@@ -1,4 +1,4 @@
-"""Readers, effects and link models of the example of another distribution."""
+"""Readers, effects and link models that other distributions provide."""
 
 import json
 import re
@@ -80,7 +80,7 @@ FAILS, OTHER = (
 
 
 def install(folder, name, groups):
-    """Write the metadata of an installed distribution; groups as in pyproject.toml."""
+    """Write the metadata of an installed distribution with entry points."""
     info = folder / f"{name}-0.1.0.dist-info"
     info.mkdir()
     (info / "METADATA").write_text(f"Name: {name}\nVersion: 0.1.0\n")
@@ -92,7 +92,7 @@ def install(folder, name, groups):
 
 @pytest.fixture
 def packages(tmp_path, monkeypatch):
-    """A folder on the path, in which distributions are installed."""
+    """Return a folder on the import path in which distributions are installed."""
     folder = tmp_path / "packages"
     folder.mkdir()
     monkeypatch.syspath_prepend(folder)
@@ -103,7 +103,7 @@ def packages(tmp_path, monkeypatch):
 
 @pytest.fixture
 def example(packages):
-    """The example, as pip installs it."""
+    """Install the example distribution."""
     project = tomllib.loads((EXAMPLE / "pyproject.toml").read_text())["project"]
     shutil.copy(EXAMPLE / "forcefit_extension.py", packages)
     install(packages, project["name"], project["entry-points"])
@@ -111,7 +111,7 @@ def example(packages):
 
 @pytest.fixture
 def broken(packages):
-    """A distribution whose module raises an error, and returns wrong objects."""
+    """Install a distribution with entry points that fail."""
     (packages / "broken.py").write_text(BROKEN)
     (packages / "raises.py").write_text("1 / 0\n")
     install(packages, "their-tools", {
@@ -132,8 +132,11 @@ def written(tmp_path, text):
     return path
 
 
-def test_link_model_of_a_cone_has_the_compliance_of_the_handbook(example, tmp_path):
-    """F L^3/(3 E I) R/r, F L/(E pi R r), and torsion; I and J of the base."""
+def test_cone_link_model_agrees_with_handbook_formulas(example, tmp_path):
+    """The deflections are F L^3/(3 E I) R/r in bending and F L/(E pi R r) in tension.
+
+    I is the second moment of area at the base.
+    """
     robot = ff.load_robot(written(tmp_path, CONE))
     C = ff.platform_stiffness(ff.place_robot(robot)).compliance
     second, G = pi * R**4 / 4, E / (2 * (1 + NU))
@@ -141,20 +144,20 @@ def test_link_model_of_a_cone_has_the_compliance_of_the_handbook(example, tmp_pa
     axial = L / (E * pi * R * r)
     q = R / r
     torsion = L / (2 * G * second) * (q + q**2 + q**3) / 3
-    # the base's y is along the cone
+    # the cone is parallel to the y axis of the base
     assert np.diag(C)[3:] == pytest.approx([bending, axial, bending], rel=1e-9)
     assert C[1, 1] == pytest.approx(torsion, rel=1e-9)
 
 
-def test_written_robot_keeps_the_stiffness_without_the_model(example, tmp_path):
+def test_written_robot_contains_stiffness_instead_of_model(example, tmp_path):
     robot = ff.load_robot(written(tmp_path, CONE))
     ff.write_robot(robot, tmp_path / "again.toml")
     assert "model" not in (tmp_path / "again.toml").read_text()
     assert ff.load_robot(tmp_path / "again.toml") == robot
 
 
-def test_radius_of_a_link_model_is_a_design_parameter_of_a_sweep(example, tmp_path):
-    """The bending compliance changes as 1/(R^3 r) with the radius of the end."""
+def test_sweep_can_vary_a_link_model_parameter(example, tmp_path):
+    """The bending compliance is proportional to 1/(R^3 r)."""
     path = written(tmp_path, CONE)
     data = ff.sweep(path, vary=["tip.link.model.end_radius=0.025,0.05"],
                     quantities=["compliance"], state="nominal",
@@ -169,8 +172,8 @@ def _home(tmp_path):
     return path
 
 
-def test_link_model_of_a_drawn_body_connects_its_joints(example, tmp_path):
-    """The same cone in a file of bodies: a pin at its start, the platform's point."""
+def test_link_model_has_equal_compliance_in_format_2(example, tmp_path):
+    """The cone in a file of format 2 has the same compliance as with frames."""
     drawn = f"""
 format = 2
 name = "drawn"
@@ -194,8 +197,8 @@ at = [0, 0, 0]
     )
 
 
-def test_effect_turns_a_drive_by_its_gain(example, tmp_path, run):
-    """1e-3 of 0.5 rad moves the tip by 0.5 mrad times 0.8 m across the arm."""
+def test_drive_gain_effect_rotates_the_arm(example, tmp_path, run):
+    """A gain error of 1e-3 at 0.5 rad rotates the 0.8 m arm by 0.5 mrad."""
     path = written(tmp_path, ARM)
     code, _, err = run("assembly", "solve", path, "--json", tmp_path / "o.json")
     assert (code, err) == (0, "")
@@ -208,7 +211,7 @@ def test_effect_turns_a_drive_by_its_gain(example, tmp_path, run):
     assert ff.load_robot(tmp_path / "again.toml") == robot
 
 
-def test_unknown_parameter_of_an_effect_is_named(example, tmp_path):
+def test_message_names_unknown_effect_parameter(example, tmp_path):
     path = written(tmp_path, ARM.replace("joint1 = 1e-3", "joint2 = 1e-3"))
     with pytest.raises(
         BadInput, match='found "joint2", which is not a parameter of drive_g'
@@ -216,10 +219,10 @@ def test_unknown_parameter_of_an_effect_is_named(example, tmp_path):
         ff.load_robot(path)
 
 
-def test_diagnosis_finds_the_effect_of_another_distribution(example, tmp_path):
-    """Readings of an arm whose first drive moves by 1.002 times its command.
+def test_diagnosis_identifies_an_installed_effect(example, tmp_path):
+    """The first drive moves by 1.002 times its command.
 
-    Finite kinematics by hand: x = a cos q1 + b cos(q1 + q2), y likewise.
+    The readings are computed with x = a cos q1 + b cos(q1 + q2).
     """
     names, rng = ("one", "two"), np.random.default_rng(2)
     frames = [
@@ -271,7 +274,7 @@ BROKEN_PARTS = [
 
 
 @pytest.mark.parametrize(("name", "message"), BROKEN_PARTS)
-def test_broken_effect_link_model_or_reader_names_its_distribution_in_one_line(
+def test_message_about_a_broken_extension_names_its_distribution(
     name, message, broken, tmp_path, run
 ):
     path, place = tmp_path / name, ""
@@ -291,31 +294,33 @@ def test_broken_effect_link_model_or_reader_names_its_distribution_in_one_line(
     assert place in err
 
 
-def test_broken_effect_does_not_affect_robots_without_this_effect(broken, tmp_path):
+def test_broken_effect_does_not_affect_other_robots(broken, tmp_path):
     text = ARM.replace("drive_gain", "encoder_offset")
     robot = ff.load_robot(written(tmp_path, text))
     assert robot.effects == {"encoder_offset": {"joint1": 1e-3}}
 
 
-def test_effect_of_two_distributions_is_refused(example, packages, tmp_path):
+def test_effect_in_two_distributions_is_rejected(example, packages, tmp_path):
     points = {"forcefit.effects": {"drive_gain": "forcefit_extension:DRIVE_GAIN"}}
     install(packages, "another", points)
     with pytest.raises(BadInput, match="drive_gain in another and forcefit-extension"):
         ff.load_robot(written(tmp_path, ARM))
 
 
-def test_effects_of_forcefit_cannot_be_replaced(example, packages, tmp_path):
+def test_extension_cannot_replace_forcefit_effects(example, packages, tmp_path):
     points = {"forcefit.effects": {"encoder_offset": "forcefit_extension:DRIVE_GAIN"}}
     install(packages, "another", points)
     robot = ff.load_robot(
         written(tmp_path, ARM.replace("drive_gain", "encoder_offset"))
     )
     screw = ff.sweep(robot, grid="q.joint1=0.5").squeeze()["platform_screw"]
-    assert float(screw.sel(screw="RZ")) == pytest.approx(1e-3)  # not times 0.5 rad
+    assert float(screw.sel(screw="RZ")) == pytest.approx(
+        1e-3
+    )  # offset, not gain times 0.5 rad
 
 
-def test_every_command_accepts_a_file_of_an_installed_reader(example, run, tmp_path):
-    """The chain lies along x: its end is at the sum of the lengths."""
+def test_installed_reader_is_used_by_commands_and_functions(example, run, tmp_path):
+    """The links are aligned with x, so that the tip is at the sum of their lengths."""
     path = tmp_path / "arm.CHAIN"
     path.write_text("0.3 0.2 0.15")
     assert ff.place_robot(ff.load_robot(path)).pose()["tx"] == pytest.approx(0.65)
@@ -330,9 +335,7 @@ def test_every_command_accepts_a_file_of_an_installed_reader(example, run, tmp_p
         ff.load_robot(path)
 
 
-def test_two_readers_of_one_file_ending_are_refused_with_both_names(
-    example, packages, tmp_path
-):
+def test_two_readers_for_one_file_extension_are_rejected(example, packages, tmp_path):
     install(packages, "another", {"forcefit.readers": {"chain": "broken:read"}})
     (tmp_path / "arm.chain").write_text("1")
     with pytest.raises(
@@ -341,9 +344,7 @@ def test_two_readers_of_one_file_ending_are_refused_with_both_names(
         ff.load_robot(tmp_path / "arm.chain")
 
 
-def test_installed_reader_cannot_replace_a_file_ending_that_forcefit_reads(
-    example, packages, tmp_path
-):
+def test_extension_cannot_replace_forcefit_readers(example, packages, tmp_path):
     readers = dict.fromkeys(("toml", "urdf"), "forcefit_extension:read_chain")
     install(packages, "another", {"forcefit.readers": readers})
     for name in ("arm.toml", "arm.urdf"):
@@ -351,7 +352,7 @@ def test_installed_reader_cannot_replace_a_file_ending_that_forcefit_reads(
         assert len(ff.load_robot(tmp_path / name).frames) > 5
 
 
-def test_page_of_extensions_shows_the_lines_of_the_example():
+def test_documented_extension_equals_the_example():
     page = (ROOT / "docs/extensions.md").read_text(encoding="utf-8")
     source = (EXAMPLE / "forcefit_extension.py").read_text(encoding="utf-8")
     project = (EXAMPLE / "pyproject.toml").read_text(encoding="utf-8")
@@ -362,10 +363,8 @@ def test_page_of_extensions_shows_the_lines_of_the_example():
 
 
 @pytest.mark.slow
-def test_extension_of_the_example_is_found_by_a_new_process(
-    example, packages, tmp_path
-):
-    """Entry points are found where Python starts, not only in this process."""
+def test_new_process_finds_the_installed_extension(example, packages, tmp_path):
+    """A new Python process finds the entry points."""
     path = written(tmp_path, CONE)
     command = "import forcefit as ff, sys; print(ff.load_robot(sys.argv[1]).name)"
     found = subprocess.run(

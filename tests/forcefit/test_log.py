@@ -26,7 +26,7 @@ ff.load_robot(sys.argv[1])
 
 
 @pytest.mark.parametrize("wanted", [[], ["log"]])
-def test_remarks_are_printed_only_where_logging_is_configured(wanted, tmp_path):
+def test_log_messages_are_printed_only_on_request(wanted, tmp_path):
     (tmp_path / "bar.sdf").write_text(four_bar())
     done = subprocess.run(
         [sys.executable, "-c", SCRIPT, tmp_path / "bar.sdf", *wanted],
@@ -38,7 +38,7 @@ def test_remarks_are_printed_only_where_logging_is_configured(wanted, tmp_path):
     assert line in done.stderr if wanted else not done.stderr
 
 
-def test_point_without_certificate_is_logged_with_its_robot(caplog):
+def test_fallback_to_the_reference_method_is_logged(caplog):
     caplog.set_level(logging.INFO, "forcefit")
     solve_assembly(beams())
     assert caplog.messages == []
@@ -51,7 +51,7 @@ def test_point_without_certificate_is_logged_with_its_robot(caplog):
     ]
 
 
-def test_requested_use_of_the_reference_method_is_not_logged(caplog):
+def test_requested_reference_method_is_not_logged(caplog):
     caplog.set_level(logging.INFO, "forcefit")
     solve_assembly(rigid(), method="reference")
     solve_assembly([rigid()], method="reference")
@@ -59,10 +59,8 @@ def test_requested_use_of_the_reference_method_is_not_logged(caplog):
     assert caplog.messages == []
 
 
-def test_link_that_was_solved_before_is_logged(
-    solved_once, surface, caplog, monkeypatch
-):
-    """Once from the disk, then from the process."""
+def test_reuse_of_a_solved_link_is_logged(solved_once, surface, caplog, monkeypatch):
+    """The first link is read from the disk, and the second is known in the process."""
     folder, _ = solved_once
     monkeypatch.setenv("FORCEFIT_CACHE", str(folder))
     monkeypatch.setattr(solved_links, "_SOLVED", {})

@@ -1,4 +1,4 @@
-"""Public names, arguments and values of the last release: they work, with a warning."""
+"""Deprecated public names, arguments and values work with a warning."""
 
 from pathlib import Path
 
@@ -32,7 +32,7 @@ def posture():
 
 
 @pytest.mark.parametrize("old", sorted(ff._RENAMED))
-def test_old_public_name_works_and_warns_with_the_new_name(old):
+def test_old_public_name_warns_with_the_new_name(old):
     new, *elsewhere = ff._RENAMED[old]
     with pytest.warns(FutureWarning, match=rf"forcefit\.{old} is now forcefit\.{new}"):
         found = getattr(ff, old)
@@ -43,7 +43,7 @@ def test_old_public_name_works_and_warns_with_the_new_name(old):
 
 
 @pytest.mark.parametrize("name", sorted(ff._MOVED_TO))
-def test_name_that_is_no_longer_public_works_and_warns_with_its_module(name):
+def test_moved_name_warns_with_its_module(name):
     with pytest.warns(FutureWarning, match=rf"forcefit\.{name} is now [\w.]+\.{name}$"):
         found = getattr(ff, name)
     assert callable(found)
@@ -54,7 +54,7 @@ def test_name_that_is_no_longer_public_works_and_warns_with_its_module(name):
 @pytest.mark.parametrize(
     ("old", "new"), [("without clearance", "nominal"), ("in contact", "contact")]
 )
-def test_old_state_has_the_results_of_the_new_one(posture, old, new):
+def test_old_state_has_same_results_as_new_state(posture, old, new):
     with pytest.warns(FutureWarning, match=f"state='{old}' is now state='{new}'"):
         found = ff.platform_stiffness(posture, old, LOAD)
     expected = ff.platform_stiffness(posture, new, LOAD)
@@ -62,7 +62,7 @@ def test_old_state_has_the_results_of_the_new_one(posture, old, new):
     np.testing.assert_array_equal(found.compliance, expected.compliance)
 
 
-def test_old_exact_flag_of_modes_has_the_results_of_the_exact_state():
+def test_natural_modes_accepts_old_exact_flag():
     posture = ff.place_robot(ff.load_robot("delta"))
     with pytest.warns(FutureWarning, match="state='exact'") as caught:
         found = ff.natural_modes(posture, 2, LOAD, exact=True)
@@ -71,7 +71,7 @@ def test_old_exact_flag_of_modes_has_the_results_of_the_exact_state():
     np.testing.assert_array_equal(found.frequencies, expected.frequencies)
 
 
-def test_old_exact_flag_of_a_deflection_curve_has_the_results_of_the_exact_state():
+def test_deflection_curve_accepts_old_exact_flag():
     posture = ff.place_robot(ff.load_robot("four_bar"))
     with pytest.warns(FutureWarning, match="state='exact'"):
         found = ff.deflection_curve(posture, 3, [0.0, 10.0], exact=True)
@@ -81,7 +81,7 @@ def test_old_exact_flag_of_a_deflection_curve_has_the_results_of_the_exact_state
         ff.deflection_curve(posture, 3, [0.0, 10.0], state="nominal")
 
 
-def test_data_set_of_an_older_release_is_read_with_the_present_names(tmp_path):
+def test_old_data_set_is_read_with_new_names(tmp_path):
     variables = {"translation_error_play": ("x", [1.0, 2.0]), "energy": ("x", [3.0, 4])}
     old = xarray.Dataset(variables, attrs={"play": "worst", "reading": "free"})
     old.to_netcdf(tmp_path / "old.nc", engine="h5netcdf")
@@ -91,7 +91,7 @@ def test_data_set_of_an_older_release_is_read_with_the_present_names(tmp_path):
     assert data.attrs == {"clearance": "worst", "assumption": "free"}
 
 
-def test_old_argument_reading_of_a_pose_error_works_as_assumption(posture):
+def test_bound_pose_error_accepts_old_argument_reading(posture):
     forced = ff.solve_assembly(posture)
     with pytest.warns(FutureWarning, match="bound_pose_error.assumption='free'"):
         found = ff.bound_pose_error(forced, reading="free")
@@ -102,9 +102,8 @@ def test_old_argument_reading_of_a_pose_error_works_as_assumption(posture):
     np.testing.assert_array_equal(found.rotation_error, expected.rotation_error)
 
 
-def test_sweep_by_the_names_of_the_last_release_has_equal_results(tmp_path):
-    """By separate functions for options, request and result;
-    file and memory are equal."""
+def test_old_sweep_functions_have_equal_results(tmp_path):
+    """The last release had separate functions for options, request and results."""
     new = ff.sweep(
         "five_bar", grid="tx=0:0.02:0.02,ty=0.13", assumption="free",
         wrench_of=["left.elbow"], state="contact",
@@ -129,9 +128,7 @@ def test_sweep_by_the_names_of_the_last_release_has_equal_results(tmp_path):
     assert SweepOptions(stiffness=False).state is None
 
 
-def test_old_argument_clearance_model_of_an_experiment_works_as_clearance(
-    posture, tmp_path
-):
+def test_experiment_accepts_old_argument_clearance_model(posture, tmp_path):
     file = tmp_path / "errors.toml"
     file.write_text(ERRORS)
     sources = sources_of(posture.robot, file)
@@ -143,8 +140,8 @@ def test_old_argument_clearance_model_of_an_experiment_works_as_clearance(
         assert found.clearance_model == "least"
 
 
-def test_path_with_the_times_of_the_last_release_has_the_results_of_the_keywords():
-    """Rest to rest over d in a time T: a quintic reaches 10 d / (sqrt(3) T^2)."""
+def test_errors_along_path_accepts_old_argument_times():
+    """The largest acceleration of a quintic is 10 d / (sqrt(3) T^2)."""
     robot = Robot("cart", "tool", (
         Frame("rail", joint="prismatic", actuated=True),
         Frame("tool", "rail", mass=2.0),
@@ -160,7 +157,7 @@ def test_path_with_the_times_of_the_last_release_has_the_results_of_the_keywords
     assert peak == pytest.approx(10 * 0.1 / (np.sqrt(3) * 0.2**2), rel=1e-3)
 
 
-def test_link_of_a_material_has_the_stiffness_of_the_constants(tmp_path):
+def test_mesh_link_accepts_old_argument_material(tmp_path):
     surface = ROOT / "meshes" / "distal_plain.stl"
     quick = FemOptions(accuracy=0.05)
     with pytest.warns(FutureWarning, match="mesh_link.material. is now") as caught:
@@ -170,12 +167,12 @@ def test_link_of_a_material_has_the_stiffness_of_the_constants(tmp_path):
     assert caught[0].filename == __file__
     new = ff.mesh_link(surface, "z=0", "z=0.452", E=6e10, nu=0.3, options=quick)
     np.testing.assert_array_equal(old.stiffness, new.stiffness)
-    # E A / L of the full round bar of 40 mm radius
+    # E A / L of a solid round bar
     stretch = 6e10 * np.pi * 0.04**2 / 0.452
     assert new.stiffness[5, 5] == pytest.approx(stretch, rel=0.06)
 
 
-def test_worst_pose_by_a_linear_response_equals_that_of_the_posture(posture, tmp_path):
+def test_worst_pose_accepts_old_argument_prepared(posture, tmp_path):
     file = tmp_path / "errors.toml"
     file.write_text(ERRORS)
     sources = sources_of(posture.robot, file)
@@ -189,7 +186,7 @@ def test_worst_pose_by_a_linear_response_equals_that_of_the_posture(posture, tmp
 @pytest.mark.parametrize(
     ("old", "new"), [("holding", "loading"), ("letting go", "unloading")]
 )
-def test_old_side_has_the_results_of_the_new_one(posture, old, new):
+def test_old_side_has_same_results_as_new_side(posture, old, new):
     with pytest.warns(FutureWarning, match=f"side='{old}' is now side='{new}'") as c:
         found = ff.platform_stiffness(posture, "contact", LOAD, side=old)
     assert c[0].filename == __file__

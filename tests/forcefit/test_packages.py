@@ -1,4 +1,4 @@
-"""Installed packages: extras, the minimal installation, packages of the same name."""
+"""Optional packages, minimal installation, and modules with equal names."""
 
 import json
 import os
@@ -70,10 +70,8 @@ def files(tmp_path):
           ROOT / "examples/irsbot2_errors.toml")),
     ],
 )  # fmt: skip
-def test_command_without_its_package_states_what_to_install(
-    files, hidden, distribution, cure, words
-):
-    """It does so before any work, and writes nothing."""
+def test_command_names_the_package_to_install(files, hidden, distribution, cure, words):
+    """The command writes no files."""
     before = sorted(files.iterdir())
     status, out, err = run_without(files, hidden, *words)
     said = err.strip().splitlines()[-1]
@@ -99,16 +97,14 @@ FEA = ("--base", "z=0", "--tip", "z=1", "--young", "1e9", "--poisson", "0.3")
          ("convert", "a.urdf", "--loops", "a.yaml", "-o", "b.toml")),
     ],
 )  # fmt: skip
-def test_file_without_its_reader_is_refused_with_the_package_to_install(
-    files, hidden, said, words
-):
+def test_reader_names_the_package_to_install(files, hidden, said, words):
     status, out, err = run_without(files, hidden, *words)
     assert err.strip().splitlines()[-1] == f"forcefit: {said}"
     assert (status, out) == (2, "")
 
 
-def test_conversion_without_mujoco_reports_that_nothing_was_compared(tmp_path):
-    """MuJoCo is a second reader; the conversion itself does not need it."""
+def test_conversion_without_mujoco_reports_no_comparison(tmp_path):
+    """MuJoCo is only required to check the conversion."""
     status, out, err = run_without(tmp_path, "mujoco", "convert", "arm6", "-o", "b.xml")
     assert (status, err) == (0, "")
     assert "b.xml was not compared with another program: MuJoCo is not installed" in out
@@ -117,7 +113,7 @@ def test_conversion_without_mujoco_reports_that_nothing_was_compared(tmp_path):
 
 @pytest.mark.slow
 def test_finite_elements_without_mkl_have_equal_results(tmp_path):
-    """SciPy's factorisation of the same mesh: results differ by rounding only."""
+    """Without MKL, the factorisation of SciPy is used."""
     surface = ROOT / "meshes/distal_plain.stl"
     held = ("--base", "z=0", "--tip", "z=0.452", *FEA[4:], "--accuracy", "0.05")
     found = []
@@ -132,14 +128,14 @@ def test_finite_elements_without_mkl_have_equal_results(tmp_path):
     assert np.abs((other - one) / scale).max() < 1e-9
 
 
-def test_missing_module_of_the_program_itself_is_raised_unchanged():
-    """The user cannot repair it."""
+def test_missing_forcefit_module_is_raised_unchanged():
+    """Such an error is a defect of forcefit, which an installation cannot solve."""
     with pytest.raises(ModuleNotFoundError), naming_packages():
         raise ModuleNotFoundError("No module named 'forcefit.x'", name="forcefit.x")
 
 
-def test_every_package_of_an_extra_is_named_with_its_extra():
-    """Also a package that is added to an extra in pyproject.toml later."""
+def test_message_names_the_extra_of_a_missing_package():
+    """The extras are read from pyproject.toml."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     extras = project["optional-dependencies"]
     for extra in set(extras) - {"all", "dev", "docs", "examples", "benchmarks"}:
@@ -151,7 +147,7 @@ def test_every_package_of_an_extra_is_named_with_its_extra():
             ):
                 with naming_packages():
                     raise ModuleNotFoundError(name=module)
-        # MKL is large and not free software: it is installed on request
+        # MKL is large and proprietary and therefore not part of [all]
         listed = re.search(rf"[\[,]{extra}[\],]", extras["all"][0])
         assert bool(listed) == (extra != "mkl")
 
@@ -162,8 +158,7 @@ def test_every_package_of_an_extra_is_named_with_its_extra():
     ("stiffness", "beam", "--length", "1", "--radius", "0.1", *FEA[4:]),
 ])  # fmt: skip
 def test_solving_one_posture_requires_five_packages(tmp_path, words):
-    """These are the packages of LEAST and their requirements;
-    results are the same as with all packages."""
+    """Results are equal if all packages except LEAST are hidden."""
     ff.write_robot(ff.load_robot("irsbot2"), tmp_path / "robot.toml")
     shown = modules_of(*LEAST) | {"forcefit"}
     assert not {"xarray", "cvxpy", "pyvista", "exudyn", "threadpoolctl"} & shown
@@ -178,7 +173,7 @@ def test_solving_one_posture_requires_five_packages(tmp_path, words):
 
 
 def ran(folders, code):
-    """Exit status, standard output and warnings of a fresh Python."""
+    """Return exit status, standard output and standard error of a new Python."""
     path = os.pathsep.join(map(str, folders))
     done = subprocess.run(
         [sys.executable, "-P", "-c", code], env=os.environ | {"PYTHONPATH": path},
@@ -190,9 +185,7 @@ def ran(folders, code):
 @pytest.mark.parametrize("name", FOLDERS)
 @pytest.mark.parametrize("file", ["{}.py", "{}/__init__.py"])
 @pytest.mark.parametrize("first", ["forcefit", "json"])
-def test_module_of_a_user_and_the_package_do_not_hide_each_other(
-    tmp_path, name, file, first
-):
+def test_user_module_and_forcefit_package_do_not_conflict(tmp_path, name, file, first):
     other = tmp_path / file.format(name)
     other.parent.mkdir(exist_ok=True)
     other.write_text("owner = 'another program'\n")
@@ -204,8 +197,8 @@ def test_module_of_a_user_and_the_package_do_not_hide_each_other(
 
 @pytest.mark.parametrize("name", FOLDERS)
 @pytest.mark.parametrize("first", ["forcefit", "json"])
-def test_old_name_of_a_package_leads_to_the_present_module(name, first):
-    """Also in a checkout, where the folder of this name is found first."""
+def test_old_package_name_imports_the_new_module(name, first):
+    """In a checkout, Python finds the folder with the old name first."""
     module = {"stiffness": "link", "assembly": "model.robot", "validation": "study"}
     old = f"{name}.{module[name]}"
     code = f"import {first}, sys, {old}; print({old} is sys.modules['forcefit.{old}'])"
@@ -220,7 +213,7 @@ def test_new_names_cause_no_warning():
 
 
 def test_checkout_without_symbolic_links_finds_the_packages(tmp_path):
-    """As on Windows, where git writes them as files of text."""
+    """On Windows, git writes symbolic links as text files."""
     links = shutil.ignore_patterns("assembly", "stiffness", "validation")
     shutil.copytree(ROOT / "forcefit", tmp_path / "forcefit", ignore=links)
     (tmp_path / "forcefit" / "stiffness").write_text("../stiffness")

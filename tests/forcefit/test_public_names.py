@@ -1,4 +1,4 @@
-"""Public names as editors and type checkers see them."""
+"""Stub file of public names for editors and type checkers."""
 
 import os
 import re
@@ -20,7 +20,7 @@ STUB = ROOT / "forcefit/__init__.pyi"
 
 
 def import_of(owner, names):
-    """The import of names as ruff formats it."""
+    """Return an import statement in the format of ruff."""
     line = f"from {owner} import {', '.join(names)}\n"
     if len(line) < 90:
         return line
@@ -38,13 +38,13 @@ def stub_of(owners):
     )
 
 
-def test_stub_file_equals_the_table_of_public_names():
-    """To write it again: python -m tests.forcefit.test_public_names."""
+def test_stub_file_agrees_with_public_names():
+    """To update the stub file, run python -m tests.forcefit.test_public_names."""
     assert STUB.read_text(encoding="utf-8") == stub_of(ff._OWNERS)
 
 
 def commands_of(group, before=()):
-    """Names of all commands of the command line."""
+    """Yield the names of all commands."""
     for name, one in group.commands.items():
         if hasattr(one, "commands"):
             yield from commands_of(one, (*before, name))
@@ -52,8 +52,8 @@ def commands_of(group, before=()):
             yield " ".join((*before, name))
 
 
-def test_reference_names_the_functions_of_every_command():
-    """Public ones without a module, others importable from the stated module."""
+def test_reference_lists_functions_of_every_command():
+    """Public functions are listed without a module, other functions with one."""
     page = (ROOT / "docs/api.md").read_text(encoding="utf-8")
     table = page.partition("## Commands and their functions")[2]
     rows = re.findall(r"^\| `([\w ]+)` \| (.*) \|$", table, flags=re.MULTILINE)
@@ -87,7 +87,7 @@ def checked(checker, folder, code):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("checker", ["mypy", "pyright"])
-def test_type_checkers_accept_the_readme_and_refuse_a_misspelt_name(checker, tmp_path):
+def test_type_checkers_know_the_public_names(checker, tmp_path):
     if find_spec(checker) is None:
         pytest.skip(f"no {checker}")
     code = python_example()
@@ -96,7 +96,7 @@ def test_type_checkers_accept_the_readme_and_refuse_a_misspelt_name(checker, tmp
     status, said = checked(checker, tmp_path, code.replace("zone_margin", "zone_marg"))
     assert status == 1
     assert "zone_marg" in said
-    # types too, not names alone: an energy is a number
+    # the type of an attribute is known: an energy is a number
     status, said = checked(checker, tmp_path, code + "forced.energy.upper()\n")
     assert status == 1
     assert "upper" in said

@@ -1,4 +1,4 @@
-"""Folder of cached meshes and compiled code, and runs without a writable folder."""
+"""Cache folder for meshes and link solutions, and runs without such a folder."""
 
 import os
 import shutil
@@ -16,7 +16,7 @@ ROOT = Path(__file__).parents[3]
 
 @pytest.fixture
 def nothing(monkeypatch, tmp_path):
-    """No variable, a home that is a file, temporary files in a folder of the test's."""
+    """Remove all cache variables, and make the home folder unusable."""
     for name in ("FORCEFIT_CACHE", "LOCALAPPDATA", "XDG_CACHE_HOME"):
         monkeypatch.delenv(name, raising=False)
     (tmp_path / "home").write_text("a file: nothing can be made in it")
@@ -26,10 +26,10 @@ def nothing(monkeypatch, tmp_path):
     return tmp_path
 
 
-def test_cache_folder_follows_the_environment_variable(nothing, monkeypatch):
+def test_cache_folder_is_set_by_environment_variable(nothing, monkeypatch):
     monkeypatch.setenv("FORCEFIT_CACHE", str(nothing / "mine"))
     assert cache_folder() == nothing / "mine"
-    # one that cannot be made is passed over
+    # a folder that cannot be created is skipped
     monkeypatch.setenv("FORCEFIT_CACHE", str(nothing / "home" / "mine"))
     assert cache_folder().parent == nothing / "tmp"
 
@@ -38,7 +38,7 @@ def test_cache_folder_follows_the_environment_variable(nothing, monkeypatch):
     ("win32", "LOCALAPPDATA", ""), ("darwin", "", "Library/Caches"),
     ("linux", "XDG_CACHE_HOME", ".cache"),
 ])  # fmt: skip
-def test_cache_folder_follows_the_convention_of_each_system(
+def test_cache_folder_depends_on_operating_system(
     system, variable, within, nothing, monkeypatch
 ):
     monkeypatch.setattr(module.sys, "platform", system)
@@ -49,9 +49,7 @@ def test_cache_folder_follows_the_convention_of_each_system(
         assert cache_folder() == nothing / "other" / "forcefit"
 
 
-def test_cache_folder_without_a_home_is_a_private_temporary_folder(
-    nothing, monkeypatch
-):
+def test_cache_folder_without_home_is_a_private_temporary_folder(nothing, monkeypatch):
     def homeless():
         raise RuntimeError("Could not determine home directory.")
 
@@ -62,8 +60,8 @@ def test_cache_folder_without_a_home_is_a_private_temporary_folder(
 
 
 @pytest.mark.skipif(not hasattr(os, "getuid"), reason="no users of POSIX")
-def test_temporary_folder_that_others_may_write_is_not_used_as_cache(nothing):
-    """Code is loaded from the cache."""
+def test_cache_folder_is_not_a_world_writable_folder(nothing):
+    """Other users could replace the files in such a folder."""
     folder = cache_folder()
     folder.chmod(0o777)
     assert cache_folder() is None
@@ -80,8 +78,8 @@ def test_cache_folder_is_none_without_a_writable_folder(nothing):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("temporary", [True, False])
-def test_read_only_installation_without_a_home_works(tmp_path, temporary):
-    """Every __pycache__ is a file, so that even root cannot write beside a source."""
+def test_solve_runs_in_a_read_only_installation(tmp_path, temporary):
+    """Each ``__pycache__`` is a file, so that root cannot write compiled code."""
     for package in ("forcefit", "stiffness", "assembly", "validation"):
         shutil.copytree(ROOT / package, tmp_path / package,
                         ignore=shutil.ignore_patterns("__pycache__"))  # fmt: skip

@@ -1,4 +1,4 @@
-"""Locks on files, and systems without POSIX modules."""
+"""File locks, and operating systems without POSIX modules."""
 
 import os
 import subprocess
@@ -12,8 +12,8 @@ from forcefit.inputs.locking import locked_file
 ROOT = Path(__file__).parents[3]
 
 
-def test_locked_file_is_refused_until_its_lock_is_released(tmp_path):
-    """Also within a single process."""
+def test_locked_file_raises_an_error_until_released(tmp_path):
+    """The lock is effective within a single process."""
     path = tmp_path / "map.nc.journal"
     with locked_file(path):
         with pytest.raises(BlockingIOError), locked_file(path, wait=False):
@@ -49,9 +49,9 @@ main()
     ],
 )
 def test_commands_run_without_posix_modules(tmp_path, words):
-    """Without modules and functions that Windows lacks, results are the same.
+    """Results are equal without the modules and functions that Windows lacks.
 
-    Only the command's own process is tested.
+    The modules are hidden in the main process only.
     """
     search = {"PYTHONPATH": os.pathsep.join([str(ROOT), *sys.path])}
     answers = []

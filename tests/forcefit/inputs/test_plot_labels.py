@@ -24,7 +24,7 @@ def drawn(figure):
 
 
 def drawn_texts(figure):
-    """All texts of a figure, drawn."""
+    """Return all texts in a figure after drawing."""
     from matplotlib.text import Text
 
     return [text.get_text() for text in drawn(figure).findobj(Text)]
@@ -32,7 +32,7 @@ def drawn_texts(figure):
 
 @pytest.mark.parametrize("name", ODD)
 def test_matplotlib_shows_a_name_unchanged(name):
-    """Its width equals that of the same text without mathematical markup."""
+    """The text is as wide as the same text drawn without formula parsing."""
     from matplotlib.figure import Figure
 
     figure = Figure()
@@ -44,7 +44,7 @@ def test_matplotlib_shows_a_name_unchanged(name):
 
 
 def grid(count, axes):
-    """A sweep's data set with odd names wherever a user has a say."""
+    """Return a sweep data set in which all user-defined names are unusual."""
     shape = tuple(count[: len(axes)])
     values = np.ones(shape)
     status = np.full(shape, "ok", dtype=object)
@@ -57,16 +57,16 @@ def grid(count, axes):
     return xarray.Dataset(data, coords, {"robot": ODD[0]})
 
 
-def test_constant_map_states_its_value_without_a_colour_scale():
+def test_constant_map_has_no_colour_scale():
     data = grid((2, 3), ("tx", "ty"))
     data["energy"] = (("tx", "ty"), np.arange(6.0).reshape(2, 3))
     figure = map_figure(data)
     shown = drawn_texts(figure)
     assert sum(text.endswith(" everywhere") for text in shown) == 4
-    assert len(figure.axes) == 6 + 1  # panels, and the energy's scale
+    assert len(figure.axes) == 6 + 1  # six panels, and the colour scale of the energy
 
 
-def test_figures_of_statistics_show_unusual_names_unchanged():
+def test_statistics_figures_show_names_unchanged():
     attrs = {"robot": ODD[0], "seed": 1, "clearance": "worst"}
     draws = {"energy": ("draw", np.arange(5.0)), "status": ("draw", np.zeros(5))}
     shown = drawn_texts(histogram_figure(xarray.Dataset(draws, attrs=attrs)))

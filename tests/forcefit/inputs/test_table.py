@@ -1,4 +1,4 @@
-"""Reading of tables, with short messages for invalid values."""
+"""Reading of TOML tables, and messages about invalid values."""
 
 import math
 
@@ -30,11 +30,11 @@ def message(function, *args, **kwargs):
 
 
 def test_bad_input_error_is_a_value_error():
-    """Callers of the library need not know this class."""
+    """Callers can catch ValueError."""
     assert isinstance(BadInput("x"), ValueError)
 
 
-def test_message_of_a_bad_input_error_is_one_line_for_any_text():
+def test_bad_input_message_is_one_line():
     text = str(BadInput("a\nb\x1b[31m\u2028c\ud800"))
     assert text == r"a\nb\x1b[31m\u2028c\ud800"
     assert len(str(BadInput("x" * 10**6))) <= 800
@@ -42,8 +42,8 @@ def test_message_of_a_bad_input_error_is_one_line_for_any_text():
 
 
 @given(st.text(alphabet=st.characters()), st.integers(20, 90))
-def test_one_line_keeps_short_plain_text_and_cuts_long_text(text, longest):
-    """An escaped character may take up to ten places."""
+def test_one_line_shortens_only_long_text(text, longest):
+    """An escaped character has a length of up to ten characters."""
     line = one_line(text, longest)
     assert len(line) <= 10 * longest
     assert "\n" not in line
@@ -51,7 +51,7 @@ def test_one_line_keeps_short_plain_text_and_cuts_long_text(text, longest):
         assert line == text
 
 
-def test_nearest_name_is_suggested_or_all_names_are_listed():
+def test_nearest_suggests_or_lists_names():
     assert nearest("raduis", ["radius", "width"]) == '; did you mean "radius"?'
     assert nearest("q", ["b", "a", "a"]) == "; valid: a, b"
     assert nearest("q", []) == ""
@@ -60,14 +60,14 @@ def test_nearest_name_is_suggested_or_all_names_are_listed():
     assert len(nearest("x" * 10**6, ["y" * 10**5] * 20)) < 100
 
 
-def test_description_of_any_value_is_short():
+def test_describe_returns_a_short_text():
     deep = []
     for _ in range(100_000):
         deep = [deep]
     wide = {str(i): [1.0] * 1000 for i in range(1000)}
     for value in (deep, wide, "x" * 10**7, [["a" * 999] * 99] * 99, np.eye(99)):
         assert len(describe(value)) <= 60
-    while deep:  # taken apart by hand: Python would recurse
+    while deep:  # Python would free nested lists recursively
         deep = deep[0]
 
 
@@ -79,14 +79,14 @@ def test_description_of_any_value_is_short():
         (0, "found 0"), (2, "found 2"), (-1.5, "found -1.5"),
     ],
 )  # fmt: skip
-def test_number_out_of_range_is_refused(value, text):
+def test_number_out_of_range_is_rejected(value, text):
     found = message(table(a=value).number, "a", "m", above=0.0, below=2.0)
     assert found.startswith(f"f.toml: place.a: {text}")
     assert found.endswith("expected a finite number > 0 and < 2 [m]")
 
 
 @pytest.mark.parametrize("value", [True, -1, 1.0, "1"])
-def test_value_that_is_not_a_whole_number_is_refused(value):
+def test_integer_key_rejects_other_values(value):
     assert "expected a whole number >= 0" in message(table(a=value).integer, "a")
 
 
@@ -97,19 +97,19 @@ def test_value_that_is_not_a_whole_number_is_refused(value):
     ("a\nb", r"found 'a\nb', expected no control characters"),
     ("a" * 60, "of 60 characters, expected at most 50"),
 ])  # fmt: skip
-def test_text_that_is_not_one_short_line_is_refused(value, text):
+def test_text_key_rejects_empty_long_or_multiline_text(value, text):
     assert text in message(
         table(a=value).text, "a", expected="a name", longest=50
     )  # fmt: skip
 
 
-def test_text_is_read_with_a_byte_order_mark_and_any_line_ends(tmp_path):
+def test_read_text_accepts_byte_order_mark_and_crlf(tmp_path):
     path = tmp_path / "a.txt"
     path.write_bytes(b"\xef\xbb\xbfa\r\nb\n")
     assert read_text(path) == "a\nb\n"
 
 
-def test_file_above_64_mib_is_refused(tmp_path):
+def test_file_above_64_mib_is_rejected(tmp_path):
     path = tmp_path / "large"
     with path.open("wb") as file:
         file.truncate((64 << 20) + 1)
@@ -125,7 +125,7 @@ def test_file_above_64_mib_is_refused(tmp_path):
     ("a = " + "9" * 5000, "found an integer with thousands of digits"),
     ("a = 1\na = 2", "Cannot overwrite a value"),
 ])  # fmt: skip
-def test_wrong_toml_is_refused_with_its_reason(text, reason, tmp_path):
+def test_message_about_invalid_toml_contains_the_reason(text, reason, tmp_path):
     path = tmp_path / "a.toml"
     path.write_text(text)
     found = message(read_toml, path)
@@ -133,20 +133,20 @@ def test_wrong_toml_is_refused_with_its_reason(text, reason, tmp_path):
     assert len(found) < len(str(path)) + 250
 
 
-def test_dotted_keys_are_read_next_to_dots_in_values(tmp_path):
-    """Dots in numbers and in texts are not nesting."""
+def test_dots_in_values_are_not_counted_as_nesting(tmp_path):
+    """Dots in numbers and strings do not count towards the nesting limit."""
     path = tmp_path / "a.toml"
     numbers = ", ".join(["0.25"] * 500)
     path.write_text(f"a.b.c.d = [{numbers}]\ntext = '{'so. ' * 50}'\n")
     assert read_toml(path).content["a"]["b"]["c"]["d"] == [0.25] * 500
 
 
-def test_integer_beyond_the_range_of_doubles_is_refused():
+def test_integer_beyond_float_range_is_rejected():
     with pytest.raises(BadInput, match="--workers: found inf, expected"):
         checked("--workers", 10**400, "1", least=1)
 
 
-def test_message_on_a_number_without_a_unit_has_no_brackets():
+def test_message_about_dimensionless_number_has_no_brackets():
     table = Table({"cp": -1}, "f.toml", "tolerance")
     with pytest.raises(BadInput, match="found -1, expected a finite number > 0$"):
         table.number("cp", "", above=0.0)

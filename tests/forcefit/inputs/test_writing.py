@@ -30,30 +30,30 @@ from forcefit.inputs.writing import (
 )
 
 ROOT = Path(__file__).parents[3]
-# the functions that put bytes on a disk, and the files that may call them
+# functions that write files, and modules in which they are allowed
 _WRITERS = {"write_text", "write_bytes", "savefig", "to_netcdf", "screenshot", "dump",
             "imsave", "savez", "savez_compressed", "dump_to_store"}  # fmt: skip
 _MAY = {
     "forcefit/inputs/writing.py",
-    "stiffness/mesh/mesh.py",  # its cache through whole_file; the mesher's scratch
+    "stiffness/mesh/mesh.py",  # cache written with whole_file, and temporary files
     "stiffness/mesh/mesh_worker.py",  # likewise
-    "stiffness/surface/surface_worker.py",  # a temporary folder
-    "assembly/files/stored_solutions.py",  # through whole_file
-    "assembly/sweeps/dataset.py",  # NetCDF through whole_file
-    "forcefit/commands/show.py",  # pixels of a screenshot
+    "stiffness/surface/surface_worker.py",  # writes to a temporary folder
+    "assembly/files/stored_solutions.py",  # uses whole_file
+    "assembly/sweeps/dataset.py",  # uses whole_file
+    "forcefit/commands/show.py",  # takes a screenshot without writing a file
     "assembly/report/plot_closing.py",  # likewise
-    "forcefit/page/page.py",  # into memory
+    "forcefit/page/page.py",  # writes to memory
     "assembly/statistics/replay.py",  # likewise
     "validation/study/report.py",  # likewise
     "validation/diagnosis/saved_covariance.py",  # likewise
-    "assembly/exchange/comparison.py",  # a temporary folder
+    "assembly/exchange/comparison.py",  # writes to a temporary folder
     "assembly/exchange/mujoco_reading.py",  # likewise
     "assembly/exchange/robot_files.py",  # likewise
 }
 
 
 def written_elsewhere(path):
-    """Calls in a file that write without ``forcefit/inputs/writing.py``."""
+    """Yield calls that write files without ``forcefit/inputs/writing.py``."""
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
             if node.func.attr in _WRITERS:
@@ -69,9 +69,7 @@ def test_only_the_writing_module_writes_files():
 
 @contextmanager
 def full_disk():
-    """No file of this process may grow beyond 512 bytes, pytest's own log included:
-    for the call alone.
-    """
+    """Limit the size of all files that this process writes to 512 bytes."""
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (512, before[1]))
     try:
@@ -97,7 +95,7 @@ def a_dataset(path):
     save_dataset(xarray.Dataset({"x": ("i", np.arange(1000.0))}), path)
 
 
-# what may stand where a picture is written
+# first bytes of existing files that may be overwritten
 WRITTEN = {
     ".png": b"\x89PNG\r\n", ".svg": b"<?xml", ".pdf": b"%PDF-",
     ".toml": b"# Written by forcefit.\n",
@@ -118,9 +116,7 @@ WRITE = {
 
 @pytest.mark.parametrize("name", WRITE)
 @pytest.mark.parametrize("before", [None, b"what stood there\n"])
-def test_full_disk_is_reported_by_one_message_and_the_old_file_is_unchanged(
-    tmp_path, name, before
-):
+def test_old_file_is_unchanged_if_the_disk_is_full(tmp_path, name, before):
     path = tmp_path / name
     if before is not None:
         path.write_bytes(WRITTEN.get(path.suffix, before))
@@ -133,21 +129,21 @@ def test_full_disk_is_reported_by_one_message_and_the_old_file_is_unchanged(
 
 
 @pytest.mark.parametrize("name", WRITE)
-def test_written_file_is_complete_and_leaves_no_other_file(tmp_path, name):
+def test_no_temporary_file_remains_after_writing(tmp_path, name):
     WRITE[name](tmp_path / name)
     assert [p.name for p in tmp_path.iterdir()] == [name]
     assert (tmp_path / name).stat().st_size > 500
 
 
 @pytest.mark.parametrize("ending", PIXELS.endings)
-def test_picture_of_every_ending_is_written_and_replaced(tmp_path, ending):
+def test_picture_of_every_format_is_written_and_overwritten(tmp_path, ending):
     path = tmp_path / f"picture{ending.upper()}"
     for shade in (0, 255):
         save_pixels(np.full((5, 7, 3), shade, np.uint8), path)
         check_writable(path, PIXELS)
         shown = np.asarray(Image.open(path).convert("RGB"))
         assert shown.shape == (5, 7, 3)
-        assert (abs(shown.astype(int) - shade) <= 2).all()  # JPEG rounds
+        assert (abs(shown.astype(int) - shade) <= 2).all()  # JPEG is lossy
 
 
 def fail_in(path):
@@ -156,7 +152,7 @@ def fail_in(path):
         raise KeyboardInterrupt
 
 
-def test_failure_while_writing_keeps_the_old_file(tmp_path):
+def test_old_file_is_unchanged_if_writing_fails(tmp_path):
     path = tmp_path / "x.txt"
     path.write_text("old")
     with pytest.raises(KeyboardInterrupt):
@@ -164,7 +160,7 @@ def test_failure_while_writing_keeps_the_old_file(tmp_path):
     assert [p.read_text() for p in tmp_path.iterdir()] == ["old"]
 
 
-def test_replaced_file_keeps_its_mode_and_a_link_its_target(tmp_path):
+def test_overwriting_preserves_mode_and_symbolic_link(tmp_path):
     path, link = tmp_path / "real.json", tmp_path / "link.json"
     path.write_text("{}")
     path.chmod(0o600)
@@ -176,7 +172,7 @@ def test_replaced_file_keeps_its_mode_and_a_link_its_target(tmp_path):
 
 
 @pytest.mark.parametrize("device", ["/dev/null", "/dev/full"])
-def test_device_file_is_refused_and_kept(tmp_path, device):
+def test_device_file_is_rejected(tmp_path, device):
     for target in (Path(device), tmp_path / "link"):
         if target.name == "link":
             target.symlink_to(device)
@@ -185,13 +181,13 @@ def test_device_file_is_refused_and_kept(tmp_path, device):
     assert Path(device).is_char_device()
 
 
-def test_a_pipe_is_refused_without_waiting_for_a_reader(tmp_path):
+def test_pipe_is_rejected_without_waiting(tmp_path):
     os.mkfifo(tmp_path / "x.json")
     with pytest.raises(BadInput, match="found a device, pipe or socket"):
         write_json({}, str(tmp_path / "x.json"))
 
 
-def test_a_robot_file_written_by_hand_is_not_replaced(tmp_path):
+def test_handwritten_robot_file_is_not_overwritten(tmp_path):
     path = tmp_path / "robot.toml"
     write_robot(load_robot("five_bar"), path)
     check_writable(path, ROBOT)
@@ -201,13 +197,13 @@ def test_a_robot_file_written_by_hand_is_not_replaced(tmp_path):
         check_writable(path, ROBOT)
 
 
-def test_invalid_paths_are_refused():
+def test_invalid_paths_are_rejected():
     for path in ("a\0b.json", "x" * 300 + ".json", "", ".", "/dev/null/x.json"):
         with pytest.raises(BadInput):
             check_writable(path, JSON)
 
 
-def test_text_that_is_not_utf_8_is_written_escaped(tmp_path):
+def test_invalid_utf_8_is_escaped(tmp_path):
     write_text("name \udcff\n", tmp_path / "x.txt")
     assert (tmp_path / "x.txt").read_bytes() == b"name \\udcff\n"
 
@@ -217,9 +213,8 @@ def write_many(path, mark, count):
         write_text(mark * 30_000, path)
 
 
-def test_two_programs_writing_at_once_leave_one_complete_file(tmp_path):
-    """Each waits for the other:
-    the file is never a mixture, and no other file remains."""
+def test_two_processes_write_one_complete_file(tmp_path):
+    """Each process waits for the other, and no temporary file remains."""
     path, fork = tmp_path / "x.txt", multiprocessing.get_context("fork")
     both = [fork.Process(target=write_many, args=(path, mark, 30)) for mark in "ab"]
     for one in both:
@@ -235,7 +230,7 @@ def test_two_programs_writing_at_once_leave_one_complete_file(tmp_path):
     assert [p.name for p in tmp_path.iterdir()] == ["x.txt"]
 
 
-def test_part_file_of_a_killed_program_is_replaced(tmp_path):
+def test_part_file_of_a_killed_process_is_overwritten(tmp_path):
     path = tmp_path / "x.txt"
     child = os.fork()
     if not child:
@@ -250,9 +245,7 @@ def test_part_file_of_a_killed_program_is_replaced(tmp_path):
     assert [p.read_text() for p in tmp_path.iterdir()] == ["whole"]
 
 
-def test_relative_path_has_slashes_and_starts_at_the_folder_of_the_file(
-    tmp_path, monkeypatch
-):
+def test_relative_path_has_slashes(tmp_path, monkeypatch):
     assert path_from(tmp_path / "a" / "b", tmp_path / "c.stl") == "../../c.stl"
 
     def another_drive(*given):

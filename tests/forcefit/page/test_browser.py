@@ -31,7 +31,7 @@ seed = 1
 tx = 0.0
 tz = -0.5
 """
-PATIENCE = 60  # [s] of a loaded machine
+PATIENCE = 60  # [s] maximum waiting time on a slow machine
 
 
 @pytest.fixture(scope="module")
@@ -129,7 +129,7 @@ def test_slider_exaggerates_displacements_in_proportion(tab, results):
     slide(tab, "exaggeration", 0.5 * most)
 
 
-def test_closing_animation_begins_open_and_ends_closed(tab):
+def test_closing_animation_starts_open_and_ends_closed(tab):
     steps = int(tab.execute_script("return document.querySelector('.closing').max"))
     gaps = []
     for step in (0, steps - 1):
@@ -142,14 +142,14 @@ def test_closing_animation_begins_open_and_ends_closed(tab):
     assert "still open" not in traces(tab)
 
 
-def test_click_on_the_map_shows_the_numbers_of_the_point(tab, results):
+def test_click_on_map_shows_the_values_of_the_point(tab, results):
     from selenium.webdriver import ActionChains
     from selenium.webdriver.common.by import By
 
     plot = tab.find_element(By.CSS_SELECTOR, "figure.map .nsewdrag")
     tab.execute_script("arguments[0].scrollIntoView({block: 'center'})", plot)
     width = plot.size["width"]
-    # the fourth of five columns, the lower of two rows
+    # fourth of five columns, lower of two rows
     ActionChains(tab).move_to_element_with_offset(
         plot, int(0.2 * width), int(0.25 * plot.size["height"])
     ).pause(0.3).click().perform()
@@ -167,7 +167,7 @@ def test_click_on_the_map_shows_the_numbers_of_the_point(tab, results):
     assert texts["tx"] == "100 mm"
 
 
-def test_choice_of_a_quantity_changes_the_map(tab, results):
+def test_selecting_a_quantity_changes_the_map(tab, results):
     tab.execute_script(
         "const s = document.querySelector('figure.map select');"
         "s.value = [...s.options].find(o => o.text.startsWith('energy')).value;"
@@ -182,7 +182,7 @@ def test_choice_of_a_quantity_changes_the_map(tab, results):
     np.testing.assert_allclose(np.array(drawn, dtype=float), energies)
 
 
-def test_click_sorts_a_table_and_the_button_copies_all_digits(tab, results):
+def test_table_can_be_sorted_and_copied(tab, results):
     tab.execute_script(
         "window.copied = []; navigator.clipboard.writeText = async text => {"
         " window.copied.push(text); };"
@@ -219,7 +219,7 @@ def test_unit_switch_changes_to_si_and_back(tab, results):
     assert tab.execute_script(first) == own
 
 
-def test_page_in_the_browser_contains_the_written_json(tab, results):
+def test_page_contains_the_json_results(tab, results):
     held = tab.execute_script("return document.querySelector('script.results').text")
     written = (results.study.folder / "results.json").read_text()
     assert json.loads(held) == json.loads(written)
@@ -229,11 +229,11 @@ def test_page_prints_to_pdf_with_its_pictures(tab):
     pdf = tab.execute_cdp_cmd("Page.printToPDF", {"printBackground": True})
     content = base64.b64decode(pdf["data"])
     assert content.startswith(b"%PDF")
-    assert len(content) > 50_000  # with its pictures
+    assert len(content) > 50_000  # includes pictures
 
 
 def test_every_figure_is_printed_with_dark_lines_on_white(tab):
-    """WebGL drawings may be lost by then, and a dark page must not be printed dark."""
+    """WebGL drawings are replaced by pictures, and dark colours by light ones."""
     count = tab.execute_script("return document.querySelectorAll('figure').length")
     tab.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": [
         {"name": "prefers-color-scheme", "value": "dark"}]})  # fmt: skip
@@ -253,8 +253,8 @@ def test_every_figure_is_printed_with_dark_lines_on_white(tab):
         "return [...g.getImageData(0, 0, 9, 9).data]"
     )
     pixels = np.array(tab.execute_script(corner)).reshape(9, 9, 4)[..., :3]
-    assert pixels.max() >= 250  # white paper ..
-    assert pixels.min() < 250  # .. and a robot on it
+    assert pixels.max() >= 250  # the background is white
+    assert pixels.min() < 250  # the robot is visible
     tab.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "", "features": []})
 
 
@@ -277,11 +277,11 @@ def test_dark_colour_scheme_has_a_dark_page_with_light_text(tab):
         assert abs(axis - back) > 128
 
 
-def test_phone_layout_keeps_numbers_on_one_line_and_scrolls_wide_tables(tab):
+def test_wide_tables_scroll_on_a_phone(tab):
     phone = {"width": 390, "height": 844, "deviceScaleFactor": 1, "mobile": True}
     tab.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", phone)
     try:
-        # figures are drawn again
+        # waits until the figures are redrawn
         wait(tab, "return document.documentElement.scrollWidth === 390")
         tall = tab.execute_script(
             "const line = parseFloat(getComputedStyle(document.querySelector('td'))"

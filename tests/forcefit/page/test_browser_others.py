@@ -1,4 +1,4 @@
-"""Pages of all commands but the study in a real browser, opened from disk."""
+"""Report pages of all commands except ``study``, opened in a browser."""
 
 import json
 from pathlib import Path
@@ -15,7 +15,7 @@ EXAMPLES = ROOT / "examples"
 CAMPAIGN = ROOT / "tests" / "campaigns" / "encoder_offset"
 ERRORS = EXAMPLES / "irsbot2_errors.toml"
 POSE = ("--pose", "tx=0.1,tz=-0.5")
-# figures that each page draws at least
+# minimum number of figures on each page
 FIGURES = {
     "diagnosis": 5, "statistics": 5, "tolerances": 3, "path": 4, "steps": 3,
     "inspect": 1, "iso": 2, "crosscheck": 1, "crosscheck_grid": 0, "stiffness_check": 0,
@@ -24,7 +24,7 @@ FIGURES = {
 
 
 def imperfect(folder, name, frame):
-    """A robot with an error in one frame, as a file."""
+    """Write a robot file with an error in one frame."""
     import forcefit as ff
     from forcefit.assembly.files.robot_file import write_robot
 
@@ -36,7 +36,7 @@ def imperfect(folder, name, frame):
 
 
 def results(folder):
-    """Two results that differ, as JSON files."""
+    """Write two JSON files with different results."""
     files = [folder / "first.json", folder / "second.json"]
     for k, file in enumerate(files):
         file.write_text(json.dumps({"robot": "r", "energy": 1.0 + k}))
@@ -44,7 +44,7 @@ def results(folder):
 
 
 def words_of(kind, folder):
-    """The command that writes a page."""
+    """Return the command that writes a page."""
     robot = imperfect(folder, "irsbot2", "leg1.link_a")
     hexapod = imperfect(folder, "hexapod", "leg2.tip")
     crosscheck = ["validation", "crosscheck", robot, "--links", "spring"]
@@ -80,7 +80,7 @@ def chromium():
 
 @pytest.fixture(scope="module")
 def pages():
-    """Pages by their kind, and the JSON of their commands."""
+    """Return a dictionary for pages and their JSON results by type."""
     return {}
 
 
@@ -102,7 +102,7 @@ def opened(request, tmp_path_factory, run, chromium, pages):
     return chromium, json.loads(written.read_text()), FIGURES[request.param]
 
 
-def test_page_draws_all_its_figures_and_contains_its_json(opened):
+def test_page_shows_all_figures_and_contains_json(opened):
     tab, results, figures = opened
     said = [one for one in tab.get_log("browser") if one["level"] == "SEVERE"]
     assert said == []
@@ -126,12 +126,12 @@ def test_page_draws_all_its_figures_and_contains_its_json(opened):
         assert np.nanmax(np.abs(still[1] - still[0])) > 1.0  # mm
 
 
-def test_page_fits_the_width_of_a_phone_and_of_paper(opened):
+def test_page_fits_phone_and_paper_width(opened):
     tab, *_ = opened
     wait(tab, "return document.querySelectorAll('img.print').length === "
          "document.querySelectorAll('figure').length")  # fmt: skip
     before = tab.execute_script("return document.querySelector('.xtitle')?.style.fill")
-    scheme(tab, "dark")  # figures are drawn again
+    scheme(tab, "dark")  # the figures are redrawn
     wait(tab, "return (document.querySelector('.xtitle')?.style.fill || 0) !== "
          f"'{before}'")  # fmt: skip
     for width in ("phone", "paper"):
@@ -148,7 +148,7 @@ def test_page_has_no_serious_accessibility_violation(opened, colours):
 
 
 def beyond(tab, width):
-    """Pieces of a page beyond the edge of a phone, or of A4 with margins of 15 mm."""
+    """Return the elements that extend beyond the width of a phone or an A4 page."""
     pixels = {"phone": 390, "paper": 680}[width]
     size = {"width": pixels, "height": 844, "deviceScaleFactor": 1,
             "mobile": width == "phone"}  # fmt: skip
@@ -156,11 +156,11 @@ def beyond(tab, width):
     tab.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": media})
     tab.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
     try:
-        if width == "phone":  # figures are drawn again
+        if width == "phone":  # the figures are redrawn
             wait(tab, "return [document.documentElement.scrollWidth, "
                  "...[...document.querySelectorAll('.main-svg')].map(svg => "
                  f"svg.clientWidth)].every(width => width <= {pixels})")  # fmt: skip
-            return tab.execute_script(  # drawings that cover the text below them
+            return tab.execute_script(  # figures that overlap the text below
                 "return [...document.querySelectorAll('figure')].filter(f => "
                 "[...f.querySelectorAll('.main-svg')].some(svg => "
                 "svg.getBoundingClientRect().bottom > "

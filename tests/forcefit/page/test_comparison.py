@@ -21,7 +21,7 @@ AFTER = {
     "title": "robot",
     "worst_clearance": {"pose": {"translation": 4e-4, "rotation": 1e-3}},
     "passed": False, "certificate": {"gap": 3e-12}, "new": 1,
-    # another order, the same parts
+    # same entries in a different order
     "governing": [
         {"part": "b", "what": "clearance", "translation": 3e-4},
         {"part": "a", "what": "clearance", "translation": 7e-4 * (1 + 1e-12)},
@@ -54,7 +54,7 @@ def test_comparison_lists_headline_numbers_before_components():
         "solution": {"energy": 2.4, "wrenches": [[1e3, -4e-13], [0.0, 5.0]]},
     }
     places = [one.place for one in compare(first, second, ("a", "b")).changes]
-    # a zero beside 1000 N holds their rounding
+    # -4e-13 N is a rounding error of 1000 N and is not listed
     assert places == [
         ("solution", "energy"),
         ("error", "frozen", "upper"),
@@ -93,7 +93,7 @@ def test_report_compare_accepts_pages_and_json_files(tmp_path, run):
     ("a.json", b"\xff\xfe\xff", "a.json: cannot be read: it is not text"),
     ("a.json", b"[1]", "a.json: found a JSON list or value, expected"),
 ])  # fmt: skip
-def test_files_that_cannot_be_compared_are_refused_in_one_line(
+def test_message_about_incomparable_files_is_one_line(
     tmp_path, run, name, content, message
 ):
     if content is not None:

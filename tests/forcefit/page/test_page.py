@@ -1,4 +1,4 @@
-"""Tests of report pages: numbers, escaping and self-containedness."""
+"""Tests of report pages: numbers, escaping and embedded resources."""
 
 import math
 import re
@@ -14,7 +14,7 @@ from forcefit.results.units import shown_in
 from tests.pages_for_tests import parse
 
 ODD = "</script><b>&\"' $x$ \\u003c"
-SIZE = 5_000_000  # bytes of a page
+SIZE = 5_000_000  # [byte] maximum size of a page
 
 
 def written(*body, **changes):
@@ -56,7 +56,7 @@ def test_unit_factor_converts_si_to_the_shown_unit():
         assert shown.factor == ratio[shown.shown]
 
 
-def test_table_column_states_its_unit_once_and_keeps_every_digit():
+def test_table_cell_preserves_all_digits():
     value = 0.1 + 0.2  # 0.30000000000000004
     rows = [["a", value], ["b", 2.0]]
     head, first, _ = parse(table(["", Column("shift", "m")], rows)).tables[0]
@@ -75,7 +75,7 @@ def test_names_on_a_page_are_escaped_in_html_and_json():
     assert seen.results == {ODD: [ODD, 1.5, None]}
     assert seen.tables[0][1][0].text == ODD
     assert seen.figures[1]["traces"][0]["name"] == ODD
-    assert "<" not in seen.figures[0]["traces"][0]["y"][0]  # plotly reads tags
+    assert "<" not in seen.figures[0]["traces"][0]["y"][0]  # plotly interprets tags
     assert results_in(text, "x") == seen.results
 
 
@@ -89,13 +89,13 @@ def test_contents_list_links_to_every_section_of_the_page():
     assert [text.count(f'id="{name}"') for name in links] == [1, 1, 1, 1]
 
 
-def test_report_page_needs_no_network_and_is_small():
+def test_report_page_is_small_and_needs_no_network():
     text = written(bars({"a": 1.0}, Axis("x"), ""))
     assert parse(text).fetched == []
     assert "@import" not in text
     assert "url(" not in text
     assert 700_000 < len(text) < SIZE  # with plotly.js
-    assert len(written()) < 50_000  # nothing to draw
+    assert len(written()) < 50_000  # without figures, plotly.js is not embedded
     assert written() == written()
 
 
@@ -111,8 +111,8 @@ def test_map_contains_every_number_in_si_units():
     assert spec["axes"]["x"]["values"] == [0.0, 0.1]
 
 
-def test_constant_quantity_is_stated_instead_of_drawn():
-    """A map of zeros with rounding once had colours from -0.1 to 0.1."""
+def test_constant_quantity_is_written_as_text():
+    """Rounding errors of a constant would otherwise appear as a pattern."""
     axes = [(Axis("tx", "m"), np.arange(3.0))]
     flat = Layer("energy", "energy", "J", np.full(3, 2.0) * (1 + 1e-16 * np.arange(3)))
     none = Layer("margin", "margin", "", np.full(3, np.inf))
@@ -140,7 +140,7 @@ def test_page_states_the_command_and_digests_of_its_input_files(tmp_path):
         r[0].text: r[1].text for r in parse(written(provenance=provenance)).tables[0]
     }
     assert rows["command"] == "forcefit study x.toml"
-    # FIPS 180-2, example of "abc"
+    # test vector "abc" of FIPS 180-2
     assert rows["SHA-256 of robot.toml"] == (
         "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"
     )
@@ -154,6 +154,6 @@ def test_page_states_the_command_and_digests_of_its_input_files(tmp_path):
     ("[" * 100_000, "x: found text that is neither HTML nor JSON, expected"),
     ("[1]", "x: found a JSON list or value, expected a JSON object"),
 ])  # fmt: skip
-def test_page_without_results_is_refused(text, message):
+def test_page_without_results_is_rejected(text, message):
     with pytest.raises(BadInput, match=message):
         results_in(text, "x")

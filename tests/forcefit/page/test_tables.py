@@ -9,7 +9,7 @@ from forcefit.page.page import Page, Provenance, page
 from forcefit.page.tables import Column, table
 
 
-def test_table_headers_can_have_the_keyboard_focus():
+def test_table_headers_can_have_keyboard_focus():
     text = table(["part", Column("shift", "m")], [["a", 1e-3]])
     heads = re.findall(r"<th( [^>]*)>", text)
     assert len(heads) == 2
@@ -20,14 +20,14 @@ def test_table_headers_can_have_the_keyboard_focus():
     ("good", "kind", "word"),
     [(True, "good", "OK"), (None, "mixed", "Caution"), (False, "bad", "Not OK")],
 )
-def test_verdict_has_the_colour_and_the_word_of_its_outcome(good, kind, word):
-    """Readers who cannot distinguish the colours need the word."""
+def test_verdict_has_a_colour_and_a_label(good, kind, word):
+    """The label is required by readers who cannot distinguish the colours."""
     text = page(Page("t", "v", good, [], "", [], [], Provenance(), {}))
     assert f"<p class='verdict {kind}'><strong>{word}:</strong> v</p>" in text
 
 
-def test_no_line_breaks_between_a_number_and_its_unit():
-    """A count has no unit: 12 poses, 3 N m of 2 modes."""
+def test_no_line_break_between_number_and_unit():
+    """Counts such as 12 poses have no unit and may be wrapped."""
     verdict = "At most 0.794 mm and 13 mrad, 1.926 J, over 12 poses of 2 modes: 5 %."
     text = page(Page("t", verdict, True, [], "", [], [], Provenance(), {}))
     (shown,) = re.findall(r"<p class='verdict good'>(.*?)</p>", text)
@@ -37,8 +37,8 @@ def test_no_line_breaks_between_a_number_and_its_unit():
     )
 
 
-def test_long_comparison_shows_the_largest_changes_and_folds_the_others():
-    """Folded parts are not printed; 1000 changes would take dozens of sheets."""
+def test_long_comparison_folds_small_changes():
+    """The folded table is not printed, which limits the number of pages."""
     first = {"robot": "r", "values": {f"v{k}": 1.0 for k in range(1000)}}
     second = {"robot": "r", "values": {f"v{k}": 1.0 + k / 1e3 for k in range(1000)}}
     text = comparison_page(compare(first, second, ("a", "b")), Provenance())

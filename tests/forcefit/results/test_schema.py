@@ -1,6 +1,6 @@
-"""JSON Schemas of files and results, against files, readers and another validator.
+"""JSON Schemas of files and results.
 
-Results themselves are compared in every test that asks for JSON (``conftest.py``).
+In addition, ``conftest.py`` checks the JSON results in all tests against their schemas.
 """
 
 import copy
@@ -27,7 +27,7 @@ ARM = {
          "link": {"beam": {"radius": 0.01}, "young": 2e11, "poisson": 0.3}},
     ],
 }  # fmt: skip
-# one fault each: its place and what is put there
+# for each mistake: path of a key, and an invalid value
 FAULTS = {
     "key of the file": (("plattform",), "tip"),
     "key of a frame": (("frame", 0, "axis"), [0, 0, 1]),
@@ -44,7 +44,7 @@ FAULTS = {
 
 @pytest.fixture(scope="module")
 def validator():
-    """Schema of a robot file or a campaign, as the command prints it."""
+    """Return a function that creates a validator from ``forcefit schema``."""
     from io import StringIO
     from unittest.mock import patch
 
@@ -58,12 +58,12 @@ def validator():
     return of
 
 
-def test_schemas_are_valid_by_the_stated_draft():
+def test_schemas_are_valid():
     for content in OUTPUTS.values():
         Draft202012Validator.check_schema(schema_of(content))
 
 
-def test_robot_files_of_the_repository_follow_the_schema(validator):
+def test_robot_files_agree_with_schema(validator):
     robot, checked = validator("robot"), 0
     for path in ROOT.glob("[!.]*/**/*.toml"):
         table = tomllib.loads(path.read_text())
@@ -73,7 +73,7 @@ def test_robot_files_of_the_repository_follow_the_schema(validator):
     assert checked > 10
 
 
-def test_campaigns_of_the_repository_follow_the_schema(validator):
+def test_campaign_files_agree_with_schema(validator):
     campaign, checked = validator("campaign"), 0
     for path in ROOT.glob("[!.]*/**/campaign.toml"):
         assert not [*campaign.iter_errors(tomllib.loads(path.read_text()))], path
@@ -82,14 +82,14 @@ def test_campaigns_of_the_repository_follow_the_schema(validator):
 
 
 @pytest.mark.parametrize("name", BUILT_IN)
-def test_written_robot_files_follow_the_schema(name, tmp_path, validator):
+def test_written_robot_files_agree_with_schema(name, tmp_path, validator):
     write_robot(BUILT_IN[name](), tmp_path / "robot.toml")
     table = tomllib.loads((tmp_path / "robot.toml").read_text())
     assert not [*validator("robot").iter_errors(table)]
 
 
 @pytest.mark.parametrize("fault", FAULTS)
-def test_schema_and_reader_refuse_the_same_mistake(fault, validator):
+def test_schema_and_reader_reject_the_same_mistakes(fault, validator):
     table = copy.deepcopy(ARM)
     robot_of(Table(copy.deepcopy(table), "robot.toml", ""), "arm")
     assert not [*validator("robot").iter_errors(table)]
@@ -103,7 +103,7 @@ def test_schema_and_reader_refuse_the_same_mistake(fault, validator):
         robot_of(Table(table, "robot.toml", ""), "arm")
 
 
-def test_schema_command_lists_names_and_suggests_the_nearest(run):
+def test_schema_command_lists_and_suggests_names(run):
     assert run("schema")[1].split("\n")[:3] == ["robot", "campaign", "assembly solve"]
     assert run("schema", "assembly", "sovle")[::2] == (
         2, 'forcefit: schema: found "assembly sovle"; did you mean "assembly solve"?\n'
@@ -132,6 +132,6 @@ def test_every_command_with_json_has_a_schema():
     ("crosscheck", "four_bar", "--pose", "tx=0.2", "--load", "fx=1e9"),
     ("validity", "four_bar", "--grid", "q.crank=0:0.1:0.1", "--load", "fx=10"),
 ])  # fmt: skip
-def test_results_of_failed_points_follow_the_schema(run, words):
-    """``run`` compares every result with its schema."""
+def test_results_of_failed_points_agree_with_schema(run, words):
+    """The fixture ``run`` checks the results against their schema."""
     assert run("validation", *words, "--json", "-")[0] in {0, 1}

@@ -44,11 +44,11 @@ def test_display_unit_is_a_multiple_of_the_si_unit(name):
     ("pose", {"tx": 0.1, "tz": -0.5}, "[0.1 -0.5] m"),
     ("pose", {"tx": 0.1, "rz": 0.2}, "[0.2] rad, [0.1] m"),
 ])  # fmt: skip
-def test_a_value_is_written_in_its_display_unit(name, value, expected):
+def test_value_text_uses_the_display_unit(name, value, expected):
     assert value_text(name, value) == expected
 
 
-def test_numbers_and_reading_errors_are_written_in_display_units():
+def test_reading_errors_are_written_in_display_units():
     assert in_unit(1.23456e-5, "um") == "12.35 um"
     assert in_unit(0.5, "") == "0.5"
     assert value_text(number("length", "m"), 0.125) == "0.125 m"
@@ -57,7 +57,7 @@ def test_numbers_and_reading_errors_are_written_in_display_units():
     assert readings_text({"position": None}) == "unknown"
 
 
-def test_result_lines_follow_the_given_names_and_omit_absent_ones():
+def test_result_lines_omit_absent_quantities():
     results = {"status": "ok", "energy": 1.0, "zone": {"margin": None}}
     assert lines_of(results, "status zone.margin zone.margin_free energy load") == {
         "zone margin, compliant joints rigid": "none", "assembly energy": "1 J",
@@ -68,7 +68,7 @@ def test_result_lines_follow_the_given_names_and_omit_absent_ones():
     }  # fmt: skip
 
 
-def test_labels_of_dimensions_equal_those_of_screws_and_wrenches():
+def test_dimension_labels_equal_screw_and_wrench_labels():
     from forcefit.stiffness.screws import SCREW, WRENCH
 
     assert LABELS["screw"] == SCREW
