@@ -8,8 +8,8 @@ are imported on first use.  :mod:`forcefit.inputs` reads and checks files, and
 import os.path
 import sys
 
-# In a checkout without symbolic links, for example on Windows, the packages are in the
-# parent folder
+# In a checkout without symbolic links, for example on Windows, the packages are found
+# in the parent folder.
 if not os.path.isdir(os.path.join(__path__[0], "assembly")):
     __path__.append(os.path.dirname(__path__[0]))
 from forcefit.old_packages import OldPackages
@@ -17,7 +17,7 @@ from forcefit.old_packages import OldPackages
 if not any(isinstance(finder, OldPackages) for finder in sys.meta_path):
     sys.meta_path.insert(0, OldPackages())
 
-TYPE_CHECKING = False  # importing typing takes longer than the rest of this module
+TYPE_CHECKING = False  # avoids importing typing, which is slow
 if TYPE_CHECKING:
     __version__: str
 

@@ -157,7 +157,7 @@ def _status_after(error: BaseException, interrupted: bool) -> int:
     # the option parser raises an error with this method for misspelt or missing options
     if not hasattr(error, "format_message"):
         raise error
-    # the message of this error is the help text
+    # this error contains the help text as its message
     if type(error).__name__ == "NoArgsIsHelpError":
         print(error.format_message(), file=sys.stderr)
         return 2

@@ -43,7 +43,7 @@ EXAMPLES = {
         "forcefit assembly steps hexapod examples/assembly_steps.toml --best force",
     ),
     "drawn": _Example(
-        "robots as drawn: a 3-UPU, a Tricept, an Agile Eye, a toleranced four-bar",
+        "robots described by bodies and joints, such as a Tricept and an Agile Eye",
         ("examples/drawn",),
         "forcefit assembly solve examples/drawn/tricept.toml --load fx=100",
     ),

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 from forcefit.inputs.errors import BadInput
 
-# for each replaced command, the words that now invoke the same function
+# replacement of each deprecated command
 COMMANDS: dict[str, tuple[str, ...]] = {
     "assembly exact": ("assembly", "solve", "--state", "exact"),
     "assembly zone": ("assembly", "solve", "--quantities", "margin"),
@@ -28,8 +28,8 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "validation iso": ("validation", "inspect", "--iso"),
 }
 _PICTURE: dict[str, tuple[str, ...]] = {"-o": ("--figure",), "--output": ("--figure",)}
-# for each command, its old options and their replacements; the value of an option
-# follows the replacement
+# For each command, its deprecated options and their replacements.  The value of an
+# option is appended to the replacement.
 OPTIONS: dict[str, dict[str, tuple[str, ...]]] = {
     "assembly error": {
         "--reading": ("--assumption",),
@@ -77,7 +77,7 @@ OPTIONS: dict[str, dict[str, tuple[str, ...]]] = {
     "stiffness stress": {"--wrench": ("--load",)},
 }
 
-# for each option, its old values and their replacements
+# for each option, its deprecated values and their replacements
 VALUES = {"--compliant": {"free": "margin_free", "rigid": "margin"}}
 STAY = {("assembly error", "--reading"), ("stiffness beam", "--axis")}
 
@@ -97,7 +97,7 @@ def with_new_names(words: Sequence[str]) -> list[str]:
     end = words.index("--") if "--" in words else len(words)
     reported: list[str] = []
     new_words: list[str] = []
-    values: dict[str, str] = {}  # new values for the word after the option
+    values: dict[str, str] = {}  # replacements for the value of the option
     for word in words[:end]:
         word, values = values.get(word, word), {}
         option, equals, value = _parts(word)

@@ -483,7 +483,7 @@ def parse_axis(option: str, text: str) -> "NDArray":
             "such as 0,0,1"
         )
     largest = np.abs(vector).max()
-    # the square of a number such as 1e300 would overflow
+    # scaled, because the square of 1e300 would overflow
     return vector if 1e-150 < largest < 1e150 else vector / largest
 
 

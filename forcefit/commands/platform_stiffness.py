@@ -70,7 +70,7 @@ def stiffness(
     figure: FigureOption = None,
     json: JsonOption = None,
 ) -> None:
-    """Compute platform stiffness and the compliance of each part."""
+    """Compute platform stiffness and compliance contributions."""
     from forcefit.assembly.model.statuses import OK
     from forcefit.assembly.report.platform_stiffness import stiffness_of, stiffness_text
     from forcefit.assembly.report.share_pictures import plot_shares

@@ -105,9 +105,9 @@ def sweep(
     state: Annotated[
         str | None,
         typer.Option(
-            help="Also compute K_C and the compliance of each part in this state: "
-            "nominal (clearances at zero) | contact | exact (the latter two with "
-            "errors, loads and clearances)."
+            help="Also compute K_C and the compliance due to each link and joint in "
+            "this state: nominal (clearances at zero) | contact | exact (the last two "
+            "with errors, loads and clearances)."
         ),
     ] = None,
     frequencies: Annotated[
@@ -169,7 +169,7 @@ def sweep(
     wrench, g = parse_load(load), parse_gravity(gravity)
     covariates = parse_covariates(under)
     with progress_bars() as update:
-        update("robot", 0, 1)  # placing the robot may compile code, which takes time
+        update("robot", 0, 1)  # may take long if code is compiled
         asked = ask_sweep(
             robot,
             SweepOptions(

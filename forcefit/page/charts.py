@@ -19,7 +19,7 @@ from forcefit.page.tables import Value
 from forcefit.results.units import shown_in
 
 BLUE, RED, GREY = "#1f6fb4", "#c0392b", "#858e97"
-# colours of lines and bars; grey is reserved for bars that show the sum of the rest
+# colours of lines and bars; grey denotes the sum of all remaining items
 COLOURS = (
     BLUE, RED, "#2e8b57", "#8e5ea2", "#d98b1f", "#179cb0", "#a3541c", "#d2679f",
     "#7d8f14", "#5b63d3", "#e2703a", "#0f7a6c",
@@ -219,7 +219,7 @@ def _constant(layer: Layer) -> float | None:
     finite = values[np.isfinite(values)]
     if not len(finite):
         return float("nan")
-    # a smaller variation is rounding error, which a map would show as a pattern
+    # a smaller variation is attributed to rounding errors
     same = np.ptp(finite) <= 1e-9 * np.abs(finite).max()
     return float(finite[0]) if same else None
 

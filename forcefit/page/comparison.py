@@ -11,7 +11,7 @@ from forcefit.page.tables import Cell, Value, table
 from forcefit.results.quantities import in_words, unit_of
 
 SAME = 1e-9  # largest relative difference attributed to rounding
-_LISTED = 60  # number of changes shown without unfolding, about two printed pages
+_LISTED = 60  # maximum number of changes in the table that is not folded
 # keys of values that describe accuracy or computing time, which are not compared
 _MEASURES = {"certificate", "seconds", "cuts"}
 _NAMES = ("name", "part", "what", "error", "term", "frame", "component")
@@ -262,8 +262,8 @@ def comparison_page(comparison: Comparison, provenance: Provenance) -> str:
             about=f"{a} and {b}.",
             body=body,
             assumed=[
-                f"Numbers with a relative difference below {SAME:g} count as equal.",
-                "Certificates, which bound the errors of results, are left out.",
+                f"Numbers that differ by less than {SAME:g} of their value are equal.",
+                "Certificates, which bound the errors of results, are not compared.",
             ],
             provenance=provenance,
             results=comparison.table(),

@@ -1,15 +1,15 @@
 "use strict";
-// Draws the figures of a page, sorts and copies its tables, opens points, switches units,
-// and keeps a picture of each figure for the printer.
-// Data are SI; what is shown is factor times that, or SI itself.
+// Draws figures, sorts and copies tables, shows the values at a point, and switches units.
+// A picture of each figure is stored for printing.
+// Data are in SI units; displayed numbers are multiplied by a factor or shown in SI units.
 (() => {
   const all = (query, at = document) => [...at.querySelectorAll(query)];
-  const redraw = []; // one function a figure, to draw it again
+  const redraw = []; // for each figure, the function that redraws it
   let si = false;
 
   function element(tag, text = "", attributes = {}) {
     const made = document.createElement(tag);
-    made.textContent = text; // never as HTML: names come from files
+    made.textContent = text; // not parsed as HTML, because names come from files
     return Object.assign(made, attributes);
   }
   const number = v => typeof v !== "number" ? "none" : String(Number(v.toPrecision(4)));
@@ -21,14 +21,14 @@
     : typeof v === "number" ? v * k : v;
   const title = axis => axis.title + (unit(axis) ? ` [${unit(axis)}]` : "");
   const escaped = text => text.replace(/&/g, "&amp;").replace(/</g, "&lt;");
-  // where nothing hovers the buttons of a plot would always cover its title
+  // on touch screens, the buttons of a plot would always cover its title
   const SETTINGS = { displaylogo: false, responsive: true,
     displayModeBar: matchMedia("(hover: none)").matches ? false : "hover",
-    plotGlPixelRatio: Math.max(1, window.devicePixelRatio) }; // 2 is four times the work
+    plotGlPixelRatio: Math.max(1, window.devicePixelRatio) }; // a ratio of 2 quadruples the computing time
   const axisLayout = axis => ({ title: { text: title(axis), standoff: 8 },
     automargin: true, ...axis.options });
 
-  // colours: those of the page on the screen, dark on white on paper
+  // colours of the page on screens, dark colours on white for printing
   const own = name => getComputedStyle(document.documentElement)
     .getPropertyValue(name).trim();
   const onScreen = () => ({ ink: own("--ink"), line: own("--line"),
@@ -45,20 +45,20 @@
         .map(name => [name, axis({ ...room[name], showbackground: false })])) } }) };
   }
 
-  const shown = new Map(); // figure: traces and layout, without colours
+  const shown = new Map(); // traces and layout of each figure, without colours
   function show(figure, traces, layout) {
     const plot = figure.querySelector(".plot");
     const whole = { margin: { l: 60, r: 20, t: 20, b: 50 }, uirevision: 1,
       legend: { orientation: "h", y: 1.02, yanchor: "bottom" }, ...layout };
-    plot.style.height = `${whole.height}px`; // which plotly.js loses with the width
+    plot.style.height = `${whole.height}px`; // plotly.js resets the height when the width changes
     shown.set(figure, [traces, whole]);
     pictureSoon(figure);
     return Plotly.react(plot, traces, coloured(whole, onScreen()), SETTINGS);
   }
 
-  // pictures for the printer: what WebGL drew is gone by then, and plots are as wide as
-  // the window, not as the paper
-  const PAPER = 680; // [px] between the margins of a page
+  // Pictures are used for printing, because WebGL drawings are lost and plots have the
+  // width of the window.
+  const PAPER = 680; // [px] width of a printed page without margins
   const waiting = new Map();
   function pictureSoon(figure) {
     clearTimeout(waiting.get(figure));
@@ -101,7 +101,7 @@
         showlegend: named > 1 }));
   }
 
-  // maps: a choice of quantities, the values under the pointer, all of a point by a click
+  // maps with selectable quantity; a click shows all values at a point
   function map(figure, spec) {
     const { x, y } = spec.axes, drawn = spec.layers.filter(l => l.drawn);
     const choice = element("select", "", { ariaLabel: "quantity of the map" });
@@ -204,7 +204,7 @@
     }
     const moved = (point, by, k) => point.map((v, c) => v + k * by[c]);
     const nothing = [null, null, null];
-    function paths(lines) { // [points, texts] as one trace, with gaps
+    function paths(lines) { // joins [points, texts] of several lines to one trace
       const points = lines.flatMap(([line]) => [...line, nothing]);
       return { type: "scatter3d", mode: "lines", hoverinfo: "text",
         text: lines.flatMap(([line, text]) => [...line.map(() => text), ""]),
@@ -317,7 +317,7 @@
     };
     body.append(...[...body.rows].sort((a, b) => up ? order(a, b) : order(b, a)));
   }
-  function csv(table) { // in SI and in full, whatever is shown
+  function csv(table) { // in SI units with all digits
     const whole = cell => {
       const si_text = si ? cell.textContent : cell.dataset.si || cell.textContent;
       if (cell.tagName === "TH") return si_text;
@@ -332,7 +332,7 @@
     const text = csv(button.parentNode.querySelector("table"));
     try {
       await navigator.clipboard.writeText(text);
-    } catch { // pages from a file may not use the clipboard
+    } catch { // pages opened from a file have no access to the clipboard
       const area = element("textarea", "", { value: text });
       document.body.append(area);
       area.select();
@@ -360,11 +360,11 @@
   document.addEventListener("keydown", event => {
     const head = event.target.closest("thead th");
     if (!head || !["Enter", " "].includes(event.key)) return;
-    event.preventDefault(); // the space bar scrolls
+    event.preventDefault(); // otherwise the space bar would scroll the page
     sort(head);
   });
 
-  // plotly.js is kept compressed ------------------------------------------------------
+  // plotly.js is stored compressed ----------------------------------------------------
   async function load() {
     const packed = document.getElementById("plotly").textContent;
     const bytes = Uint8Array.fromBase64 ? Uint8Array.fromBase64(packed)
@@ -386,7 +386,7 @@
       kinds[figure.classList[0]](figure, spec);
     }
     const left = new Map(figures.map((figure, k) => [figure, redraw[k]]));
-    const seen = figure => { // what the reader looks at is drawn first
+    const seen = figure => { // visible figures are drawn first
       const { top, bottom } = figure.getBoundingClientRect();
       return bottom > 0 && top < innerHeight;
     };
@@ -395,7 +395,7 @@
       if (!seen(figure)) mark("first screen");
       left.delete(figure);
       await draw();
-      await new Promise(done => setTimeout(done)); // the reader may scroll meanwhile
+      await new Promise(done => setTimeout(done)); // lets the browser handle other events
     }
     mark("first screen");
     mark("drawn");

@@ -45,15 +45,15 @@ MOBILITY = record(
     "counts_certain singular finite_freedoms words", _COUNTS, near_=_COUNTS,
     motions=Listed(record(
         kind=Words(("translation", "turn", "screw")),
-        direction=number("direction of a motion or its axis, base axes", "1", *_AXIS),
-        point_=number("point of the axis, base axes", "m", *_AXIS),
+        direction=number("direction of translation or axis, in base axes", "1", *_AXIS),
+        point_=number("point on the axis, in base axes", "m", *_AXIS),
         pitch_=number("pitch of a screw", "m"),
     )),
 )  # fmt: skip
 SOLUTION = record(
     "nominal_mismatch remarks load gravity reading? method?", _POSTURE, _SOLVED,
     joints=Each(number("joint coordinate", "rad or m")),
-    joint_frames_=Each(text("frame at the point and in the axes of a joint")),
+    joint_frames_=Each(text("frame with the point and the axes of a joint")),
     mobility=MOBILITY,
     zone_=ZONE,
     certificate_=record(
@@ -90,22 +90,23 @@ _SHARES = record(
     forces_=number("share of the internal forces and loads"),
 )  # fmt: skip
 _ALONG = record(
-    free=number("stiffness, the others free", "N m/rad, N/m"),
-    blocked=number("stiffness, the others blocked", "N m/rad, N/m"),
+    free=number("stiffness if the other directions are free", "N m/rad, N/m"),
+    blocked=number("stiffness if the other directions are blocked", "N m/rad, N/m"),
 )
 _TANGENT = record(
     "state stiffness free_motions rigid_wrenches "
     "characteristic_length centre",
-    point=number("point of the matrices and screws, base axes", "m", "axis"),
-    compliance=number("compliance of the platform at that point, base axes",
+    point=number("reference point of matrices and screws, in base axes", "m", "axis"),
+    compliance=number("compliance of the platform at this point, in base axes",
                       "rad/(N m) .. m/N", "screw", "wrench_component"),
     eigen=Listed(record("screw pitch", stiffness=number("eigenstiffness", "N/m"))),
-    condition=number("condition of the stiffness"), along=Each(_ALONG),
+    condition=number("condition number of the stiffness"), along=Each(_ALONG),
     shares=Each(_SHARES),
 )  # fmt: skip
 _CONTACT = record(
-    "", _TANGENT, side_=text("side of the kink"), contacts_=count("closed clearances"),
-    touching_=count("clearances just touching"),
+    "", _TANGENT, side_=text("direction of the load change: loading or unloading"),
+    contacts_=count("closed clearances"),
+    touching_=count("clearances in contact without a force"),
 )  # fmt: skip
 _SLOPES = Each(number("derivative of the compliance", "", "row", "column"))
 PLATFORM_STIFFNESS = record(
@@ -118,16 +119,16 @@ PLATFORM_STIFFNESS = record(
 _DEFLECTION = record(
     "state?", _POSTURE,
     along=text("component of the load"),
-    followed=flag("past limit points"),
+    followed=flag("equilibrium path beyond limit points"),
     loads_=number("load", "N m or N", "point"),
     deflection_=number("deflection", "rad or m", "point"),
     platform_screw_=number("platform error", "rad, m", "point", "screw"),
     energy_=number("energy", "J", "point"),
     stiffness_=number("tangent stiffness", "N m/rad or N/m", "point"),
     contacts_=text("closed clearances", "point", "name"),
-    free_in_clearances_=flag("free within clearances", "point"),
+    free_in_clearances_=flag("free motion within clearances", "point"),
     events_=Listed(record(load=number("load", "N m or N"), kind=text("kind of event"),
-                          what=text("what happens"),
+                          what=text("description of the event"),
                           deflection=number("deflection", "rad or m"))),
 )  # fmt: skip
 _FREQUENCIES = record(
@@ -152,7 +153,8 @@ _REACHED = record(
     clearances_=Each(number("contribution of the clearance", "")),
 )  # fmt: skip
 _OF_DRAWS = record(
-    "unit draws assembled", of=count("all draws"), clearance_=_CLEARANCE_MODEL,
+    "unit draws assembled", of=count("total number of draws"),
+    clearance_=_CLEARANCE_MODEL,
     all_draws_=record(infinite=INTERVAL, quantiles=_QUANTILES), zero_=INTERVAL,
     mean_=_MEAN, quantiles_=_QUANTILES, most_probable_=_ESTIMATE,
 )  # fmt: skip
@@ -168,15 +170,16 @@ _STIFFNESS_OF_DRAWS = record(
 _IMPORTANCE = record(
     base_draws=count("base draws"), clearance=_CLEARANCE_MODEL,
     quantities=Each(
-        record("reason?", largest_share_left_out=number("largest share left out"),
+        record("reason?",
+               largest_share_left_out=number("largest fraction of omitted base draws"),
                first_index_=Each("first_index"), total_index_=Each("total_index"),
                rank_=Each("rank"))
     ),
     platform=Each(
         record(
             error_unit=text("unit of the error"),
-            rotation_part=number("rotation that involves the error", "rad"),
-            translation_part=number("translation that involves the error", "m"),
+            rotation_part=number("rotation due to the error", "rad"),
+            translation_part=number("translation due to the error", "m"),
             rotation_gain=number("rotation for each unit of error", ""),
             translation_gain=number("translation for each unit of error", ""),
         )
@@ -184,7 +187,8 @@ _IMPORTANCE = record(
 )  # fmt: skip
 STATISTICS = record(
     "robot seed load gravity draws assembled confidence contact_length duality_gap",
-    pose=POSE, clearance=_CLEARANCE_MODEL, clearance_means=text("its meaning"),
+    pose=POSE, clearance=_CLEARANCE_MODEL,
+    clearance_means=text("meaning of the clearance model"),
     assembles=Each(INTERVAL),
     clearance_not_mixed_=count("draws whose clearance walk did not mix"),
     exceeds=Each(record("limit unit", _LIMITED)), within_limits_=_LIMITED,
@@ -196,27 +200,28 @@ STATISTICS = record(
         most_probable=Listed(_ESTIMATE),
     ),
     safety_=number("safety", "1", "link"),
-    stress_error_=number("its error", "1", "link"),
+    stress_error_=number("estimated relative error of the stress", "1", "link"),
     stiffness_=_STIFFNESS_OF_DRAWS, importance_=_IMPORTANCE,
     capability_=Each(
         record("limit unit", cp=_ESTIMATE, cpk=_ESTIMATE, ppm=_ESTIMATE)
     ),
     worst_case_=Each(
         record(
-            "unit", reading=text("which worst case"), means=text("its meaning"),
+            "unit", reading=text("type of worst case"),
+            means=text("meaning of the type"),
             attained=number("value attained", ""), bound=number("certified bound", ""),
             direction=number("direction of the value attained", "1", "axis"),
-            shares=Each(number("part by an error or a clearance", "")),
-            rigid_=number("value attained without any force", ""),
+            shares=Each(number("contribution of an error or a clearance", "")),
+            rigid_=number("value attained without forces", ""),
         )
     ),
 )  # fmt: skip
 _CLASS = record(
     "name tolerance unit", share=_SHARE,
-    scaled_alike=number("with one factor on all tolerances", ""),
-    cost=number("cost"), loosest_allowed=number("largest allowed", ""),
-    at_loosest=flag("at the largest allowed"),
-    width_=flag("whether it is the full width of a zone, not to each side"),
+    scaled_alike=number("tolerance for a common factor on all tolerances", ""),
+    cost=number("cost"), loosest_allowed=number("largest allowed tolerance", ""),
+    at_loosest=flag("tolerance equal to the largest allowed one"),
+    width_=flag("tolerance is the full width of a zone"),
 )  # fmt: skip
 _VERIFICATION = record(
     "draws verdict confidence", look=count("interim test"),
@@ -230,10 +235,10 @@ _VERIFICATION = record(
 _ALLOCATION = record(
     "yield price cuts draws seed contact_length", limits=_BY_NAME,
     cost=text("law of the cost"), tolerances=Listed(_CLASS),
-    price_alike=number("price with one factor on all tolerances"),
+    price_alike=number("price for a common factor on all tolerances"),
     price_bound=number("lower bound of the price"),
     worst=Each(record(found=number("largest found", ""), proven=number("proven", ""))),
-    proven_scale=number("scale at which all limits are proved"),
+    proven_scale=number("factor on all tolerances for which the limits are proven"),
     verification=_VERIFICATION,
     clearance=_CLEARANCE_MODEL, distribution=text("distribution within a tolerance"),
     deviations=number("standard deviations in a tolerance"),
@@ -245,16 +250,17 @@ _ALLOCATION = record(
     ),
 )  # fmt: skip
 _PRESENT = record(
-    "postures", quantity=text("margin judged"),
+    "postures", quantity=text("zone margin that is computed"),
     largest_margin=number("largest margin"),
     margins=number("margins", "1", "posture"), at=POSE,
-    factor_on_errors=number("factor on all errors at which it assembles everywhere"),
+    factor_on_errors=number("factor on all errors at which all postures assemble"),
     energy_there=number("energy at the largest margin", "J"),
     assemblable_share=number("share of postures that assemble"),
     slopes=Listed(
-        record("value", error=text("error"), margin_slope=number("of the margin", ""),
+        record("value", error=text("error"),
+               margin_slope=number("derivative of the margin", ""),
                share_of_margin=number("share of the margin"),
-               energy_slope=number("of the energy", ""))
+               energy_slope=number("derivative of the energy", ""))
     ),
 )  # fmt: skip
 _TOLERANCES = record(
@@ -266,7 +272,7 @@ _SWEEP = Record(
         "robot", output=text("file"), axes=Each(count("points")),
         points=count("points"), status=Each(count("points")),
         quantities=Each(
-            record(units=text("unit"), min=number("least", ""),
+            record(units=text("unit"), min=number("smallest", ""),
                    median=number("median", ""), max=number("largest", ""))
         ),
     ).content,
@@ -276,29 +282,31 @@ _BY_QUANTILE = Each(number("quantile", ""))
 _STEP = record(
     "platform_screw",
     name=text("name of the step"), kind=text("kind of the step"),
-    energy=number("energy of all springs, fixtures included", "J"),
+    energy=number("energy of all springs, including fixtures", "J"),
     work=number("work of the step", "J"),
     load_work=number("work of the loads that act before and after", "J"),
     lost=number("energy lost by a release", "J"),
     closing_force=number("largest closing force", "N"),
     closing_moment=number("largest closing moment", "N m"),
-    closing_wrench=number("closing wrench, axes of the closure or fixture", "N m, N",
+    closing_wrench=number("closing wrench, in axes of the closure or fixture", "N m, N",
                           "wrench_component"),
-    opening=number("opening before, as far as free motions cannot close it", "rad, m",
+    opening=number("opening that free motions cannot close", "rad, m",
                    "screw"),
-    left_open_=number("opening that the step leaves", "rad, m", "screw"),
+    left_open_=number("opening that remains after the step", "rad, m", "screw"),
     spring_back_=number("motion of what is released, in its axes", "rad, m", "screw"),
     reading_=number("reading", "rad or m", "component"),
-    exceeded_=flag("needs more than the allowed force"),
+    exceeded_=flag("requires more than the allowed force"),
     adjustment_=number("change of the geometric error", "rad or m", "component"),
-    wrenches=Each(number("wrench locked in afterwards", "N m, N", "wrench_component")),
+    wrenches=Each(
+        number("wrench locked in after the step", "N m, N", "wrench_component")
+    ),
 )  # fmt: skip
 _STEPS = record(
     "remarks platform_screw?", _POSTURE, steps=Listed(_STEP),
     order_=record(
         objective=Words(("force", "energy", "error")), value=number("value", ""),
         bound=number("lower bound in any order", ""),
-        given=number("value in the order given", ""), searched=count("states computed"),
+        given=number("value in the given order", ""), searched=count("computed states"),
         steps=text("names of the steps", "step"),
     ),
     influences_=Listed(record(
@@ -331,9 +339,9 @@ ASSEMBLY: Mapping[str, Content] = {
     "assembly show": record(
         "robot remarks", pose=POSE, mobility=MOBILITY,
         axes=Each(record(
-            at=number("origin of the frame, base axes", "m", *_AXIS),
-            x=number("its x axis, base axes", "1", *_AXIS),
-            z=number("its z axis, base axes", "1", *_AXIS),
+            at=number("origin of the frame, in base axes", "m", *_AXIS),
+            x=number("x axis of the frame, in base axes", "1", *_AXIS),
+            z=number("z axis of the frame, in base axes", "1", *_AXIS),
         )),
     ),
     "assembly error": _ERROR,
@@ -349,16 +357,17 @@ ASSEMBLY: Mapping[str, Content] = {
         "robot left_out", platform=text("platform"), frames=count("frames"),
         closures=count("closures"), files=text("files written", "file"),
         home=record(
-            open_before=number("closure gap at the file's home pose", "rad or m"),
+            open_before=number("closure gap at the home pose of the file", "rad or m"),
             open_after=number("closure gap at the computed home pose", "rad or m"),
-            drives_held=flag("drives kept at home"),
+            drives_held=flag("drives kept at their home coordinates"),
         ),
         largest_difference=number("largest difference when read back"),
         compared=Listed(
             record(
-                where=text("place of the largest difference"),
+                where=text("location of the largest difference"),
                 reader=text("program"), file=text("file"),
-                why_not=text("reason for no comparison"), bodies=count("bodies"),
+                why_not=text("reason why no comparison was made"),
+                bodies=count("bodies"),
                 masses=count("masses"), loops=count("loops"),
                 difference=number("largest difference"),
             )

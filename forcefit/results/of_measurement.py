@@ -49,11 +49,11 @@ _LEARNED = record(
 )  # fmt: skip
 _DIAGNOSIS = record(
     "campaign robot verdict remarks not_measured",
-    needed=text("measurement that would decide"),
+    needed=text("measurement that would distinguish the effects"),
     sentence=text("conclusion in a sentence"),
     effects=Listed(_EFFECT), alternatives=Listed(record("names probability")),
     probabilities=Each("probability"),
-    best_by_score=text("effects of the best score", "effect"),
+    best_by_score=text("effects of the model with the best score", "effect"),
     error=record(
         unit=_ERROR_UNIT, before=_ERRORS, after=_ERRORS, saved=_ERRORS, noise=_SIZES,
         with_outliers=record(before=_ERRORS, after=_ERRORS),
@@ -76,7 +76,7 @@ _DIAGNOSIS = record(
     ),
     geometry=_RANDOM_EFFECTS, springs=_RANDOM_EFFECTS, learned=Listed(_LEARNED),
     held_out=record(
-        "rows", how=text("split or folds"), words=text("how, in words"),
+        "rows", how=text("split or folds"), words=text("description of the split"),
         ids=text("ids", "row"), uncertainty=number("uncertainty of the error"),
     ),
     lack_of_fit=record(
@@ -101,28 +101,29 @@ _DIAGNOSIS = record(
     calibration=Record({
         "campaigns": count("simulated campaigns of each kind"),
         "without": Each(count("campaigns")), "with_found": Each(count("campaigns")),
-        "right": number("share that named the effects"),
+        "right": number("fraction with correctly identified effects"),
         "false_claims": number("share of false claims"),
     }),
 )  # fmt: skip
 _REVISITS = record(
-    "rows", sets=count("sets of repeats"), others=count("rows of no set"),
+    "rows", sets=count("sets of repeats"), others=count("rows without a repeat"),
     adjacent=number("share of repeats in direct succession"),
-    span=number("share of the session between first and last"), order=text("order"),
+    span=number("fraction of the session from first to last repeat"),
+    order=text("order"),
 )  # fmt: skip
 _COMPONENT = Each(number("noise", "rad or m"))
 _NOISE = record(
-    ratio=number("noise from repeats over the stated sigma"),
+    ratio=number("noise from repeats divided by the declared sigma"),
     degrees=number("degrees of freedom"), interval=number("interval", "1", "bound"),
-    ratio_with_slow_changes=number("ratio with slow changes left in"),
+    ratio_with_slow_changes=number("ratio including slow changes"),
     chance_without_change=Each("probability"), component=_COMPONENT,
     component_degrees=Each(number("degrees of freedom")),
     component_interval=Each(number("interval", "rad or m", "bound")),
     suspects=Listed(record(rows=text("rows", "row"), component=text("component"),
                            size=number("size in standard deviations"),
-                           chance=number("probability by noise alone"))),
+                           chance=number("probability due to noise"))),
 )  # fmt: skip
-_BOUNDS = number("least and largest", "", "bound")
+_BOUNDS = number("smallest and largest value", "", "bound")
 _LOADS = record(
     levels=count("different loads"), unloaded_rows=count("rows without load"),
     force=number("least and largest force", "N", "bound"),
@@ -200,11 +201,11 @@ _ISO = record(
 )  # fmt: skip
 _SESSION = record(
     session=text("session"), setup_rows=count("set-up rows"),
-    other_rows=count("other rows"), suffices=flag("set-up rows suffice"),
+    other_rows=count("remaining rows"), suffices=flag("set-up rows suffice"),
     open=text("undetermined parameters", "name"),
     uncertainty=number("uncertainty after the set-up rows", "m"),
     left_in_setup=number("residual of the set-up rows", "m"),
-    held_in_setup=number("error of the set-up rows, robot as saved", "m"),
+    held_in_setup=number("error of the saved robot at the set-up rows", "m"),
     left_behind=text("effects of other sessions", "effect"), error=_ERRORS,
     declared=_ERRORS,
     parameters=Listed(record("name value std", effect=text("effect"))),
@@ -213,7 +214,7 @@ _CURVE = record(
     label=text("label"), where=text("place"), component=text("component"),
     kind=text("kind"), form=text("form"), formula=text("formula"),
     session=text("session"), parameters=Listed(record("name value std unit")),
-    variable=text("variable"), beside=Each(number("held variable", "")),
+    variable=text("variable"), beside=Each(number("constant variable", "")),
     units=record(variable=text("unit"), value=text("unit")),
     x=number("variable", "", "point"), value=number("value", "", "point"),
     std=number("standard deviation", "", "point"),
@@ -231,7 +232,7 @@ MEASUREMENT: Mapping[str, Content] = {
         ),
     ),
     "validation import": record(
-        "robot rows scatter left_out remarks", joined_by=text("joined by"),
+        "robot rows scatter left_out remarks", joined_by=text("method of matching"),
         readings=count("readings"),
         device=record(rotation=number("rotation", "1", "row", "column"),
                       shift=number("position", "m", "axis")),
@@ -249,7 +250,7 @@ MEASUREMENT: Mapping[str, Content] = {
     "validation predict": record(
         "rows registration reference_point not_measured",
         without_answer=_UNANSWERED, open=count("rows whose pose is undetermined"),
-        identified_at=number("point at which it was identified", "m", "axis"),
+        identified_at=number("point at which the robot was identified", "m", "axis"),
         extrapolated=Listed(record(id=text("row"), variables=text("variables"))),
         std=_SIZES, noise=_SIZES, error=record("", _ERRORS, unit=_ERROR_UNIT),
         beyond_learned_range=Listed(_BEYOND),

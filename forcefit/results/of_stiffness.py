@@ -43,14 +43,14 @@ _ENTRY = Record(
 )  # fmt: skip
 _SOLIDS = record(
     solids=Listed(
-        record("name volume", low=number("least corner", "m", "axis"),
-               high=number("largest corner", "m", "axis"))
+        record("name volume", low=number("smallest coordinates", "m", "axis"),
+               high=number("largest coordinates", "m", "axis"))
     )
 )  # fmt: skip
 _COMPARISON = record(
     "difference length slenderness", beam=LINK, fea=LINK,
     end_effect=number("end effect, times r / L", "1", "component"),
-    axes_turned=number("turn of the beam's axes that fits better", "rad"),
+    axes_turned=number("rotation of the beam axes with a better fit", "rad"),
     explanation=text("explanation"),
 )  # fmt: skip
 _OVER_SLENDERNESS = record(
@@ -76,7 +76,7 @@ STIFFNESS: Mapping[str, Content] = {
         region=text("region"), away=number("distance from the interfaces", "m"),
         beam_=record(
             "", _STRESS,
-            von_mises_whole_length=number("largest in the whole length", "Pa"),
+            von_mises_whole_length=number("largest stress along the length", "Pa"),
         ),
     ),
     "stiffness library": Either((

@@ -9,9 +9,9 @@ from forcefit.results.records import Content, Each, Either, Listed, Record, reco
 _ASKED = Each(number("pose component or joint coordinate", "rad or m"))
 _SIDE = record(
     "platform_screw energy", links=Each("wrench"), joints=Each("wrench"),
-    energy_between_ends_=number("energy of weights between the ends", "J"),
+    energy_between_ends_=number("energy of weights between link ends", "J"),
     closure_gap_=number("largest closure error"),
-    free_motions_held_=flag("free motions held"), seconds_="seconds",
+    free_motions_held_=flag("free motions blocked"), seconds_="seconds",
 )  # fmt: skip
 _SCALE = record("scale", vjm=_SIDE, exact_vjm=_SIDE, multibody=_SIDE, difference=_SIDE)
 _CHECK = record("value tolerance verdict passed", uncertainty=number("uncertainty", ""))
@@ -26,7 +26,7 @@ _POSE_CHECK = record(
     checks=Each(_CHECK),
     smallest_changes_noticed=Listed(
         record("name value", kind=text("kind"), relative=number("relative change"),
-               check=text("check that detects it"), unproved=flag("unproved"))
+               check=text("check that detects the error"), unproved=flag("not proven"))
     ),
 )  # fmt: skip
 _BY_METHOD = Each(number("value"))
@@ -42,7 +42,7 @@ CROSSCHECK = Either((
         undecided_joints=text("joints not decided", "joint"),
         moved=Each(number("displacement", "rad, m", "screw")),
         stable=Each(flag("stable")),
-        another_equilibrium=flag("another equilibrium"),
+        another_equilibrium=flag("different equilibrium"),
     ),
     record(
         "passed", reached=count("poses reached"),

@@ -93,8 +93,8 @@ QUANTITIES: Mapping[str, Quantity] = {
     "ty": Quantity("position y", "m"),
     "tz": Quantity("position z", "m"),
     "joint_coordinate": Quantity(
-        "joint coordinate", "rad or m", ("joint",), "nominal coordinate of every "
-        "joint, also where the status is not ok", "q",
+        "joint coordinate", "rad or m", ("joint",), "nominal coordinate of each "
+        "joint, even if the status is not ok", "q",
     ),
     "nominal_mismatch": Quantity(
         "nominal closure error", meaning="largest closure error [rad or m] of the "
@@ -114,7 +114,7 @@ QUANTITIES: Mapping[str, Quantity] = {
     "platform_freedoms_drives_locked": count(
         "degrees of freedom of the platform with locked drives"
     ),
-    "redundant_constraints": count("redundant constraints, drives locked"),
+    "redundant_constraints": count("redundant constraints with locked drives"),
     "drives": count("drives"),
     "locked_freedoms": count("degrees of freedom with locked drives"),
     "overconstraint": count("redundant closure equations"),
@@ -124,7 +124,7 @@ QUANTITIES: Mapping[str, Quantity] = {
         "size",
     ),
     "local_freedoms": count(
-        "degrees of freedom of legs alone",
+        "degrees of freedom of the legs",
         meaning="degrees of freedom of the legs with the platform at rest"
     ),
     "actuation_redundancy": count(
@@ -132,9 +132,9 @@ QUANTITIES: Mapping[str, Quantity] = {
         meaning="number of drives minus the degrees of freedom that they lock"
     ),
     "singular_value_gap": Quantity(
-        "gap of the singular values", meaning="smallest singular value that counts as "
-        "nonzero, divided by the largest that counts as zero, or by the rounding "
-        "error; null if all count as zero",
+        "gap of the singular values", meaning="smallest singular value treated as "
+        "nonzero, divided by the largest treated as zero, or by the rounding "
+        "error; null if all are treated as zero",
     ),
     "counts_certain": flag("gap of the singular values of at least 100"),
     "singular": flag("more degrees of freedom than at nearby poses"),
@@ -144,8 +144,8 @@ QUANTITIES: Mapping[str, Quantity] = {
     ),
     "words": text("mobility in words"),
     "point": Quantity(
-        "point", "m", ("axis",), "point at which screws and wrenches are read; in base "
-        "axes for a stiffness, in platform axes for a pose error",
+        "point", "m", ("axis",), "reference point of screws and wrenches, in base "
+        "axes for a stiffness and in platform axes for a pose error",
     ),
     "direction": Quantity(
         "direction", dims=_SCREW, meaning="unit screw in base axes"
@@ -167,21 +167,22 @@ QUANTITIES: Mapping[str, Quantity] = {
     "assemblable_free": flag("assembles, compliant joints free"),
     "margin": Quantity(
         "zone margin, compliant joints rigid", meaning="factor on all clearances at "
-        "which the robot just assembles without force, with rigid compliant joints",
+        "which the robot can just be assembled without force, with rigid compliant "
+        "joints",
         symbol="lambda",
     ),
     "margin_free": Quantity(
         "zone margin, compliant joints free", meaning="factor on all clearances at "
-        "which the robot just assembles without force, with compliant joints free "
-        "about their own axis",
+        "which the robot can just be assembled without force, with compliant joints "
+        "free about their own axis",
         symbol="lambda",
     ),
     "margin_bound": Quantity(
-        "bound of the margin, rigid",
+        "bound of the zone margin, compliant joints rigid",
         meaning="certified lower bound of the zone margin, compliant joints rigid"
     ),
     "margin_free_bound": Quantity(
-        "bound of the margin, free",
+        "bound of the zone margin, compliant joints free",
         meaning="certified lower bound of the zone margin, compliant joints free"
     ),
     "energy": Quantity(
@@ -198,15 +199,15 @@ QUANTITIES: Mapping[str, Quantity] = {
     ),
     "platform_screw": Quantity(
         "platform error", "rad, m", _SCREW,
-        "pose error at the platform's origin, base axes", "x", shown="mrad, mm"
+        "pose error at the platform's origin, in base axes", "x", shown="mrad, mm"
     ),
     "reading": Quantity(
         "reading", "rad, m", _SCREW, "pose deviation that a measuring device reads",
         shown="mrad, mm"
     ),
     "clearance": Quantity(
-        "clearance", "rad, m", _SCREW, "displacement within the clearance, and small "
-        "motions of passive joints", "delta c", shown="mrad, mm"
+        "clearance", "rad, m", _SCREW, "joint displacement within the clearance, and "
+        "small motion of a passive joint", "delta c", shown="mrad, mm"
     ),
     "link": Quantity(
         "deformation of the link", "rad, m", _SCREW,
@@ -225,13 +226,13 @@ QUANTITIES: Mapping[str, Quantity] = {
     ),
     "wrench": Quantity(
         "wrench", "N m, N", _WRENCH,
-        "wrench that the part farther from the base exerts on the nearer part, at the "
-        "frame's origin in its axes", "w",
+        "wrench of the body farther from the base on the nearer body, at the frame's "
+        "origin in its axes", "w",
     ),
     "joint_wrench": Quantity(
         "wrench through the joint", "N m, N", _WRENCH,
-        "wrench that the part farther from the base exerts on the nearer part, at the "
-        "frame's origin in its axes",
+        "wrench of the body farther from the base on the nearer body, at the frame's "
+        "origin in its axes",
     ),
     "start_wrench": Quantity(
         "wrench at the start of the link", "N m, N", _WRENCH,
@@ -307,21 +308,21 @@ QUANTITIES: Mapping[str, Quantity] = {
         "certified bounds of the largest translation error, eq. (27)", shown="mm"
     ),
     "rotation_error_clearance": Quantity(
-        "largest rotation by clearances alone", "rad", ("bound",),
+        "largest rotation due to clearances", "rad", ("bound",),
         "certified bounds of the largest rotation error, eq. (27), frozen, without "
         "geometric errors", shown="mrad"
     ),
     "translation_error_clearance": Quantity(
-        "largest translation by clearances alone", "m", ("bound",),
+        "largest translation due to clearances", "m", ("bound",),
         "certified bounds of the largest translation error, eq. (27), frozen, without "
         "geometric errors", shown="mm"
     ),
     "rotation_screw": Quantity(
-        "platform error of largest rotation", "rad, m", _SCREW,
+        "platform error with the largest rotation", "rad, m", _SCREW,
         "platform error that attains the lower bound of the rotation", shown="mrad, mm"
     ),
     "translation_screw": Quantity(
-        "platform error of largest translation", "rad, m", _SCREW,
+        "platform error with the largest translation", "rad, m", _SCREW,
         "platform error that attains the lower bound of the translation",
         shown="mrad, mm"
     ),
@@ -349,7 +350,9 @@ QUANTITIES: Mapping[str, Quantity] = {
         "the stress due to the mesh; 0 for beam formulas, infinite for links with a "
         "re-entrant edge without a fillet",
     ),
-    "safety": Quantity("safety", meaning="yield strength over the largest stress"),
+    "safety": Quantity(
+        "safety", meaning="yield strength divided by the largest stress"
+    ),
     "rotation": Quantity(
         "platform rotation", "rad", meaning="magnitude of the platform's rotation "
         "error",
@@ -369,7 +372,9 @@ QUANTITIES: Mapping[str, Quantity] = {
         meaning="certified lower bound of the largest translation error", shown="um"
     ),
     "position": Quantity("position error", "m", shown="um"),
-    "normalised": Quantity("normalised error", meaning="error over the stated noise"),
+    "normalised": Quantity(
+        "normalised error", meaning="error divided by the declared noise"
+    ),
     "force": Quantity("largest force", "N", meaning="largest force through any body"),
     "moment": Quantity(
         "largest moment", "N m", meaning="largest moment through any body"
@@ -403,23 +408,24 @@ QUANTITIES: Mapping[str, Quantity] = {
         "characteristic length",
     ),
     "stiffness_condition": Quantity(
-        "condition of the stiffness", meaning="largest over smallest eigenstiffness"
+        "condition number of the stiffness",
+        meaning="largest divided by smallest eigenstiffness",
     ),
     "pitch": Quantity("pitch", "m/rad"),
     "screw": Quantity("screw", "rad, m", _SCREW),
     "centre": Quantity("centre of stiffness", "m", ("axis",)),
     "share": Quantity(
         "share of a part", dims=("part", "wrench_component"),
-        meaning="share of every link and joint in the compliance along each axis",
+        meaning="fraction of each link and joint in the compliance along each axis",
     ),
     "frequency": Quantity(
         "natural frequency", "Hz", ("mode",),
-        "natural frequencies, lowest first, with the drives held and without load and "
+        "natural frequencies, lowest first, with locked drives and without load and "
         "gravity",
     ),
-    "idle_motions": count("free motions that leave the platform at rest"),
+    "idle_motions": count("free motions with the platform at rest"),
     "von_mises": Quantity("largest von Mises stress", "Pa", shown="MPa"),
-    "tip": Quantity("tip", "m", ("axis",), "point at which the stiffness is read"),
+    "tip": Quantity("tip", "m", ("axis",), "reference point of the stiffness"),
     "base": Quantity("base", "m", ("axis",)),
     "length": Quantity("length", "m"),
     "slenderness": Quantity("slenderness L / r"),
@@ -468,22 +474,22 @@ QUANTITIES: Mapping[str, Quantity] = {
     ),
     "clearance_mixed": Quantity(
         "clearance mixed",
-        meaning="1 where the random walk within the clearances has mixed, else 0"
+        meaning="1 if the random walk within the clearances has mixed, otherwise 0"
     ),
     "yield": Quantity("yield"),
     "price": Quantity("price of the tolerances"),
     "tolerance": Quantity("tolerance", "rad or m"),
     "first_index": Quantity(
         "first-order Sobol index", dims=("bounds",),
-        meaning="share of the variance that a group explains alone",
+        meaning="fraction of the variance due to a group of errors alone",
     ),
     "total_index": Quantity(
         "total Sobol index", dims=("bounds",),
-        meaning="share of the variance that involves a group",
+        meaning="fraction of the variance due to a group, with its interactions",
     ),
     "failed_share": Quantity(
-        "share left out", meaning="share of the base draws that are left out because a "
-        "compared draw has no result",
+        "share left out", meaning="fraction of the base draws that are omitted because "
+        "a compared draw has no result",
     ),
     "part": Quantity(
         "deviation of the platform", "rad, m", ("component",),
@@ -491,8 +497,8 @@ QUANTITIES: Mapping[str, Quantity] = {
     ),
     "gain": Quantity(
         "slope of the platform", "rad or m for each rad or m", ("component",),
-        "exact slope of the platform's rotation and translation with a group's errors; "
-        "NaN for a group of angles and lengths",
+        "derivative of the platform's rotation and translation with respect to a group "
+        "of errors; NaN if the group contains both angles and lengths",
     ),
     "rank": count("possible ranks", "bound"),
     "postures": count("postures"),
@@ -515,20 +521,21 @@ QUANTITIES: Mapping[str, Quantity] = {
         "acceleration of the platform at its origin, in base axes",
     ),
     "inertial_screw": Quantity(
-        "deflection by acceleration", "rad, m", _SCREW, "change of the pose error at "
-        "the platform's origin by the accelerations, base axes", shown="mrad, mm"
+        "deflection due to acceleration", "rad, m", _SCREW, "change of the pose error "
+        "due to accelerations, at the platform's origin in base axes", shown="mrad, mm"
     ),
     "drive_force": Quantity(
         "drive force", "N m or N", ("drive",),
-        "force or moment of each drive on the part that it carries",
+        "force or moment that each drive exerts on the body that it moves",
     ),
     "first_frequency": Quantity(
         "first natural frequency", "Hz",
-        meaning="lowest natural frequency along the path, with the drives held and "
+        meaning="lowest natural frequency along the path, with locked drives and "
         "without load and gravity",
     ),
     "periods": Quantity(
-        "path time in periods", meaning="path time times the first natural frequency"
+        "path time in periods",
+        meaning="path time multiplied by the first natural frequency",
     ),
     # measured data and comparisons
     "campaign": text("campaign"),

@@ -1,8 +1,8 @@
-// Makes plotly.min.js.gz: plotly.js with only the traces that page.js and charts.py draw.
+// Creates plotly.min.js.gz, which contains only the trace types used by page.js and charts.py.
 //
 //     npm install && npm run build
 //
-// Whole it is 4.9 MB, and a browser takes 1.4 s to read it; this is 1.8 MB and 0.4 s.
+// The size decreases from 4.9 MB to 1.8 MB, and the parsing time from 1.4 s to 0.4 s.
 import { writeFileSync } from "node:fs";
 import { gzipSync } from "node:zlib";
 import { build } from "esbuild";
@@ -21,7 +21,7 @@ const { outputFiles } = await build({
   },
   bundle: true, minify: true, write: false, format: "iife", globalName: "Plotly",
   banner: { js: "/* plotly.js 3.7.0, MIT: see LICENSE */" }, legalComments: "eof",
-  // as plotly.js's own esbuild-config.js
+  // plugins of esbuild-config.js in plotly.js
   plugins: [css(), glsl({ minify: true }), environmentPlugin({ NODE_DEBUG: false })],
   alias: { stream: "stream-browserify" },
   define: { global: "window", "define.amd": "false" },
