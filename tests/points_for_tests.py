@@ -1,7 +1,7 @@
 """Campaigns in which a device measures three points of a platform at once.
 
-The platform moves as a rigid body.  Its repeatability error is the same for all points
-of a row, and each reading has an additional error of the device.
+The repeatability error in each row is a rigid-body motion of the platform.  Each
+reading has an additional error of the device.
 """
 
 from collections.abc import Mapping, Sequence

@@ -1,4 +1,4 @@
-"""Commands ``forcefit assembly error``, ``solve`` and related commands."""
+"""Commands ``forcefit assembly error`` and ``forcefit assembly solve``."""
 
 import json
 from dataclasses import replace

@@ -24,7 +24,7 @@ def test_deflection_curve_includes_clearance_and_contact(run, tmp_path):
 
 
 def test_followed_path_continues_beyond_limit_points(run, tmp_path):
-    """The path of a von Mises truss has two limit points."""
+    """The equilibrium path of a von Mises truss has two limit points."""
     column = tmp_path / "arch.toml"
     write_robot(shallow_arch().robot, column)
     picture = tmp_path / "path.svg"
