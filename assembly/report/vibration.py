@@ -59,15 +59,17 @@ def vibration_of(
         results["remarks"] = [_NOMINAL]
     try:
         modes = natural_modes(posture, count, load, gravity, state)
-        errors = discretisation_errors(modes, load, gravity, state)
     except (CannotAssemble, FreeMotion, SolverFailed) as error:
         return results | {"status": failure_status(error), "reason": str(error)}
+    try:
+        errors = discretisation_errors(modes, load, gravity, state)
+    except (CannotAssemble, FreeMotion, SolverFailed):
+        errors = np.full(len(modes.frequencies), np.nan)
     if np.isnan(modes.frequencies).any():
         results["status"] = UNSTABLE
     elif (modes.frequencies == 0.0).any():
         results["status"] = FREE_MOTION
-    if np.any(errors > _COARSE):
-        results["remarks"] = [*results["remarks"], _coarse(errors)]
+    results["remarks"] = [*results["remarks"], *_coarse(modes.frequencies, errors)]
     return results | {
         "frequencies": modes.frequencies,
         "discretisation_errors": errors,
@@ -96,16 +98,28 @@ def vibration_text(results: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def _coarse(errors: NDArray) -> str:
-    """Return the remark on frequencies that are too high."""
-    large = errors[errors > _COARSE]
-    least, most = (f"{100 * e:.2g}" for e in (large.min(), large.max()))
-    span = most if least == most else f"{least} to {most}"
-    return (
-        f"{len(large)} of {len(errors)} frequencies are about {span} % too high, "
-        'because each beam vibrates in one cubic shape; a larger "pieces" of its link '
-        "in the robot file reduces this error"
-    )
+def _coarse(frequencies: NDArray, errors: NDArray) -> list[str]:
+    """Return the remarks on frequencies with large or unknown errors."""
+    remarks = []
+    large = np.abs(errors[np.abs(errors) > _COARSE])
+    if large.size:
+        least, most = (f"{100 * e:.2g}" for e in (large.min(), large.max()))
+        span = most if least == most else f"{least} to {most}"
+        low = np.nanmin(errors) < -_COARSE
+        remarks.append(
+            f"{len(large)} of {len(errors)} frequencies are about {span} % "
+            f"{'too high or too low' if low else 'too high'}, "
+            'because each beam vibrates in one cubic shape; a larger "pieces" of its '
+            "link in the robot file reduces this error"
+        )
+    unknown = int(np.sum((frequencies > 0.0) & np.isnan(errors)))
+    if unknown:
+        remarks.append(
+            f"the errors of {unknown} of {len(errors)} frequencies are unknown, "
+            'because no stable equilibrium was found with twice the number of "pieces" '
+            "of each beam"
+        )
+    return remarks
 
 
 def _free(mode: dict[str, Any]) -> str:

@@ -93,6 +93,34 @@ def test_estimated_frequency_error_agrees_with_the_exact_error(pieces):
     np.testing.assert_allclose(discretisation_errors(modes), errors, rtol=tolerance)
 
 
+@pytest.mark.parametrize("pieces", [4, 8])
+def test_discretisation_error_of_waves_equals_that_of_linear_elements(pieces):
+    """The eigenvalue of n linear elements of a rod is 6 (1 - cos a)/(2 + cos a).
+
+    Here a = pi/2n.  Both longitudinal and torsional waves have this error.
+    """
+    a = np.pi / (2 * pieces)
+    error = np.sqrt(6 * (1 - np.cos(a)) / (2 + np.cos(a))) / a - 1
+    modes = natural_modes(cantilever(pieces), 20)
+    estimates = discretisation_errors(modes)
+    turn, shift = modes.platform_screws[0], modes.platform_screws[3]
+    for motion in (turn, shift):
+        first = np.flatnonzero(np.abs(motion) > 1e-6 * np.abs(motion).max())[0]
+        np.testing.assert_allclose(estimates[first], error, rtol=0.01)
+
+
+def test_discretisation_errors_compare_equal_modes_near_buckling():
+    """One spring in place of a column buckles at 3 EI/2L^2, below pi^2 EI/4L^2."""
+    posture = cantilever(1)
+    load = {"fx": -2.0 * E * SIDE**4 / 12 / LENGTH**2}
+    modes = natural_modes(posture, 4, load, state="exact")
+    estimates = discretisation_errors(modes, load, state="exact")
+    unstable = np.isnan(modes.frequencies)
+    assert unstable.any()
+    np.testing.assert_array_equal(np.isnan(estimates), unstable)
+    assert np.nanmax(np.abs(estimates)) < 1.0
+
+
 def test_axial_and_torsional_frequencies_agree_with_closed_form():
     """The frequencies are (1/4L) sqrt(E / rho) and (1/4L) sqrt(GJ / rho I_p)."""
     modes = natural_modes(cantilever(8), 60)
