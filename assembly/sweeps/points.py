@@ -43,6 +43,7 @@ from forcefit.assembly.sweeps.point_conditions import (
 from forcefit.assembly.sweeps.point_kinematics import note_geometry
 from forcefit.assembly.sweeps.point_stiffness import (
     nominal_stiffnesses,
+    stiffness_parts,
     tangent_stiffnesses,
 )
 from forcefit.assembly.sweeps.quantities import (
@@ -270,7 +271,7 @@ def _solve_reached(
         _record_bounds(bounds, solved, rows)
     if question.stiffness:
         tangents = replace(conditions, robot=robot)
-        _record_stiffness(question.stiffness, tangents, solved, rows)
+        _record_stiffness(question, tangents, solved, rows)
     if question.frequencies:
         _record_frequencies(question.frequencies, robot, conditions, solved, rows)
     if question.linearisation:
@@ -313,9 +314,10 @@ def _record_wrenches(
 
 
 def _record_stiffness(
-    state: str, conditions: Conditions, solved: SolvedPoints, rows: NDArray
+    question: Question, conditions: Conditions, solved: SolvedPoints, rows: NDArray
 ) -> None:
     """Store the platform stiffness."""
+    state = question.stiffness
     T = conditions.transforms
     runs = list(_runs(T.reshape(len(T), -1)))
     if state == "nominal":
@@ -324,6 +326,11 @@ def _record_stiffness(
     else:
         quantities, reasons = tangent_stiffnesses(conditions, state)
         runs = [slice(i, i + 1) for i in range(len(T))]
+    every = computed(question)["share"].dims["part"]
+    shares = np.zeros((len(runs), len(every), 6))
+    columns = [every.index(p) for p in stiffness_parts(conditions.robot, state)]
+    shares[:, columns] = quantities["share"]
+    quantities = quantities | {"share": shares}
     for key, values in quantities.items():
         for i, run in enumerate(runs):
             solved.records[key][rows[run]] = values[i]

@@ -2,13 +2,19 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from forcefit.assembly.effects import apply_known
+from forcefit.assembly.kinematics.posture import home_posture
 from forcefit.assembly.kinematics.singularity import KINDS
+from forcefit.assembly.measurement.conditions import as_declared
+from forcefit.assembly.model.joint_names import shown_name
 from forcefit.assembly.model.link_stress import stressed_names
 from forcefit.assembly.model.robot import Robot
+from forcefit.assembly.platform_stiffness.matrices import Part
 from forcefit.assembly.sweeps.parameters import Design
 from forcefit.assembly.sweeps.point_stiffness import STATES, stiffness_parts
 from forcefit.results.display import html_table, short_repr
@@ -158,7 +164,7 @@ def computed(question: Question) -> dict[str, Variable]:
         table |= {name: _variable(name, link=links) for name in STRESS[:2]}
         table["safety"] = _variable("safety")
     if question.stiffness:
-        table |= _stiffness_variables(question.robot, question.stiffness)
+        table |= _stiffness_variables(question)
     if question.frequencies:
         modes = tuple(str(k + 1) for k in range(question.frequencies))
         table["frequency"] = _variable("frequency", mode=modes)
@@ -173,16 +179,39 @@ def _moving(robot: Robot) -> tuple[str, ...]:
     return tuple(f.name for f in robot.frames if f.joint != "fixed")
 
 
-def _stiffness_variables(robot: Robot, state: str) -> dict[str, Variable]:
+def _stiffness_variables(question: Question) -> dict[str, Variable]:
     """Return the variables for the platform stiffness."""
-    eigen, parts = tuple("123456"), stiffness_parts(robot, state)
+    eigen, state = tuple("123456"), question.stiffness
     return {
         "compliance": _variable("compliance", f", at its origin, {STATES[state]}"),
         "stiffness": _variable("axis_stiffness"),
         "eigen_stiffness": _variable("eigen_stiffness", eigen=eigen),
         "stiffness_condition": _variable("stiffness_condition"),
-        "share": _variable("share", part=parts),
+        "share": _variable("share", part=_share_parts(question)),
     }
+
+
+@lru_cache(maxsize=4)
+def _share_parts(question: Question) -> tuple[str, ...]:
+    """Return the contributions to the compliance, including those of effects.
+
+    Effects add springs, for example of a drive or the foundation.  A varied number may
+    add a clearance to a frame that has none in the robot file.
+    """
+    robot = question.robot
+    if robot.has_effects:
+        home = home_posture(robot.without_effects())
+        declared = as_declared(home, question.load, covariates=question.under)
+        robot = apply_known(declared, robot).robot
+    parts = list(stiffness_parts(robot, question.stiffness))
+    if question.stiffness == "contact" and question.design is not None:
+        varied = [path.split(".clearance.")[0] for path in question.varied
+                  if ".clearance." in path]  # fmt: skip
+        names = [f.name for f in robot.frames]
+        for row, name in enumerate(names):
+            if name in varied or name.partition(".")[2] in varied:
+                parts.append(Part(shown_name(robot, row), "clearance").words)
+    return tuple(dict.fromkeys(parts))
 
 
 def record_type(question: Question) -> np.dtype:

@@ -100,3 +100,64 @@ def test_swept_frequencies_equal_single_solutions():
 def test_sweep_of_frequencies_without_mass_is_rejected(robot, count, message):
     with pytest.raises(BadInput, match=message):
         sweep(robot, grid="tx=0,tz=-0.5", assumption="none", frequencies=count)
+
+
+ARM = """
+platform = "tip"
+[[frame]]
+name = "drive"
+parent = "base"
+joint = "revolute"
+actuated = true
+[[frame]]
+name = "tip"
+parent = "drive"
+translation = [0.4, 0, 0]
+[[effect]]
+name = "drive_compliance"
+parameters = { drive = 3e4 }
+[[effect]]
+name = "base_compliance"
+parameters = { "stiffness.rz" = 1e4 }
+"""
+
+
+@pytest.mark.parametrize("state", ["nominal", "contact", "exact"])
+def test_swept_stiffness_includes_springs_of_effects(tmp_path, state):
+    """Springs in series: 1/3e4 + 1/1e4 rad/(N m), of which 1/4 in the drive."""
+    (tmp_path / "arm.toml").write_text(ARM)
+    data = sweep(tmp_path / "arm.toml", grid="q.drive=0:0.2:0.1", assumption="none",
+                 state=state, load=[0, 0, 10.0, 0, 0, 0])  # fmt: skip
+    np.testing.assert_allclose(data.compliance[:, 2, 2], 1 / 3e4 + 1 / 1e4, rtol=1e-6)
+    under_mz = data.share.sel(wrench_component="MZ")
+    for part, share in (("drive joint", 0.25), ("foundation joint", 0.75)):
+        np.testing.assert_allclose(under_mz.sel(part=part), share, rtol=1e-6)
+
+
+PIN = """
+platform = "tip"
+[[frame]]
+name = "drive"
+parent = "base"
+joint = "revolute"
+actuated = true
+[[frame]]
+name = "pin"
+parent = "drive"
+joint_stiffness = [1e3, 1e3, 1e3, 1e6, 1e6, 1e6]
+clearance = { radial = 0.0 }
+[[frame]]
+name = "tip"
+parent = "pin"
+"""
+
+
+def test_swept_stiffness_accepts_clearance_that_is_zero_in_the_file(tmp_path):
+    """100 N against a bound of radius 0.1 mm: 1e6 N/m tangential to the bound."""
+    (tmp_path / "pin.toml").write_text(PIN)
+    data = sweep(tmp_path / "pin.toml", grid="q.drive=0", assumption="none",
+                 state="contact", load=[0, 0, 0, 100.0, 0, 0],
+                 vary=["pin.clearance.radial=0,1e-4"]).squeeze()  # fmt: skip
+    np.testing.assert_allclose(data.compliance[:, 4, 4], [1e-6, 2e-6], rtol=1e-6)
+    under_fy = data.share.sel(part="pin clearance", wrench_component="FY")
+    np.testing.assert_allclose(under_fy, [0.0, 0.5], atol=1e-6)
