@@ -149,7 +149,9 @@ def discretisation_errors(
 
     Returns:
         (k,) relative errors; 0 without such beams.  NaN for frequencies that are 0 or
-        NaN, or that are with twice the number of pieces, where a mode is unstable.
+        NaN, or that are with twice the number of pieces, where a mode is unstable.  All
+        are NaN if a mesh link has a density, because its condensed mass has an unknown
+        error.
 
     Raises:
         CannotAssemble: as in :func:`natural_modes`.
@@ -163,6 +165,8 @@ def discretisation_errors(
         if isinstance(f.link, BeamLink) and f.link.density is not None
     }
     coarse = modes.frequencies
+    if any(isinstance(f.link, MeshLink) and f.link.density for f in robot.frames):
+        return np.full(len(coarse), np.nan)
     errors = np.where(coarse > 0.0, 0.0, np.nan)
     if vibrating:
         posture = replace(modes.posture, robot=robot.with_links(vibrating))

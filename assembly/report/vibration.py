@@ -117,7 +117,7 @@ def _coarse(frequencies: NDArray, errors: NDArray) -> list[str]:
         remarks.append(
             f"the errors of {unknown} of {len(errors)} frequencies are unknown, "
             'because no stable equilibrium was found with twice the number of "pieces" '
-            "of each beam"
+            "of each beam, or because the mass of a mesh link is condensed to its ends"
         )
     return remarks
 
