@@ -60,7 +60,9 @@ _RIGID = Panel("margin", 1.0, "zone margin, compliant joints rigid [-]", "magma_
 _SAFETY = Panel("safety", 1.0, "yield strength over peak stress [-]", "viridis")
 _STIFFNESS = (
     Panel("eigen_stiffness.1", 1e-6, "softest eigen-stiffness [N/um]", "viridis"),
-    Panel("stiffness_condition", 1.0, "condition number of the stiffness [-]", "magma_r"),
+    Panel(
+        "stiffness_condition", 1.0, "condition number of the stiffness [-]", "magma_r"
+    ),
 )
 _FREQUENCY = Panel("frequency.1", 1.0, "lowest natural frequency [Hz]", "viridis")
 
