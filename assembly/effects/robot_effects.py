@@ -89,6 +89,38 @@ def apply_robot_effects(
     return AppliedEffects(effective, conditions.load_at_origin()[0], g, conditions)
 
 
+def with_effects_applied(posture: Posture) -> Posture:
+    """Return a posture after applying effects, for results without loads.
+
+    Args:
+        posture: posture of the declared robot.
+
+    Returns:
+        The posture with the resulting errors, springs, clearances and foundation.
+
+    Raises:
+        BadInput: an effect loads the robot, depends on covariates, or requires finite
+            motions.
+    """
+    robot = posture.robot
+    needed = dict(covariates_of(robot, []))
+    for name in robot.effects:
+        needed |= dict.fromkeys(LIBRARY[name].needs, name)
+    for covariate, effect in needed.items():
+        raise BadInput(
+            f'{robot.name}: found effect "{effect}", which depends on {covariate}, but '
+            "effects are applied without such conditions here; remove the effect, or "
+            f"use assembly solve or validation crosscheck with --under {covariate}=.."
+        )
+    applied = apply_robot_effects(posture)
+    if applied.gravity is not None or applied.load.any():
+        raise BadInput(
+            f"{robot.name}: found effects that load the robot, which are not supported "
+            "here; use assembly solve or validation crosscheck instead"
+        )
+    return applied.posture
+
+
 def check_covariates(
     robot: Robot, given: Mapping[str, float | str], *, finite: bool = False
 ) -> None:

@@ -312,20 +312,15 @@ def posture_of(
         Posture with the effects of the robot file applied.
 
     Raises:
-        BadInput: an effect loads the robot, which the calling command does not support.
+        BadInput: an effect loads the robot or depends on covariates, which the calling
+            command does not support.
     """
-    from forcefit.assembly.effects.robot_effects import apply_robot_effects
+    from forcefit.assembly.effects.robot_effects import with_effects_applied
 
     declared = declared_posture(
         robot, pose, joint, rest, mismatch, own_errors, note, links, drive_force
     )
-    applied = apply_robot_effects(declared)
-    if applied.gravity is not None or applied.load.any():
-        raise BadInput(
-            f"{robot}: found effects that load the robot, which this command does not "
-            "support; use assembly solve or validation crosscheck instead"
-        )
-    return applied.posture
+    return with_effects_applied(declared)
 
 
 def declared_posture(

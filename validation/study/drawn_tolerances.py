@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from forcefit.assembly.effects.robot_effects import with_effects_applied
 from forcefit.assembly.kinematics.posture import Posture, place_robot
 from forcefit.assembly.model.robot import Robot
 from forcefit.assembly.model.statuses import OK
@@ -178,7 +179,9 @@ def bounds_over_grid(
     for k, point in enumerate(points):
         if solved[k]:
             pose = dict(zip(axes, map(float, point), strict=True))
-            prepared = linear_response(place_robot(robot, pose=pose))
+            prepared = linear_response(
+                with_effects_applied(place_robot(robot, pose=pose))
+            )
             found = bound_worst_pose(prepared, sources, _MAP_TOLERANCE)[1]
             bounds[k] = [found[key] for key in POSE_ERRORS]
         progress(k + 1, len(points))

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from forcefit.assembly.kinematics.posture import Posture
+from forcefit.assembly.effects.robot_effects import AppliedEffects
 from forcefit.assembly.model.robot import Robot
 from forcefit.assembly.model.statuses import OK
 from forcefit.assembly.platform_stiffness.vibration import check_masses
@@ -88,11 +88,13 @@ def read_service(root: Table, robot: Robot, links: bool = True) -> Service | Non
     return service
 
 
-def at_pose(posture: Posture, service: Service, unloaded: Mapping) -> dict[str, Any]:
+def at_pose(
+    applied: AppliedEffects, service: Service, unloaded: Mapping
+) -> dict[str, Any]:
     """Return the results for the robot under load at a pose.
 
     Args:
-        posture: the robot's configuration.
+        applied: the robot's configuration, load and gravity after applying effects.
         service: the requested results.
         unloaded: solution without loads, with the keys of ``assembly solve``.
 
@@ -103,11 +105,12 @@ def at_pose(posture: Posture, service: Service, unloaded: Mapping) -> dict[str, 
         ``deflection`` (6,), the difference of the platform screws with and without
         loads.
     """
+    posture = applied.posture
     found: dict[str, Any] = {
         "status": OK, "load": service.load, "gravity": service.gravity
     }  # fmt: skip
     if service.loaded:
-        solution = solution_of(posture, service.load, service.gravity)
+        solution = solution_of(posture, applied.load, applied.gravity)
         found |= {"solution": solution, "status": solution["status"]}
         if "reason" in solution:
             found["reason"] = solution["reason"]

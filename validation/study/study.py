@@ -11,6 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from forcefit.assembly.effects.robot_effects import (
+    apply_robot_effects,
+    with_effects_applied,
+)
 from forcefit.assembly.files.solved_links import solved_link
 from forcefit.assembly.kinematics.posture import Posture, place_robot
 from forcefit.assembly.linear.energy import Assembly, solve_assembly
@@ -169,17 +173,19 @@ def run_study(study: Study, progress: Progress = lambda *_: None) -> StudyResult
         The results.  No file is written.
 
     Raises:
-        BadInput: the pose is unreachable, or a surface cannot be meshed.
+        BadInput: the pose is unreachable, a surface cannot be meshed, or an effect of
+            the robot loads it or depends on covariates.
         ModuleNotFoundError: a package that a check requires is missing.
     """
     wanted = set(study.checks)
     # Missing packages and unreachable poses are reported before long computations.
     need(*(one for check in sorted(wanted) for one in _PACKAGES.get(check, ())))
-    place_robot(study.robot, pose=study.pose)
+    with_effects_applied(place_robot(study.robot, pose=study.pose))
     stiffness, robot = None, study.robot
     if "stiffness" in wanted or study.source == "fea":
         stiffness, robot = _compare_links(study, progress)
-    posture = place_robot(robot, pose=study.pose)
+    declared = place_robot(robot, pose=study.pose)
+    posture = with_effects_applied(declared)
     progress("assembly", 0, 1)
     solution = solution_of(posture) | posture_status(posture)
     solved = solution["status"] == OK
@@ -203,7 +209,10 @@ def run_study(study: Study, progress: Progress = lambda *_: None) -> StudyResult
         )  # fmt: skip
     service = None
     if study.service is not None:
-        service = at_pose(posture, study.service, solution)
+        loads = study.service.load, study.service.gravity
+        service = at_pose(
+            apply_robot_effects(declared, *loads), study.service, solution
+        )
     statistics, draws = None, None
     if study.statistics is not None and solved:
         statistics, draws = drawn_at_pose(

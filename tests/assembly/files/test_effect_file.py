@@ -127,6 +127,9 @@ def test_solve_requires_covariate_of_an_effect(tmp_path, run):
     assert (status, out) == (2, "")
     assert '"thermal_expansion" depends on temperature' in err
     assert "--under temperature=NUMBER" in err
+    status, _, err = run("validation", "validity", path)
+    assert status == 2
+    assert 'found effect "thermal_expansion", which depends on temperature' in err
     status, _, err = run("assembly", "solve", path, "--under", "temprature=6")
     assert status == 2
     assert "temprature" in err

@@ -363,3 +363,49 @@ def test_study_without_an_output_folder_writes_no_file(tmp_path, monkeypatch):
     ff.run_study(read, output="report")
     names = {path.name for path in (tmp_path / "report").iterdir()}
     assert names == {"report.html", "results.json"}
+
+
+BAR = """
+name = "bar"
+platform = "tip"
+[[frame]]
+name = "drive"
+parent = "base"
+joint = "revolute"
+actuated = true
+[[frame]]
+name = "tip"
+parent = "drive"
+translation = [0.5, 0, 0]
+link = { beam = { radius = 0.02 }, young = 7e10, poisson = 0.3 }
+[[effect]]
+"""
+
+
+def test_study_applies_the_effects_of_the_robot(tmp_path):
+    """A joint zero turns the bar; the foundation deflects under F by F / k."""
+    (tmp_path / "bar.toml").write_text(
+        BAR + 'name = "encoder_offset"\nparameters = { drive = 1e-3 }\n[[effect]]\n'
+        'name = "base_compliance"\nparameters = { "stiffness.tx" = 1e7 }\n'
+    )
+    text = (
+        'robot = "bar.toml"\n[service]\nload = [0, 0, 0, 100, 0, 0]\n'
+        "[checks]\ncrosscheck = false\npicture = false\n"
+    )
+    results = run_study(read_study(study_file(tmp_path, text)))
+    screw = results.solution["platform_screw"]
+    np.testing.assert_allclose(screw, [0, 0, 1e-3, 0, 5e-4, 0], atol=1e-12)
+    stretch = 0.5 / (7e10 * np.pi * 0.02**2)
+    axial = results.service["deflection"][3]
+    assert axial == pytest.approx(100 * (1 / 1e7 + stretch), rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    "effect",
+    ['"thermal_expansion"\nparameters = { tip = 1e-5 }',
+     '"self_weight"\nparameters = { "g.z" = -9.81 }'],
+)  # fmt: skip
+def test_study_rejects_effects_that_it_cannot_apply(effect, tmp_path):
+    (tmp_path / "bar.toml").write_text(BAR + f"name = {effect}\n")
+    with pytest.raises(BadInput, match="assembly solve or validation crosscheck"):
+        run_study(read_study(study_file(tmp_path, 'robot = "bar.toml"\n')))
