@@ -121,6 +121,23 @@ def with_effects_applied(posture: Posture) -> Posture:
     return applied.posture
 
 
+def errors_of_effects(declared: Posture, applied: Posture) -> NDArray | None:
+    """Return the errors that effects add, which random errors must not replace.
+
+    Args:
+        declared: posture of the declared robot.
+        applied: the same posture after applying effects.
+
+    Returns:
+        (n, 6) [rad, m] errors of the frames of ``applied``, or None without effects.
+    """
+    if not declared.robot.has_effects:
+        return None
+    own = {frame.name: frame.geometric_error for frame in declared.robot.frames}
+    frames = applied.robot.frames
+    return np.array([f.geometric_error - own.get(f.name, 0.0) for f in frames])
+
+
 def check_covariates(
     robot: Robot, given: Mapping[str, float | str], *, finite: bool = False
 ) -> None:

@@ -201,8 +201,8 @@ def zones_of_errors(sources: Sources) -> list[tuple[str, Zone, NDArray]]:
         independent, fixed = sources, sources.fixed
     if fixed is not None and fixed.any():
         raise BadInput(
-            "worst case: found loops that do not close in the home pose; expected "
-            "loops that close, because closure errors are constant"
+            "worst case: found constant errors, due to effects or loops that do not "
+            "close in the home pose; expected random errors only"
         )
     found = [] if independent is None else _intervals(independent)
     return found + [(p.name, p.zone, np.ones(sum(p.zone.dimensions))) for p in placed]

@@ -12,6 +12,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from forcefit.assembly.effects.robot_effects import (
+    errors_of_effects,
+    with_effects_applied,
+)
 from forcefit.assembly.kinematics.posture import Posture
 from forcefit.assembly.model.given_load import Load
 from forcefit.assembly.statistics.callout_sources import Sources, sources_of
@@ -151,8 +155,10 @@ def statistics(
             'expected clearance "contact"'
         )
     g = None if gravity is None else tuple(np.array(gravity, dtype=float).tolist())
+    declared, posture = posture, with_effects_applied(posture)
+    sources = sources_of(posture.robot, errors, errors_of_effects(declared, posture))
     experiment = Experiment(
-        posture, sources_of(posture.robot, errors), seed, clearance, margins, load=load,
+        posture, sources, seed, clearance, margins, load=load,
         gravity=g, stiffness=state or "", precision=precision_for(limits),
         contact_length=contact_length,
     )  # fmt: skip

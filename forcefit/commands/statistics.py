@@ -20,12 +20,12 @@ from forcefit.commands.options import (
     RestOption,
     RobotArgument,
     SeedOption,
+    declared_posture,
     note_closing,
     note_loose,
     note_massless,
     parse_gravity,
     parse_load,
-    posture_of,
 )
 from forcefit.commands.plot import CsvOption
 from forcefit.commands.progress import progress_bars
@@ -158,6 +158,10 @@ def statistics(
     interruption, the same command continues from this journal and produces the same
     file.
     """
+    from forcefit.assembly.effects.robot_effects import (
+        errors_of_effects,
+        with_effects_applied,
+    )
     from forcefit.assembly.report.first_order import posture_status
     from forcefit.assembly.report.results import status_line
     from forcefit.assembly.statistics.callout_sources import sources_of
@@ -188,11 +192,14 @@ def statistics(
     if figure is not None:
         check_writable(figure, PICTURE)
     closing = rest is not None or mismatch is not None
-    posture = posture_of(
+    declared = declared_posture(
         robot, pose, joint, rest, mismatch, own_errors=not closing, note=False,
         drive_force=drive_force,
     )  # fmt: skip
-    fixed = posture.robot.declared_errors if closing else None
+    posture = with_effects_applied(declared)
+    fixed = errors_of_effects(declared, posture)
+    if closing:
+        fixed = posture.robot.declared_errors
     sources = sources_of(posture.robot, errors, fixed)
     wrench, g = parse_load(load), parse_gravity(gravity)
     note_closing(posture.robot, rest, mismatch)

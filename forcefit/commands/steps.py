@@ -15,8 +15,8 @@ from forcefit.commands.options import (
     RestOption,
     RobotArgument,
     SeedOption,
+    declared_posture,
     parse_gravity,
-    posture_of,
 )
 from forcefit.commands.progress import one_thread, progress_lines
 from forcefit.commands.report import ReportOption, provenance
@@ -61,6 +61,10 @@ def steps(
     results are closing forces, energies, spring-back on release, and locked-in
     wrenches.
     """
+    from forcefit.assembly.effects.robot_effects import (
+        errors_of_effects,
+        with_effects_applied,
+    )
     from forcefit.assembly.files.step_file import read_steps
     from forcefit.assembly.model.error_distributions import read_sources
     from forcefit.assembly.report.steps import drawn_steps, steps_of, steps_text
@@ -70,9 +74,13 @@ def steps(
 
     if (errors is None) != (draws is None):
         raise BadInput("steps: found only one of --errors and --draws, expected both")
-    posture = posture_of(robot, pose, joint, rest, mismatch)
+    declared = declared_posture(robot, pose, joint, rest, mismatch)
+    posture = with_effects_applied(declared)
     asked, g = read_steps(plan, posture.robot), parse_gravity(gravity)
-    sources = None if errors is None else read_sources(errors, posture.robot)
+    sources = None
+    if errors is not None:
+        fixed = errors_of_effects(declared, posture)
+        sources = read_sources(errors, posture.robot, fixed)
     order = None
     states: list[State] = []
     with one_thread():

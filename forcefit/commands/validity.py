@@ -18,9 +18,9 @@ from forcefit.commands.options import (
     RestOption,
     RobotArgument,
     SeedOption,
+    declared_posture,
     parse_gravity,
     parse_load,
-    posture_of,
 )
 from forcefit.commands.progress import progress_bars
 from forcefit.commands.report import ReportOption, provenance
@@ -69,6 +69,7 @@ def validity(
     platform stiffness are estimated as well.  The exit status is 1 if the robot has
     neither errors nor a load, because then there is nothing to compare.
     """
+    from forcefit.assembly.effects.robot_effects import with_effects_applied
     from forcefit.assembly.sweeps.targets import grid_targets, parse_grid, read_targets
     from forcefit.validation.assumptions.over_poses import costs_at, costs_over_poses
     from forcefit.validation.assumptions.platform_cost import PlatformCosts
@@ -95,13 +96,14 @@ def validity(
         check_writable(figure, PICTURE)
     wrench, g = parse_load(load), parse_gravity(gravity)
     own = errors is None or rest is mismatch is None
-    posture = posture_of(robot, pose, joint, rest, mismatch, own)
-    posture = with_errors(posture, errors, seed, own)
+    declared = declared_posture(robot, pose, joint, rest, mismatch, own)
+    declared = with_errors(declared, errors, seed, own)
+    posture = with_effects_applied(declared)
     if grid is None and poses is None:
         costs = costs_at(posture, wrench, g, solids)
         table, text = costs_table(costs), costs_text(costs)
     else:
-        machine = posture.robot
+        machine = declared.robot
         targets = (
             grid_targets(parse_grid(grid, machine))
             if grid is not None

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from forcefit.assembly.effects.robot_effects import with_effects_applied
 from forcefit.assembly.kinematics.posture import Posture, place_many, place_many_joints
 from forcefit.assembly.kinematics.verdict import limits_passed
 from forcefit.assembly.model.robot import Robot
@@ -103,7 +104,8 @@ def costs_over_poses(
         for passed, reason in zip(beyond, reasons, strict=True)
     ]
     reached = [
-        posture for posture, passed in zip(postures, beyond, strict=True)
+        with_effects_applied(posture)
+        for posture, passed in zip(postures, beyond, strict=True)
         if posture is not None and not passed
     ]  # fmt: skip
     platform: PlatformCosts | str = "no pose is reached"

@@ -10,7 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from forcefit.assembly.effects.robot_effects import with_effects_applied
+from forcefit.assembly.effects.robot_effects import (
+    errors_of_effects,
+    with_effects_applied,
+)
 from forcefit.assembly.kinematics.posture import Posture, place_robot
 from forcefit.assembly.model.robot import Robot
 from forcefit.assembly.model.statuses import OK
@@ -121,7 +124,8 @@ def drawn_at_pose(
     """Return statistics and worst case of parts within the tolerances at a pose.
 
     Args:
-        posture: the robot's configuration.  Its geometric errors are not used.
+        posture: the declared robot's configuration.  Its geometric errors are not
+            used.
         asked: requested results.
         progress: function called with the number of finished draws and the number of
             all draws.
@@ -133,7 +137,9 @@ def drawn_at_pose(
     Raises:
         BadInput: a limit refers to a quantity that is not computed for this robot.
     """
-    sources = sources_of(posture.robot)
+    declared, posture = posture, with_effects_applied(posture)
+    fixed = errors_of_effects(declared, posture)
+    sources = sources_of(posture.robot, fixed=fixed)
     experiment = Experiment(
         posture, sources, asked.seed, precision=precision_for(asked.limits)
     )
@@ -171,7 +177,7 @@ def bounds_over_grid(
         The maps with certified upper bounds on rotation and translation over all parts
         and clearances.  Bounds are NaN at points without a solution.
     """
-    sources, axes = sources_of(robot), [str(axis) for axis in maps["status"].dims]
+    axes = [str(axis) for axis in maps["status"].dims]
     bounds = np.full((maps["status"].size, len(POSE_ERRORS)), np.nan)
     values = [maps[axis].values for axis in axes]
     points = np.stack(np.meshgrid(*values, indexing="ij"), -1).reshape(-1, len(axes))
@@ -179,9 +185,11 @@ def bounds_over_grid(
     for k, point in enumerate(points):
         if solved[k]:
             pose = dict(zip(axes, map(float, point), strict=True))
-            prepared = linear_response(
-                with_effects_applied(place_robot(robot, pose=pose))
-            )
+            declared = place_robot(robot, pose=pose)
+            posture = with_effects_applied(declared)
+            fixed = errors_of_effects(declared, posture)
+            sources = sources_of(posture.robot, fixed=fixed)
+            prepared = linear_response(posture)
             found = bound_worst_pose(prepared, sources, _MAP_TOLERANCE)[1]
             bounds[k] = [found[key] for key in POSE_ERRORS]
         progress(k + 1, len(points))

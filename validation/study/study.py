@@ -216,7 +216,7 @@ def run_study(study: Study, progress: Progress = lambda *_: None) -> StudyResult
     statistics, draws = None, None
     if study.statistics is not None and solved:
         statistics, draws = drawn_at_pose(
-            posture, study.statistics, lambda d, n: progress("drawn parts", d, n)
+            declared, study.statistics, lambda d, n: progress("drawn parts", d, n)
         )
         if maps is not None and "worst_case" in statistics:
             maps = bounds_over_grid(
