@@ -6,7 +6,6 @@ from forcefit.assembly.effects.effect import Unknown
 from forcefit.assembly.kinematics.posture import place_robot
 from forcefit.assembly.measurement.predict import with_second_order
 from forcefit.assembly.model.robot import BeamLink, Frame, Robot
-from forcefit.validation.campaign.campaign import Campaign
 from forcefit.validation.diagnosis.claims import parameters_of
 from forcefit.validation.diagnosis.columns import Columns
 from forcefit.validation.diagnosis.derivatives import Derivatives
@@ -14,6 +13,7 @@ from forcefit.validation.diagnosis.fit import fit_machine
 from forcefit.validation.diagnosis.hypotheses import Hypothesis, Slot
 from forcefit.validation.diagnosis.signatures import conditions_of
 from forcefit.validation.diagnosis.unknowns import Acting, Unknowns
+from tests.campaigns_for_tests import campaign_at
 from tests.planar_arm_for_tests import SIGMA
 
 LENGTH = 0.8
@@ -29,16 +29,10 @@ def bar(load=None, measured=None, link=None, rows=8, spread=2.0, spring=None,
     placed = [
         place_robot(robot, joints={"drive": q}) for q in np.linspace(0, spread, rows)
     ]
-    return Campaign(
-        name="bar", robot=robot, ids=tuple(f"m{i}" for i in range(rows)),
-        coordinates=np.stack([p.coordinates for p in placed]),
-        transforms=np.stack([p.transforms for p in placed]), mismatch=np.zeros(rows),
-        commanded="joints",
+    return campaign_at(
+        robot, placed, np.zeros((rows, 6)) if measured is None else measured, SIGMA,
         loads=np.zeros((rows, 6)) if load is None else np.tile(load, (rows, 1)),
-        measured=np.zeros((rows, 6)) if measured is None else measured,
-        sigma=np.tile(SIGMA, (rows, 1)), covariates=covariates,
-        reference_point=np.zeros(3), registration="known",
-        configuration=np.arange(rows), repeat=np.arange(rows),
+        covariates=covariates,
     )  # fmt: skip
 
 

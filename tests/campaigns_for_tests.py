@@ -1,7 +1,10 @@
 """Measurement campaigns shared by several tests, in folders and in memory."""
 
+import csv
+
 import numpy as np
 
+from forcefit.assembly.kinematics.posture import home_posture
 from forcefit.assembly.model.robot import Frame, Robot
 from forcefit.validation.campaign.campaign import Campaign
 
@@ -62,6 +65,42 @@ def write_campaign(folder, head=HEAD, rows=ROWS, robot=ARM, toml=None, noise=NOI
     return folder
 
 
+def table_rows(numbers, first=0):
+    """Lines of a measuring table with the ids m0, m1, ... for numbers (R, n)."""
+    rows = enumerate(np.asarray(numbers).tolist(), first)
+    return [",".join([f"m{i}", *map(repr, row)]) for i, row in rows]
+
+
+def read_table(path):
+    """Rows of a CSV file as dictionaries."""
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def fitted_numbers(effects, name, session=None):
+    """Values and standard deviations of an effect in the table of a diagnosis."""
+    return {
+        p["name"]: (p["value"], p["std"])
+        for effect in effects
+        if effect["name"] == name and effect.get("session") == session
+        for p in effect["parameters"]
+    }
+
+
+def campaign_at(robot, placed, measured, sigma, **given):
+    """A campaign of readings (R, 6) at the postures of the rows, with other fields."""
+    rows = len(placed)
+    return Campaign(**{
+        "name": robot.name, "robot": robot, "ids": tuple(f"m{i}" for i in range(rows)),
+        "coordinates": np.stack([p.coordinates for p in placed]),
+        "transforms": np.stack([p.transforms for p in placed]),
+        "mismatch": np.zeros(rows), "commanded": "joints", "measured": measured,
+        "loads": np.zeros((rows, 6)), "sigma": np.broadcast_to(sigma, (rows, 6)),
+        "covariates": {}, "reference_point": np.zeros(3), "registration": "known",
+        "configuration": np.arange(rows), "repeat": np.arange(rows),
+    } | given)  # fmt: skip
+
+
 def campaign_of(measured, sigma=1.0, repeat=None, loads=None, **covariates):
     """Return a campaign with given readings (R, 6).
 
@@ -70,20 +109,8 @@ def campaign_of(measured, sigma=1.0, repeat=None, loads=None, **covariates):
     rows = len(measured)
     robot = Robot("post", "top", (Frame("top", translation=[0, 0, 1.0]),))
     repeat = np.arange(rows) if repeat is None else np.asarray(repeat)
-    return Campaign(
-        name="made up",
-        robot=robot,
-        ids=tuple(f"m{i}" for i in range(rows)),
-        coordinates=np.zeros((rows, 1)),
-        transforms=np.broadcast_to(robot.fixed_transforms, (rows, 1, 4, 4)),
-        mismatch=np.zeros(rows),
-        commanded="joints",
-        loads=np.zeros((rows, 6)) if loads is None else loads,
-        measured=measured,
-        sigma=np.broadcast_to(sigma, (rows, 6)),
+    return campaign_at(
+        robot, [home_posture(robot)] * rows, measured, sigma, configuration=repeat,
+        loads=np.zeros((rows, 6)) if loads is None else loads, repeat=repeat,
         covariates=covariates,
-        reference_point=np.zeros(3),
-        registration="known",
-        configuration=repeat,
-        repeat=repeat,
-    )
+    )  # fmt: skip

@@ -6,7 +6,7 @@ import numpy as np
 
 from forcefit.assembly.kinematics.posture import place_robot
 from forcefit.assembly.model.robot import BeamLink, Frame, Robot
-from forcefit.validation.campaign.campaign import Campaign
+from tests.campaigns_for_tests import campaign_at
 from tests.planar_arm_for_tests import SIGMA
 
 SPRING = np.diag([np.inf, np.inf, 5e4, np.inf, np.inf, np.inf])
@@ -41,15 +41,10 @@ def commanded(robot, rows=12, seed=2, reach=1.5):
         place_robot(bare, joints=dict(zip(DRIVES, row, strict=True))) for row in q
     ]
     loads = rng.normal(size=(rows, 6)) * np.repeat([2.0, 30.0], 3)
-    return Campaign(
-        name="arm", robot=robot, ids=tuple(f"m{i}" for i in range(rows)),
-        coordinates=np.stack([p.coordinates for p in placed]),
-        transforms=np.stack([p.transforms for p in placed]), mismatch=np.zeros(rows),
-        commanded="joints", loads=loads, measured=np.zeros((rows, 6)),
-        sigma=np.tile(SIGMA, (rows, 1)),
+    return campaign_at(
+        robot, placed, np.zeros((rows, 6)), SIGMA, loads=loads,
         covariates={"temperature": np.linspace(1, 8, rows),
                     "time": 60.0 * np.arange(rows),
                     "approach": rng.choice([-1.0, 1.0], rows)},
-        reference_point=np.array([0.02, 0.05, 0.03]), registration="known",
-        configuration=np.arange(rows), repeat=np.arange(rows),
+        reference_point=np.array([0.02, 0.05, 0.03]),
     )  # fmt: skip

@@ -4,9 +4,7 @@ import numpy as np
 
 from forcefit.assembly.kinematics.posture import home_posture
 from forcefit.assembly.model.robot import BeamLink, Frame, Robot
-from forcefit.validation.multibody.simulation import (
-    simulate_assembly,
-)
+from forcefit.validation.multibody.simulation import simulate_assembly
 
 E, NU = 60e9, 0.3
 ROUND = BeamLink({"radius": 0.04}, E, NU)
@@ -23,6 +21,15 @@ def coaxial(error, length=0.4):
         Frame("b", "wall", translation=[-length, 0, 0], link=ROUND),
     )
     return home_posture(Robot("coaxial", "a", frames, (("a", "b"),)))
+
+
+def block():
+    """A rigid bar of 1 m that is closed with a gap of 0.1 mm, so it cannot assemble."""
+    frames = (
+        Frame("a", translation=[1, 0, 0]),
+        Frame("b", translation=[1, 0, 0], geometric_error=[0, 0, 0, 1e-4, 0, 0]),
+    )
+    return home_posture(Robot("block", "a", frames, (("a", "b"),)))
 
 
 def random_stiffness(rng, soft=1e3):

@@ -38,6 +38,14 @@ def irsbot2_over(x, z):
     return robot, place_many(robot, poses)[0]
 
 
+def with_frames(robot, chosen, **changes):
+    """The robot with changes of the chosen frames; a change may depend on the frame."""
+    return replace(robot, frames=tuple(
+        replace(f, **{k: v(f) if callable(v) else v for k, v in changes.items()})
+        if chosen(f) else f for f in robot.frames
+    ))  # fmt: skip
+
+
 def with_bodies(robot, rng, heaviest=5.0, off=0.2):
     """Return the robot with random masses [kg] and centres of mass."""
     return replace(robot, frames=tuple(

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from forcefit.assembly.effects.functions import AXES
-from forcefit.assembly.files.robot_file import read_robot
+from forcefit.assembly.model.robot import Frame, Robot
 from forcefit.validation.campaign.campaign_file import read_commands
 from forcefit.validation.diagnosis.candidates import (
     Candidate,
@@ -18,6 +18,7 @@ from forcefit.validation.diagnosis.responses import responses
 from forcefit.validation.diagnosis.sensitivities import Sensitivities
 from forcefit.validation.diagnosis.signatures import conditions_of
 from tests.bar_for_tests import BEAM, LENGTH, along, bar
+from tests.campaigns_for_tests import table_rows
 
 LINE = CandidateShape("powers", ("0", "1"))
 
@@ -83,30 +84,18 @@ def test_constant_or_incomplete_quantities_are_not_variables():
     ]  # fmt: skip
 
 
-SLIDE = """
-name = "axis"
-platform = "carriage"
-[[frame]]
-name = "x"
-parent = "base"
-rotation = [0.0, 1.5707963267948966, 0.0]
-joint = "prismatic"
-actuated = true
-[[frame]]
-name = "carriage"
-parent = "x"
-rotation = [0.0, -1.5707963267948966, 0.0]
-"""
-
-
 def test_quantities_that_vary_only_by_round_off_are_not_variables(tmp_path):
     """The slide is rotated by pi/2, whose cosine is 6e-17 in floating point."""
-    (tmp_path / "slide.toml").write_text(SLIDE)
+    turn = [0, np.pi / 2, 0]
+    robot = Robot("axis", "carriage", (
+        Frame("x", rotation=turn, joint="prismatic", actuated=True),
+        Frame("carriage", "x", rotation=np.negative(turn)),
+    ))  # fmt: skip
     x = np.linspace(0.0, 0.5, 9).round(3)
-    lines = [f"m{i},{a},{5 * a},{1e-17 * a}" for i, a in enumerate(x)]
+    rows = table_rows(np.outer(x, [1.0, 5.0, 1e-17]))
     table = tmp_path / "commands.csv"
-    table.write_text("\n".join(["id,q.x,load.fx,load.fy", *lines]) + "\n")
-    campaign = read_commands(table, read_robot(tmp_path / "slide.toml"))
+    table.write_text("\n".join(["id,q.x,load.fx,load.fy", *rows]) + "\n")
+    campaign = read_commands(table, robot)
     conditions = conditions_of(campaign)
     assert np.ptp(conditions.postures.platform[:, 2, 3]) > 0.0
     found = variables_of(conditions)

@@ -27,6 +27,7 @@ from forcefit.validation.diagnosis.report import report_page
 from forcefit.validation.diagnosis.results import effects, table
 from forcefit.validation.diagnosis.sentence import sentence
 from forcefit.validation.diagnosis.text import text
+from tests.campaigns_for_tests import fitted_numbers
 from tests.planar_arm_for_tests import SIGMA, measured
 
 CAMPAIGNS = Path(__file__).parents[2] / "campaigns"
@@ -58,8 +59,7 @@ def diagnosed(tmp_path_factory):
 
 def numbers(found, effect):
     """Return values and standard deviations of the parameters of an effect."""
-    (one,) = [e for e in effects(found) if e["name"] == effect]
-    return {p["name"]: (p["value"], p["std"]) for p in one["parameters"]}
+    return fitted_numbers(effects(found), effect)
 
 
 def assert_within(found, effect, truth):

@@ -13,7 +13,7 @@ from forcefit.assembly.linear.energy import solve_assembly
 from forcefit.inputs.table import BadInput
 from forcefit.validation.campaign.campaign_file import read_campaign
 from forcefit.validation.diagnosis.diagnose import diagnose
-from tests.campaigns_for_tests import write_campaign
+from tests.campaigns_for_tests import table_rows, write_campaign
 
 ARM, LEAD = 0.1, 1.0 / (2 * np.pi)  # [m, m/rad]
 ROBOT = f"""
@@ -40,10 +40,10 @@ def deviation(q, turn):
     return np.stack([zero, zero, turn, *across, LEAD * turn], axis=1)
 
 
-def with_function(tmp_path, components, kind, variables, value):
+def with_function(tmp_path, components, kind, variables, value, where="spindle"):
     file = tmp_path / "press.toml"
     file.write_text(
-        f'{ROBOT}[[effect]]\nname = "function"\nwhere = "spindle"\nkind = "{kind}"\n'
+        f'{ROBOT}[[effect]]\nname = "function"\nwhere = "{where}"\nkind = "{kind}"\n'
         f'components = ["{components}"]\nvariables = ["{variables}"]\n'
         f'form = "powers"\nparameters = {{ "0" = {value} }}\n'
     )
@@ -57,10 +57,7 @@ def test_error_of_a_driven_screw_is_identified_along_its_thread(tmp_path):
     q, size, noise = rng.uniform(-3, 3, 80), 3e-4, 1e-6
     measured = deviation(q, size * np.sin(3 * q)) + noise * rng.normal(size=(80, 6))
     head = ",".join(["id", "q.spindle", *(f"meas.{c}" for c in COMPONENTS)])
-    rows = [
-        f"m{i},{a!r},{','.join(map(repr, row))}"
-        for i, (a, row) in enumerate(zip(q.tolist(), measured.tolist(), strict=True))
-    ]
+    rows = table_rows(np.column_stack([q, measured]))
     of_noise = f"[noise]\nrotation = {noise}\nposition = {noise}\n"
     folder = write_campaign(tmp_path, head, rows, ROBOT, noise=of_noise)
     found = diagnose(read_campaign(folder))
@@ -71,31 +68,22 @@ def test_error_of_a_driven_screw_is_identified_along_its_thread(tmp_path):
     assert found.after.normalised < 1.3
 
 
-def test_function_along_a_thread_rotates_and_translates_the_tool(tmp_path):
-    robot = with_function(tmp_path, "rs", "screw", "q.spindle", 2e-4)
-    posture = place_robot(robot, joints={"spindle": 0.7})
-    applied = apply_robot_effects(posture)
-    found = solve_assembly(applied.posture).platform_screw
-    (expected,) = deviation(np.array([0.7]), np.array([2e-4]))
-    np.testing.assert_allclose(found, expected, atol=1e-18)
-
-
-def test_compliance_along_a_thread_responds_to_moment_and_force(tmp_path):
+@pytest.mark.parametrize(("kind", "value", "turn"), [
+    ("screw", 2e-4, 2e-4), ("compliance", 1e-5, 1e-5 * (0.4 + LEAD * 25.0))
+])  # fmt: skip
+def test_function_along_a_thread_rotates_and_translates_the_tool(
+    tmp_path, kind, value, turn
+):
     """The generalised load of the joint is mz + h fz."""
-    robot = with_function(tmp_path, "rs", "compliance", "q.spindle", 1e-5)
+    robot = with_function(tmp_path, "rs", kind, "q.spindle", value)
     posture = place_robot(robot, joints={"spindle": 0.7})
     load = np.array([0.0, 0.0, 0.4, 0.0, 0.0, 25.0])  # [N m, N] at the tool
     applied = apply_robot_effects(posture, load)
     found = solve_assembly(applied.posture, load).platform_screw
-    turn = 1e-5 * (0.4 + LEAD * 25.0)
     (expected,) = deviation(np.array([0.7]), np.array([turn]))
     np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-18)
 
 
 def test_component_along_a_thread_requires_a_helical_joint(tmp_path):
-    file = tmp_path / "press.toml"
-    with_function(tmp_path, "rs", "screw", "q.spindle", 2e-4)
-    text = file.read_text().replace('where = "spindle"', 'where = "tool"')
-    file.write_text(text)
     with pytest.raises(BadInput, match='components: found "rs"'):
-        read_robot(file)
+        with_function(tmp_path, "rs", "screw", "q.spindle", 2e-4, where="tool")

@@ -31,10 +31,6 @@ def test_robot_in_the_report_has_its_measured_pose(diagnosed):
     off = (read - assembled(diagnosed, row).platform_screw)[known] / sigma
     assert np.abs(off).max() < 5
     assert np.abs(diagnosed.residual_before[row][known] / sigma).max() > 20
-
-
-def test_view_of_the_robot_names_row_and_effect(diagnosed):
-    row, _ = worst_row(diagnosed)
     drawn = worst_robot(diagnosed)
     assert f"Row {diagnosed.campaign.ids[row]}, held out" in drawn
     assert "drive compliance" in drawn

@@ -10,9 +10,9 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from forcefit.assembly.kinematics.posture import place_robot
 from forcefit.assembly.model.robot import Frame, Robot
-from forcefit.validation.campaign.campaign import Campaign
 from forcefit.validation.diagnosis.diagnose import diagnose
 from forcefit.validation.diagnosis.sequence import errors_of
+from tests.campaigns_for_tests import campaign_at
 from tests.planar_arm_for_tests import SIGMA
 
 TURNING = {"joint": "revolute", "actuated": True}
@@ -49,15 +49,7 @@ def found():
         seen[k, :3] += (actual.rotation * nominal.rotation.inv()).as_rotvec()
         seen[k, 3:] += actual.translation - nominal.translation
     placed = [place_robot(ARM, joints={"j1": a, "j2": b}) for a, b in q]
-    campaign = Campaign(
-        name="arm", robot=ARM, ids=tuple(f"m{k}" for k in range(rows)),
-        coordinates=np.stack([p.coordinates for p in placed]),
-        transforms=np.stack([p.transforms for p in placed]), mismatch=np.zeros(rows),
-        commanded="joints", loads=np.zeros((rows, 6)), measured=seen,
-        sigma=np.tile(SIGMA, (rows, 1)), covariates={}, reference_point=np.zeros(3),
-        registration="known", configuration=np.arange(rows), repeat=np.arange(rows),
-    )  # fmt: skip
-    return diagnose(campaign)
+    return diagnose(campaign_at(ARM, placed, seen, SIGMA))
 
 
 def test_large_geometric_errors_are_identified_to_second_order(found):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from forcefit.validation.diagnosis.holdout import hidden, hold_out
+from forcefit.validation.diagnosis.holdout import hold_out
 from tests.campaigns_for_tests import campaign_of
 
 
@@ -54,12 +54,3 @@ def test_small_campaign_holds_out_every_row_once(rows, folds):
     assert len(parts) == folds
     assert sorted(sum(parts, [])) == list(range(rows))
     assert (hold_out(campaign).how == "none") == (rows == 1)
-
-
-def test_held_out_rows_have_commands_but_no_readings():
-    campaign = campaign_of(np.ones((4, 6)), loads=np.arange(24.0).reshape(4, 6))
-    rows = np.array([True, False, False, True])
-    there = hidden(campaign, rows)
-    assert np.array_equal(np.isnan(there.measured).all(axis=1), rows)
-    assert np.array_equal(there.loads, campaign.loads)
-    assert np.array_equal(there.cells.any(axis=1), ~rows)

@@ -49,26 +49,15 @@ def test_repeat_scatter_agrees_with_hand_calculation():
     assert rms == pytest.approx(1.0)
 
 
-@pytest.mark.parametrize(("tau", "repeats", "told"), [
-    (1.05, (1.0, 40), []), (3.0, (1.0, 40), ["residual"]),
-    (0.4, (0.5, 40), ["residual"]),
-    (1.0, (2.0, 40), ["repeatable"]), (1.0, (2.0, 2), []),
+@pytest.mark.parametrize(("tau", "repeats", "common", "told"), [
+    (1.05, (1.0, 40), (0, 0), []), (3.0, (1.0, 40), (0, 0), ["residual"]),
+    (0.4, (0.5, 40), (0, 0), ["residual"]), (1.0, (2.0, 40), (0, 0), ["repeatable"]),
+    (1.0, (2.0, 2), (0, 0), []),
+    (1.0, (1.0, 40), (1.2e-5, 5e-6), ["the points of a row: 5 um, 12 urad"]),
+    (1.0, (1.0, 40), (0.0, 2.54e-5), ["the points of a row: 25.4 um"]),
+    (1.0, (0.0, 0), (0.0, 5e-6), ["an unrecorded cause has the same effect"]),
 ])  # fmt: skip
-def test_noise_that_differs_from_sigma_is_reported(tau, repeats, told):
-    found = findings(tau, 0.03, repeats, memory=False)
+def test_noise_that_differs_from_sigma_is_reported(tau, repeats, common, told):
+    found = findings(tau, 0.03, repeats, memory=False, common=common)
     assert len(found) == len(told)
     assert all(word in one for word, one in zip(told, found, strict=True))
-
-
-@pytest.mark.parametrize(("common", "words"), [
-    ((1.2e-5, 5e-6), "5 um, 12 urad"), ((0.0, 2.54e-5), "25.4 um"), ((0.0, 0.0), ""),
-])  # fmt: skip
-def test_common_noise_is_reported_with_standard_deviations(common, words):
-    told = findings(1.0, 0.03, (1.0, 40), memory=False, common=common)
-    head = "noise common to the points of a row: "
-    assert told == ((head + words,) if words else ())
-
-
-def test_common_noise_without_repeats_is_reported_as_uncertain():
-    (told,) = findings(1.0, 0.03, (0.0, 0), memory=False, common=(0.0, 5e-6))
-    assert "an unrecorded cause has the same effect" in told

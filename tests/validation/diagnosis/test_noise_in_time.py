@@ -68,16 +68,6 @@ def test_covariance_under_correlated_noise_equals_matrix_formula(sessions, rng):
     assert np.array_equal(white, H)
 
 
-def test_variance_of_an_ornstein_uhlenbeck_mean_equals_formula():
-    """[(1 + f)/(1 - f) - 2 f (1 - f^n)/(n (1 - f)^2)] / n with f = exp(-step/tau)."""
-    campaign = session(columns=(3,))
-    f, n = np.exp(-STEP / CONSTANT), ROWS
-    expected = ((1 + f) / (1 - f) - 2 * f * (1 - f**n) / (n * (1 - f) ** 2)) / n
-    H, G = np.full((1, 1), 1 / n), np.ones((n, 1))
-    wide = widened(H, G, campaign, NoiseInTime(1.0, CONSTANT, 0.0))
-    assert wide[0, 0] == pytest.approx(expected, rel=1e-9)
-
-
 @pytest.mark.slow
 def test_90_per_cent_intervals_are_valid_under_correlated_noise(rng):
     """Most intervals include the true value, unlike intervals for white noise.
@@ -140,11 +130,8 @@ def test_noise_in_time_equals_estimate_from_the_full_matrix(sessions, rng):
     """The rows are not in the order of time, and the time steps differ."""
     campaign = session(36, (1, 3), sessions)
     campaign.covariates["time"] = rng.permutation(np.cumsum(rng.integers(0, 40, 36)))
-    z = (
-        2.5
-        * np.linalg.cholesky(covariance_of(campaign, 0.9, 200.0))
-        @ rng.normal(size=72)
-    )
+    root = np.linalg.cholesky(covariance_of(campaign, 0.9, 200.0))
+    z = 2.5 * root @ rng.normal(size=72)
     found, expected = noise_in_time(campaign, z), by_definition(campaign, z)
     assert (found.share, found.constant) == pytest.approx(expected[:2])
     assert found.probability == pytest.approx(expected[2], rel=1e-9, abs=0)

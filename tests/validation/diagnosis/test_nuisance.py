@@ -90,13 +90,6 @@ def test_nuisance_columns_predict_the_readings_of_a_changed_robot(loaded):
     assert robot.errors[geometry.frame, geometry.axis].tolist() == x.tolist()
 
 
-def test_zero_or_negative_compliance_does_not_change_a_joint():
-    robot = Robot("a", "tip", (Frame("one", joint="revolute"), Frame("tip", "one")))
-    first, axes = np.zeros(2, int), np.array([0, 1])
-    same = with_compliance(robot, first, axes, np.array([0.0, -1e-6]))
-    assert same.frame("one").joint_stiffness is robot.frame("one").joint_stiffness
-
-
 def test_passive_joint_with_added_compliance_rotates_freely():
     """A compliance of 1e-7 m/N is in series with a rigid bearing."""
     hinge = Frame("hinge", "base", joint="revolute")

@@ -14,6 +14,8 @@ from forcefit.inputs.table import BadInput
 from forcefit.validation.diagnosis.registration import coarse_frame, register
 from forcefit.validation.diagnosis.signatures import conditions_of
 from tests.bar_for_tests import LENGTH, along, bar
+from tests.campaigns_for_tests import campaign_at
+from tests.planar_arm_for_tests import SIGMA
 
 TURN, SHIFT = [0.3, -0.2, 0.5], [1.0, 0.5, -2.0]
 
@@ -105,11 +107,7 @@ def test_collinear_points_do_not_determine_the_device_rotation():
     placed = [place_robot(robot, joints={"slide": 0.1 * k}) for k in range(5)]
     seen = np.zeros((5, 6))
     seen[:, :3] = np.nan
-    campaign = replace(
-        bar(rows=5, measured=seen), robot=robot,
-        coordinates=np.stack([p.coordinates for p in placed]),
-        transforms=np.stack([p.transforms for p in placed]),
-    )  # fmt: skip
+    campaign = campaign_at(robot, placed, seen, SIGMA)
     with pytest.raises(BadInput, match="measured points that are not on one line"):
         register(campaign, conditions_of(campaign))
 

@@ -1,21 +1,13 @@
-"""Test lack of fit, outliers and trends of residuals."""
+"""Test lack of fit and outliers of residuals."""
 
 import numpy as np
 import pytest
 from scipy.stats import binom, kstest
 
-from forcefit.validation.diagnosis import lack_of_fit as module
-from forcefit.validation.diagnosis.lack_of_fit import (
-    SIGNIFICANT,
-    lack_of_fit,
-    outlying,
-    trends,
-)
-from forcefit.validation.diagnosis.signatures import conditions_of, whiten
+from forcefit.validation.diagnosis.lack_of_fit import SIGNIFICANT, lack_of_fit, outlying
+from forcefit.validation.diagnosis.signatures import whiten
 from tests.campaigns_for_tests import campaign_of
 from tests.planar_arm_for_tests import SIGMA
-
-# The following tests are about lack of fit.
 
 
 def noisy(rng, rows=40, sets=10, size=1.0):
@@ -110,27 +102,3 @@ def test_large_residuals_are_outliers(rng):
     assert np.flatnonzero(outlying(campaign, z[campaign.cells])).tolist() == [7]
     z[[3, 20], 0] += 60
     assert np.flatnonzero(outlying(campaign_of(z), z.ravel())).tolist() == [3, 20]
-
-
-# The following tests are about trends.
-
-
-def varied(rng, rows=120):
-    """Return a campaign of noise with varying loads and covariates."""
-    loads = np.zeros((rows, 6))
-    loads[:, 3:] = 20 * rng.normal(size=(rows, 3))
-    return campaign_of(
-        rng.normal(size=(rows, 6)) * SIGMA, SIGMA, loads=loads,
-        humidity=rng.uniform(-1, 1, rows), time=60.0 * np.arange(rows),
-        temperature=rng.normal(size=rows),
-    )  # fmt: skip
-
-
-def test_false_alarm_rate_of_trends_equals_significance_level(rng, monkeypatch):
-    """The level is 5 % instead of 0.1 % to limit the number of campaigns."""
-    monkeypatch.setattr(module, "UNLIKELY", 0.05)
-    alarms = 0
-    for _ in range(100):
-        campaign = varied(rng, 20)
-        alarms += bool(trends(campaign, conditions_of(campaign), campaign.measured))
-    assert binom.cdf(alarms, 100, 0.05) < 1 - 1e-3

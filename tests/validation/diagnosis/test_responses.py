@@ -13,6 +13,7 @@ from forcefit.validation.diagnosis.responses import responses
 from forcefit.validation.diagnosis.signatures import conditions_of
 from tests.bar_for_tests import BEAM, LENGTH, along, bar
 from tests.linkages_for_tests import five_bar
+from tests.robots_for_tests import with_frames
 
 LOAD = np.array([0.3, -0.2, 3.0, 1.0, 5.0, -2.0])
 
@@ -106,11 +107,8 @@ def test_response_does_not_depend_on_clearance_under_load(held, closed):
         campaign, conditions = loaded()
         robot, loose = campaign.robot, "drive"
     clearance = Clearance(radial=1e-5, axial=2e-5)
-    frames = tuple(
-        replace(f, clearance=clearance if f.name == loose else f.clearance)
-        for f in robot.frames
-    )
-    there = replace(conditions, robot=replace(robot, frames=frames))
+    there = with_frames(robot, lambda f: f.name == loose, clearance=clearance)
+    there = replace(conditions, robot=there)
     if held:
         rest = np.zeros_like(conditions.errors)
         rest[:, robot.index(loose), 3] = 1.0

@@ -17,7 +17,7 @@ from forcefit.validation.campaign.campaign_file import read_campaign
 from forcefit.validation.correction.prediction import predict
 from forcefit.validation.diagnosis.diagnose import diagnose
 from forcefit.validation.diagnosis.results import learned
-from tests.campaigns_for_tests import write_campaign
+from tests.campaigns_for_tests import table_rows, write_campaign
 
 SIGMA, ROWS, ROCKING = 2e-5, 80, 1e-3
 GAIN = 0.8  # rotation of the base per unit of the sensor value
@@ -47,11 +47,11 @@ def rocking(tmp_path):
         tip = tip + [0, 0, 0.5]
         turned = rotation_matrix(np.array([0, GAIN * tilt[i], 0])) @ tip
         read = turned - tip + SIGMA * rng.normal(size=3)
-        rows.append(",".join(map(str, [f"m{i}", a, b, *read.tolist(), tilt[i]])))
+        rows.append([a, b, *read, tilt[i]])
     head = "id,q.one,q.two,meas.tx,meas.ty,meas.tz,cov.tilt"
     write_robot(arm(), tmp_path / "arm.toml")
     folder = write_campaign(
-        tmp_path / "day", head, rows,
+        tmp_path / "day", head, table_rows(rows),
         robot=(tmp_path / "arm.toml").read_text(),
         noise=f"[noise]\nposition = {SIGMA}\n",
     )  # fmt: skip

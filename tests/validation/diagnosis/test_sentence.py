@@ -8,11 +8,7 @@ from forcefit.assembly.model.function import Function
 from forcefit.validation.diagnosis.calibration import Calibration
 from forcefit.validation.diagnosis.sentence import calibration_text, formula
 
-
-def test_formula_of_a_product_contains_both_variables():
-    numbers = {"0.0": 1.0, "1.0": 2.0, "0.1": 3.0, "2.1": -4.0}
-    function = Function("drive", ("rz",), ("q.drive", "cov.bed"), "powers", numbers)
-    assert formula(function) == "rz = 1 + 2 drive + 3 bed + -4 drive^2 bed"
+PRODUCT = {"0.0": 1.0, "1.0": 2.0, "0.1": 3.0, "2.1": -4.0}
 
 
 @pytest.mark.parametrize(
@@ -30,10 +26,16 @@ def test_formula_of_a_product_contains_both_variables():
          "rz = 2e-05 drive up to 4 + 1e-06 drive beyond 4"),
         ("knee", {"size": 8e-5, "at": 0.01}, "rz = 8e-05 drive's sign from 0.01"),
         ("step", {"size": 2.0, "at": 0.5}, "rz = 2 step.size(drive)"),
+        ("powers", PRODUCT, "rz = 1 + 2 drive + 3 bed + -4 drive^2 bed"),
+        ("powers", {"rz.1": 2e-3, "tx.1": 3e-3},
+         "rz = 0.002 drive; tx = 0.003 drive (times the wrench there)"),
     ],
 )  # fmt: skip
 def test_formula_equals_expected_text_for_each_form(form, parameters, expected):
-    function = Function("drive", ("rz",), ("q.drive",), form, parameters)
+    components = ("rz", "tx") if "tx.1" in parameters else ("rz",)
+    variables = ("q.drive", "cov.bed") if parameters is PRODUCT else ("q.drive",)
+    kind = "compliance" if "tx.1" in parameters else "screw"
+    function = Function("drive", components, variables, form, parameters, kind)
     assert formula(function) == expected
 
 
@@ -49,12 +51,3 @@ def test_calibration_text_contains_counts_and_percentages():
     )
     unnamed = calibration_text(replace(tally, right=float("nan")))
     assert "correct effects" not in unnamed
-
-
-def test_formula_of_a_compliance_mentions_the_wrench():
-    function = Function(
-        "drive", ("rz", "tx"), ("q.drive",), "powers",
-        {"rz.1": 2e-3, "tx.1": 3e-3}, "compliance",
-    )  # fmt: skip
-    expected = "rz = 0.002 drive; tx = 0.003 drive (times the wrench there)"
-    assert formula(function) == expected

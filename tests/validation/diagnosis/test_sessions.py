@@ -15,7 +15,7 @@ from forcefit.validation.diagnosis.saving import save
 from forcefit.validation.synthetic.design import CampaignDesign, plan_campaign
 from forcefit.validation.synthetic.effects import SCREW
 from forcefit.validation.synthetic.machine import Hidden, simulate_readings
-from tests.campaigns_for_tests import write_campaign
+from tests.campaigns_for_tests import fitted_numbers, table_rows, write_campaign
 from tests.elastic_arm_for_tests import arm, with_errors
 
 SIGMA = np.repeat([1e-5, 5e-6], 3)
@@ -62,19 +62,9 @@ def measured(folder, hidden, common=(), known=True):
     )  # fmt: skip
 
 
-def parameters(found, name, session=None):
-    """Return values and standard deviations of the parameters of an effect."""
-    return {
-        p["name"]: (p["value"], p["std"])
-        for effect in found["effects"]
-        if effect["name"] == name and effect.get("session") == session
-        for p in effect["parameters"]
-    }
-
-
 def assert_near(found, name, truth, session=None, most=np.inf):
     """Check that parameters are within four standard deviations of the truth."""
-    told = parameters(found, name, session)
+    told = fitted_numbers(found["effects"], name, session)
     for key, true in truth.items():
         value, std = told[key]
         assert abs(value - true) < 4 * std
@@ -178,12 +168,11 @@ def in_two_tables(folder, shift):
     folder = write_campaign(folder, toml={"measurements": tables}, noise=(
         f"[noise]\nrotation = {SIGMA[0]}\nposition = {SIGMA[5]}\n"))  # fmt: skip
     for day, name in days.items():
+        q, x = rng.uniform(-1, 1, (60, 2)), rng.uniform(0, 10, 60)
+        read = SIGMA[5] * rng.normal(size=(60, 3))
+        read[:, 2] += shift * x if name == "humidity" else 0.0
         lines = [f"id,q.one,q.two,meas.tx,meas.ty,meas.tz,cov.{name}"]
-        for i in range(60):
-            q, x = rng.uniform(-1, 1, 2), rng.uniform(0, 10)
-            read = SIGMA[5] * rng.normal(size=3)
-            read[2] += shift * x if name == "humidity" else 0.0
-            lines.append(",".join(map(str, [f"m{i}", *q, *read, x])))
+        lines += table_rows(np.column_stack([q, read, x]))
         (folder / f"{day}.csv").write_text("\n".join(lines) + "\n")
     return folder
 

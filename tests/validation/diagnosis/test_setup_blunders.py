@@ -14,8 +14,9 @@ from forcefit.assembly.kinematics.posture import Posture, place_many, place_many
 from forcefit.assembly.measurement.conditions import as_declared
 from forcefit.assembly.measurement.predict import predict
 from forcefit.assembly.robots import load_robot
-from forcefit.validation.campaign.campaign import Campaign, number_rows
+from forcefit.validation.campaign.campaign import number_rows
 from forcefit.validation.diagnosis.setup_blunders import setup_blunders
+from tests.campaigns_for_tests import campaign_at
 
 ROWS = 25
 POINT = np.array([0.05, 0.02, 0.1])
@@ -24,15 +25,11 @@ SHIFT = np.array([2.0, -1.0, 0.5])
 
 
 def placed(robot, q):
-    """Return joint coordinates and frame poses for commands (R, drives)."""
+    """Return the postures for commands (R, drives)."""
     driven = [frame.actuated for frame in robot.frames]
     held = np.full((len(q), len(driven)), np.nan)
     held[:, driven] = q
-    postures, _ = place_many_joints(robot, held)
-    return (
-        np.array([p.coordinates for p in postures]),
-        np.array([p.transforms for p in postures]),
-    )
+    return place_many_joints(robot, held)[0]
 
 
 class Machine:
@@ -63,26 +60,25 @@ class Machine:
 
     def declared(self, q, loads):
         """Return the platform poses and the deviations of the declared robot."""
-        coordinates, transforms = placed(self.robot, q)
+        postures = placed(self.robot, q)
+        transforms = np.array([p.transforms for p in postures])
+        coordinates = np.array([p.coordinates for p in postures])
         posture = Posture(self.robot, coordinates, transforms, 0.0)
         deviation = predict(as_declared(posture, loads, point=POINT)).deviation
         return transforms[:, self.robot.index(self.robot.platform)], deviation
 
     def campaign(self, rotations=False):
         """Return a campaign of the machine with its current commands and readings."""
-        coordinates, transforms = placed(self.robot, self.q)
+        postures = placed(self.robot, self.q)
+        transforms = np.array([p.transforms for p in postures])
         T = transforms[:, self.robot.index(self.robot.platform)]
         gap = Rotation.from_matrix(self.turns @ np.swapaxes(T[:, :3, :3], 1, 2))
         turned = gap.as_rotvec() if rotations else np.full((ROWS, 3), np.nan)
         shift = self.points - T[:, :3, 3] - T[:, :3, :3] @ POINT
-        kinds = number_rows(coordinates)
-        return Campaign(
-            name="made up", robot=self.robot, ids=tuple(map(str, range(ROWS))),
-            coordinates=coordinates, transforms=transforms, mismatch=np.zeros(ROWS),
-            commanded="joints", loads=self.loads,
-            measured=np.hstack([turned, shift]),
-            sigma=np.tile(np.repeat([1e-5, self.noise], 3), (ROWS, 1)),
-            covariates={}, reference_point=POINT,
+        kinds = number_rows(np.array([p.coordinates for p in postures]))
+        return campaign_at(
+            self.robot, postures, np.hstack([turned, shift]),
+            np.repeat([1e-5, self.noise], 3), loads=self.loads, reference_point=POINT,
             registration="unknown" if self.unknown else "known",
             configuration=kinds, repeat=kinds,
         )  # fmt: skip

@@ -5,17 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from forcefit.assembly.measurement.predict import predict
 from forcefit.assembly.model.function import Function
 from forcefit.inputs.table import BadInput
 from forcefit.validation.diagnosis.derivatives import Derivatives
-from forcefit.validation.diagnosis.hypotheses import Hypothesis
-from forcefit.validation.diagnosis.signatures import (
-    Tangents,
-    conditions_of,
-    whiten,
-)
-from forcefit.validation.diagnosis.trace import FINITE
+from forcefit.validation.diagnosis.signatures import Tangents, conditions_of, whiten
 from tests.bar_for_tests import bar, fit_of
 from tests.planar_arm_for_tests import SIGMA
 
@@ -62,14 +55,3 @@ def test_residual_equals_reading_minus_declared_prediction():
     found = whiten(campaign, campaign.measured) - tangents.declared
     assert found == pytest.approx(expected, abs=1e-9)
     assert len(tangents.declared) == 46
-
-
-def test_signature_of_an_effect_without_unknowns_is_an_offset():
-    """The effect is a finite rotation of a compliant drive."""
-    spring = np.diag([np.inf, np.inf, 2e3, np.inf, np.inf, np.inf])
-    campaign = bar([0, 0, 0, 0, 150.0, 0], spring=spring)
-    tangents = Tangents(campaign, Derivatives(conditions_of(campaign)))
-    found = tangents.at_start(Hypothesis(FINITE, (), ()))
-    exact = predict(replace(tangents.derivatives.conditions, exact=True)).deviation
-    assert found.offset == pytest.approx(whiten(campaign, exact) - tangents.declared)
-    assert found.columns.shape == (48, 0)

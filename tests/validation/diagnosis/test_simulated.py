@@ -10,6 +10,7 @@ from forcefit.validation.synthetic.design import CampaignDesign, varied_for
 from forcefit.validation.synthetic.effects import LIBRARY
 from forcefit.validation.synthetic.equivalents import SAME, alternatives
 from forcefit.validation.synthetic.generator import generate_campaign, write_campaign
+from tests.campaigns_for_tests import fitted_numbers
 from tests.elastic_arm_for_tests import arm, with_errors
 
 DESIGN = CampaignDesign(
@@ -38,16 +39,12 @@ def assert_true_numbers(found, made):
 
     Masses are not checked, because different masses have similar effects.
     """
-    numbers = {
-        (effect["name"], p["name"]): p
-        for effect in table(found)["effects"]
-        for p in effect["parameters"]
-    }
     for one in made.effects:
-        for name, value in one.parameters.items():
-            if value and one.name != "body_mass":
-                told = numbers[one.name, name]
-                assert abs(told["value"] - value) < 4 * told["std"], name
+        numbers = fitted_numbers(table(found)["effects"], one.name)
+        for name, true in one.parameters.items():
+            if true and one.name != "body_mass":
+                value, std = numbers[name]
+                assert abs(value - true) < 4 * std, name
 
 
 @pytest.mark.slow

@@ -12,6 +12,7 @@ from forcefit.validation.diagnosis.diagnose import diagnose
 from forcefit.validation.diagnosis.prediction import predicted
 from forcefit.validation.diagnosis.results import table
 from forcefit.validation.diagnosis.saving import corrected
+from tests.campaigns_for_tests import table_rows
 
 ROWS, STEP, SIGMA = 240, 60.0, 2e-6
 BED, FRAME = 0.9e-6, -16e-6  # [m/K]
@@ -36,8 +37,7 @@ def diagnosed(tmp_path, read, covariates, sigma=SIGMA):
         f"[noise]\nrotation = 1.0\nposition = {sigma}\n"
     )
     head = ",".join(["id", "q.z", "meas.tz", *(f"cov.{name}" for name in covariates)])
-    rows = np.column_stack([np.zeros(len(read)), read, *covariates.values()])
-    lines = [f"m{i}," + ",".join(f"{x:.9g}" for x in row) for i, row in enumerate(rows)]
+    lines = table_rows(np.column_stack([0 * read, read, *covariates.values()]))
     (tmp_path / "rows.csv").write_text("\n".join([head, *lines]) + "\n")
     return diagnose(read_campaign(tmp_path))
 

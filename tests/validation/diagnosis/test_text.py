@@ -15,11 +15,9 @@ def errors(position, rotation, normalised):
     return {"position": position, "rotation": rotation, "normalised": normalised}
 
 
-def step(term, unknowns, rms, sigma, unit="m"):
-    return {
-        "term": term, "unknowns": unknowns, "kept_aside_rms": rms, "unit": unit,
-        "kept_aside_sigma": sigma,
-    }  # fmt: skip
+def step(term, unknowns, rms, sigma):
+    return {"term": term, "unknowns": unknowns, "kept_aside_rms": rms, "unit": "m",
+            "kept_aside_sigma": sigma}  # fmt: skip
 
 
 def made(**changes):

@@ -1,7 +1,5 @@
 """Test trends of a residual against F tests with a different solver."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -13,6 +11,8 @@ from forcefit.validation.diagnosis import lack_of_fit as module
 from forcefit.validation.diagnosis.lack_of_fit import trends
 from forcefit.validation.diagnosis.signatures import conditions_of
 from tests.bar_for_tests import bar
+from tests.campaigns_for_tests import campaign_at
+from tests.planar_arm_for_tests import SIGMA
 
 ROWS = 30
 
@@ -32,13 +32,8 @@ def varied(rng):
     seen = rng.normal(size=(ROWS, 6)) + shown[:, None]
     seen[rng.random((ROWS, 6)) < 0.2] = np.nan
     seen[4:, 5] = np.nan
-    return replace(
-        bar(rows=ROWS, measured=seen, time=rng.uniform(0, 500, ROWS),
-            humidity=humidity),
-        robot=robot, loads=loads,
-        coordinates=np.stack([p.coordinates for p in placed]),
-        transforms=np.stack([p.transforms for p in placed]),
-    )  # fmt: skip
+    given = {"time": rng.uniform(0, 500, ROWS), "humidity": humidity}
+    return campaign_at(robot, placed, seen, SIGMA, loads=loads, covariates=given)
 
 
 def functions(campaign):
