@@ -4,8 +4,6 @@ The readings are computed in closed form for a planar arm, so all deviations of 
 imported campaigns are round-off.
 """
 
-import json
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -20,7 +18,9 @@ from tests.validation.exchange.test_tracker import (
     TARGETS,
     TURN,
     Lab,
+    imported,
     points,
+    refused,
     seen,
 )
 
@@ -28,23 +28,6 @@ from tests.validation.exchange.test_tracker import (
 @pytest.fixture
 def lab(tmp_path):
     return Lab(tmp_path)
-
-
-def imported(lab, run, text, encoding="utf-8"):
-    """Import an export and return the JSON output of the command."""
-    lab.folder.joinpath("export.txt").write_bytes(text.encode(encoding))
-    status, out, err = run(*lab.words(), "--json", "-")
-    assert status == 0, err
-    return json.loads(out)
-
-
-def refused(lab, run, text):
-    """Return the error message for an export, and check that nothing is written."""
-    lab.export(text)
-    status, out, err = run(*lab.words())
-    assert (status, out) == (2, "")
-    assert not (lab.folder / "campaign").exists()
-    return err.strip().splitlines()[-1]
 
 
 def assert_exact(lab, readings=None):
@@ -213,9 +196,8 @@ def test_quoted_numbers_with_decimal_comma_are_read(lab, run):
 def test_decimal_mark_is_declared_for_each_table(lab, run):
     text = (lab.folder / "commands.csv").read_text().replace(",", ";")
     (lab.folder / "commands.csv").write_text(text)
-    body = [
-        line.replace(".", ",") for line in points(line="p{k}::{name};{x!r};{y!r};{z!r}")
-    ]
+    line = "p{k}::{name};{x!r};{y!r};{z!r}"
+    body = [row.replace(".", ",") for row in points(line=line)]
     lab.targets(decimal='","')
     assert 'decimal = { commands = "." }' in refused(lab, run, "\n".join(body))
     lab.targets(decimal='{ export = ",", commands = "." }')

@@ -1,6 +1,5 @@
 """Tests of the import of tracker files as a campaign, with a known device frame."""
 
-import csv
 import json
 
 import numpy as np
@@ -9,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from forcefit.validation.campaign.campaign_file import read_campaign
 from forcefit.validation.exchange.device_table import Writing, parse_time
-from tests.campaigns_for_tests import ARM
+from tests.campaigns_for_tests import ARM, read_table
 
 TARGETS = {"A": (0.0, 0.0, 0.1), "B": (0.1, 0.02, 0.0), "C": (0.0, 0.07, 0.03)}
 ANGLES = [(0.1 * k, 0.3 + 0.17 * k) for k in range(-6, 7)]
@@ -67,8 +66,7 @@ class Lab:
 
     def table(self):
         """Return the columns of the imported campaign."""
-        with (self.folder / "campaign" / "measurements.csv").open() as file:
-            rows = list(csv.DictReader(file))
+        rows = read_table(self.folder / "campaign" / "measurements.csv")
         return {k: [row[k] for row in rows] for k in rows[0]}
 
 
@@ -85,15 +83,30 @@ def points(names="ABC", line="{name}", change=lambda k, name, p: p):
             yield line.format(k=k, name=name, x=x, y=y, z=z)
 
 
+def imported(lab, run, text, encoding="utf-8"):
+    """Import an export and return the JSON output of the command."""
+    lab.folder.joinpath("export.txt").write_bytes(text.encode(encoding))
+    status, out, err = run(*lab.words(), "--json", "-")
+    assert status == 0, err
+    return json.loads(out)
+
+
+def refused(lab, run, text):
+    """Return the error message for an export, and check that nothing is written."""
+    lab.export(text)
+    status, out, err = run(*lab.words())
+    assert (status, out) == (2, "")
+    assert not (lab.folder / "campaign").exists()
+    return err.strip().splitlines()[-1]
+
+
 SPATIAL_ANALYZER = "Main::p{k}::{name}, {x!r}, {y!r}, {z!r}"
 
 
 def test_spatial_analyzer_readings_are_assigned_to_commands_by_name(lab, run):
     """For exact readings, deviations are round-off."""
-    lab.export("// a comment\n" + "\n".join(points(line=SPATIAL_ANALYZER)))
-    status, out, err = run(*lab.words(), "--json", "-")
-    assert status == 0, err
-    table = json.loads(out)
+    text = "\n".join(["// a comment", *points(line=SPATIAL_ANALYZER)])
+    table = imported(lab, run, text)
     assert table["joined_by"] == "name"
     assert (table["rows"], table["readings"], table["left_out"]) == (13, 39, [])
     assert table["device"]["rotation"] == pytest.approx(TURN.as_matrix(), abs=1e-12)
@@ -136,15 +149,11 @@ def test_german_export_with_times_and_uncertainty_is_read(lab, run):
     text = (lab.folder / "commands.csv").read_text().replace(",", ";")
     (lab.folder / "commands.csv").write_text(text.replace(".", ",").replace(
         "q,", "q.").replace("22,11,2026", "22.11.2026"))  # fmt: skip
-    rows = ["Punkt-ID;Name;X [mm];Y [mm];Z [mm];U95 X [um];U95 Y [um];U95 Z [um];Datum"]
-    rows[0] = rows[0].replace("Punkt-ID;", "").replace("Datum", "Timestamp")
+    rows = ["Name;X [mm];Y [mm];Z [mm];U95 X [um];U95 Y [um];U95 Z [um];Timestamp"]
     for line in points("A", "{name};{x!r};{y!r};{z!r};30,0;40,0;50,0;{k}"):
         cells, _, k = line.replace(".", ",").rpartition(";")
         rows.append(f"{cells};2026-11-22T10:{int(k):02d}:02")
-    lab.export("\n".join(rows))
-    status, out, err = run(*lab.words(), "--json", "-")
-    assert status == 0, err
-    assert json.loads(out)["joined_by"] == "time"
+    assert imported(lab, run, "\n".join(rows))["joined_by"] == "time"
     campaign = read_campaign(lab.folder / "campaign")
     assert campaign.reference_point == pytest.approx(TARGETS["A"])
     assert np.abs(campaign.measured[:, 3:]).max() < 1e-12
@@ -162,8 +171,7 @@ def test_deviations_are_recovered_with_a_known_registration(lab, run):
         "B\t{}\t{}\t{}".format(*(attained(a, TARGETS["B"]) + [1e-4, 2e-4, k * 1e-6]))
         for k, a in enumerate(ANGLES)
     ]
-    lab.export("\n".join(lines))
-    assert run(*lab.words())[0] == 0
+    imported(lab, run, "\n".join(lines))
     campaign = read_campaign(lab.folder / "campaign")
     expected = [[1e-4, 2e-4, k * 1e-6] for k in range(13)]
     assert campaign.measured[:, 3:] == pytest.approx(np.array(expected), abs=1e-14)
@@ -177,10 +185,8 @@ def test_exchanged_targets_and_outliers_are_omitted_and_reported(lab, run, rng):
             p = seen(ANGLES[k], "BA"["AB".index(name)])
         return p + (k == 7 and name == "C") * np.array([0, 0.03, 0])
 
-    lab.export("\n".join(points(line=SPATIAL_ANALYZER, change=change)))
-    status, out, _ = run(*lab.words(), "--json", "-")
-    left_out = json.loads(out)["left_out"]
-    assert status == 0
+    text = "\n".join(points(line=SPATIAL_ANALYZER, change=change))
+    left_out = imported(lab, run, text)["left_out"]
     assert len(left_out) == 3
     assert '"Main::p3::A"): command "p3": this is target "B"' in left_out[0]
     assert 'command "p3": this is target "A"; targets were exch' in left_out[1]
@@ -194,17 +200,13 @@ def test_exchanged_targets_and_outliers_are_omitted_and_reported(lab, run, rng):
 def test_targets_exchanged_in_every_row_are_rejected(lab, run):
     lines = [line.translate(str.maketrans("AB", "BA"))
              for line in points(line=SPATIAL_ANALYZER)]  # fmt: skip
-    lab.export("\n".join(lines))
-    status, _, err = run(*lab.words())
-    assert status == 2
-    assert "exchanged in every row: A is B, B is A" in err
-    assert not (lab.folder / "campaign").exists()
+    message = refused(lab, run, "\n".join(lines))
+    assert "exchanged in every row: A is B, B is A" in message
 
 
 def test_files_with_the_same_points_become_repeated_rows(lab, run):
     """Names without a command are joined by order.  Two files have the same points."""
-    lab.export("\n".join(points(line="{name} {x!r} {y!r} {z!r}")))
-    assert run(*lab.words())[0] == 0
+    imported(lab, run, "\n".join(points(line="{name} {x!r} {y!r} {z!r}")))
     lab.folder.joinpath("campaign/measurements.csv").unlink()
     lab.folder.joinpath("campaign/campaign.toml").unlink()
     named = "\n".join(points(line="p{k}::{name} {x!r} {y!r} {z!r}"))
@@ -225,8 +227,7 @@ def test_names_with_any_separator_identify_target_and_command(line, lab, run):
         for k, a in enumerate(ANGLES)
         for name in "ABC"
     ]
-    lab.export("\n".join(["name;x;y;z", *rows[::-1]]))
-    assert run(*lab.words())[0] == 0
+    imported(lab, run, "\n".join(["name;x;y;z", *rows[::-1]]))
     table = lab.table()
     assert table["id"] == [f"p{k}" for k in range(len(ANGLES))]
     assert [float(x) for x in table["meas.B.tx"]] == pytest.approx(
@@ -257,11 +258,7 @@ def test_names_with_any_separator_identify_target_and_command(line, lab, run):
 ])  # fmt: skip
 def test_invalid_device_file_is_rejected(lab, run, text, targets, message):
     lab.targets(**targets)
-    lab.export(text)
-    status, out, err = run(*lab.words())
-    assert (status, out) == (2, "")
-    assert message in err.splitlines()[-1]
-    assert not (lab.folder / "campaign").exists()
+    assert message in refused(lab, run, text)
 
 
 @pytest.mark.parametrize(("head", "message"), [
@@ -272,15 +269,11 @@ def test_invalid_device_file_is_rejected(lab, run, text, targets, message):
 ])  # fmt: skip
 def test_invalid_table_of_commands_is_rejected(lab, run, head, message):
     lab.commands(head=head)
-    lab.export("\n".join(points(line=SPATIAL_ANALYZER)))
-    status, _, err = run(*lab.words())
-    assert status == 2
-    assert message in err.splitlines()[-1]
+    assert message in refused(lab, run, "\n".join(points(line=SPATIAL_ANALYZER)))
 
 
 def test_import_does_not_overwrite_a_campaign(lab, run):
-    lab.export("\n".join(points(line=SPATIAL_ANALYZER)))
-    assert run(*lab.words())[0] == 0
+    imported(lab, run, "\n".join(points(line=SPATIAL_ANALYZER)))
     status, _, err = run(*lab.words())
     assert status == 2
     assert "expected a new folder" in err
@@ -289,10 +282,8 @@ def test_import_does_not_overwrite_a_campaign(lab, run):
 def test_import_reports_ground_points_and_unknown_names(lab, run):
     lines = list(points(line=SPATIAL_ANALYZER))
     lines[5] = lines[5].replace("p1", "pl")
-    lab.export("\n".join(["Ground::nest1, 1, 2, 3", *lines]))
-    status, out, _ = run(*lab.words(), "--json", "-")
-    table = json.loads(out)
-    assert (status, table["readings"]) == (0, 38)
+    table = imported(lab, run, "\n".join(["Ground::nest1, 1, 2, 3", *lines]))
+    assert table["readings"] == 38
     misnamed, ground = table["left_out"]
     assert misnamed.endswith('("Main::pl::C"): its name contains no id of a command')
     assert "1 readings of no target" in ground
@@ -304,10 +295,7 @@ def test_readings_far_from_any_command_are_reported(lab, run):
     lab.commands(range(0, 130, 10))
     lines = [f"{line};{10 * k + 1 + 3 * (k == 5)}" for k, line in enumerate(
         points("A", "{name};{x!r};{y!r};{z!r}"))]  # fmt: skip
-    lab.export("name;x;y;z;time\n" + "\n".join(lines))
-    status, out, _ = run(*lab.words(), "--json", "-")
-    table = json.loads(out)
-    assert status == 0
+    table = imported(lab, run, "\n".join(["name;x;y;z;time", *lines]))
     assert table["readings"] == 12
     assert "no command is near it in time" in table["left_out"][0]
 
