@@ -48,6 +48,19 @@ def write_file(tmp_path: Path) -> Callable[[str | bytes], Path]:
 
 
 @pytest.fixture
+def rejected(run):
+    """Run a command that must be rejected without output: its error message."""
+
+    def call(*words):
+        status, out, err = run(*words)
+        assert (status, out) == (2, "")
+        assert "Traceback" not in err
+        return err.strip()
+
+    return call
+
+
+@pytest.fixture
 def run(capsys, monkeypatch):
     """Return a function that runs ``forcefit`` in this process.
 

@@ -14,7 +14,8 @@ from forcefit.validation.campaign.campaign_file import read_campaign, read_comma
 from forcefit.validation.correction.prediction import predict
 from forcefit.validation.diagnosis.diagnose import diagnose
 from forcefit.validation.diagnosis.saving import corrected
-from tests.campaigns_for_tests import write_campaign
+from forcefit.validation.multibody.simulation import without_clearance
+from tests.campaigns_for_tests import table_rows, write_campaign
 
 SIGMA = 2e-5
 HOUR = 3600.0
@@ -43,7 +44,7 @@ def measured(folder, rows, reach, sessions=None, zero=0.0, wave=None):
     q = np.array([f.position for f in saved.frames if f.actuated])
     q = q + reach * rng.uniform(-1, 1, (rows, len(q)))
     head = ",".join(["id", *(f"q.{n}" for n in names)])
-    lines = [",".join([f"m{i + 1}", *map(repr, r.tolist())]) for i, r in enumerate(q)]
+    lines = table_rows(q, first=1)
     (folder / "plain.csv").write_text("\n".join([head, *lines]) + "\n")
     offset = {"encoder_offset": {names[0]: zero}}
     commands = read_commands(folder / "plain.csv", replace(saved, effects=offset))
@@ -125,10 +126,7 @@ def test_set_up_rows_at_a_single_position_are_insufficient(machine, run):
 
 def test_saved_robot_predicts_its_own_sessions(machine, run):
     """The device is relocated in each session."""
-    tight = load_robot(machine / "declared.toml")
-    tight = replace(
-        tight, frames=tuple(replace(f, clearance=None) for f in tight.frames)
-    )
+    tight = without_clearance(load_robot(machine / "declared.toml"))
     zeros = {f.name: 5e-4 for f in tight.frames if f.actuated}
     write_robot(tight, machine / "declared.toml")
     hidden = replace(tight, effects={"encoder_offset": zeros})
@@ -195,16 +193,14 @@ def test_set_up_rows_of_the_first_minutes_are_insufficient_for_drift(machine, ru
     (["--setup", "6"], "found only set-up rows"),
     (["--setup", "3", "--fit", "zero"], '--fit: found "zero"; did you mean "zeros"'),
 ])  # fmt: skip
-def test_invalid_set_up_rows_are_rejected(words, message, machine, run):
+def test_invalid_set_up_rows_are_rejected(words, message, machine, rejected):
     folder = measured(machine, 6, 0.8)
-    code, _, error = run("validation", "carry", str(machine / "saved.toml"),
-                         str(folder), *words)  # fmt: skip
-    assert code == 2
+    error = rejected("validation", "carry", machine / "saved.toml", folder, *words)
     assert message in error
-    assert "\n" not in error.strip()
+    assert "\n" not in error
 
 
-def test_rows_that_do_not_determine_the_registration_are_rejected(machine, run):
+def test_rows_that_do_not_determine_the_registration_are_rejected(machine, rejected):
     """The rows contain one reading each."""
     folder = measured(machine, 6, 0.8)
     file = folder / "campaign.toml"
@@ -213,8 +209,7 @@ def test_rows_that_do_not_determine_the_registration_are_rejected(machine, run):
     head, *rows = table.read_text().splitlines()
     lines = [row.rsplit(",", 3)[0] + ",1e-4" for row in rows]
     table.write_text("\n".join([head.rsplit(",", 2)[0], *lines]) + "\n")
-    saved = str(machine / "saved.toml")
-    code, _, error = run("validation", "carry", saved, str(folder), "--setup", "3")
-    assert code == 2
+    saved = machine / "saved.toml"
+    error = rejected("validation", "carry", saved, folder, "--setup", "3")
     assert "found a fit of the registration" in error
-    assert error.strip().endswith("or --fit zeros")
+    assert error.endswith("or --fit zeros")

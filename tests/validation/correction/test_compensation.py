@@ -1,6 +1,5 @@
 """Tests of corrected commands against hand calculations and simulated machines."""
 
-import csv
 import json
 from dataclasses import replace
 from math import acos, atan2, cos, sin
@@ -13,9 +12,10 @@ from forcefit.assembly.files.robot_file import write_robot
 from forcefit.assembly.robots import load_robot
 from forcefit.validation.campaign.campaign_file import read_commands
 from forcefit.validation.correction.compensation import compensate
+from forcefit.validation.multibody.simulation import without_clearance
 from forcefit.validation.synthetic.again import distances
 from forcefit.validation.synthetic.machine import Hidden
-from tests.campaigns_for_tests import ARM
+from tests.campaigns_for_tests import ARM, read_table, table_rows
 
 LONGER = ARM.replace("translation = [0.8, 0, 0]", """translation = [0.8, 0, 0]
 geometric_error = [0, 0, 0, 0.01, 0, 0]""")  # fmt: skip
@@ -47,11 +47,6 @@ def test_compensation_tables_equal_the_arrays(tmp_path):
     assert table.attrs["units"]["offset"] == "rad or m"
 
 
-def rows_of(path):
-    with path.open(newline="") as file:
-        return list(csv.DictReader(file))
-
-
 def two_links(x, y, length):
     """Return the joint angles of a planar arm with links of 1 m and ``length``."""
     second = acos((x**2 + y**2 - 1 - length**2) / (2 * length))
@@ -71,13 +66,13 @@ def test_compensated_commands_equal_hand_calculation(tmp_path, run):
     code, text, error = run("validation", *words)
     assert (code, error) == (0, "")
     assert "expected error: " in text
-    for row, (q1, q2) in zip(rows_of(out), [(0.3, 0.9), (-0.2, 1.2)], strict=True):
+    for row, (q1, q2) in zip(read_table(out), [(0.3, 0.9), (-0.2, 1.2)], strict=True):
         x = cos(q1) + 0.8 * cos(q1 + q2)
         y = sin(q1) + 0.8 * sin(q1 + q2)
         first, second = two_links(x, y, 0.81)
         assert float(row["q.one"]) == pytest.approx(first - 2e-3, abs=1e-8)
         assert float(row["q.two"]) == pytest.approx(second, abs=1e-8)
-    assert float(rows_of(offsets)[0]["after.position"]) < 1e-9
+    assert float(read_table(offsets)[0]["after.position"]) < 1e-9
     # The written file is a valid table of commands.
     again = read_commands(out, load_robot(robot))
     assert again.ids == ("a", "b")
@@ -135,21 +130,16 @@ std = { "1.sine" = 2e-4 }
 @pytest.mark.parametrize("name", ["arm6", "delta", "hexapod"])
 def test_compensated_machine_reaches_its_target(name, tmp_path):
     """The machine is simulated independently.  The residual is of second order."""
-    robot = load_robot(name)
-    frames = tuple(replace(f, clearance=None) for f in robot.frames)
-    robot = replace(robot, frames=frames)
+    robot = without_clearance(load_robot(name))
     drives = [f for f in robot.frames if f.actuated]
     size = {"revolute": 2e-4, "prismatic": 1e-4}
     hidden = {f.name: size[f.joint] * (-1) ** i for i, f in enumerate(drives)}
     rng = np.random.default_rng(3)
     reach = {"revolute": 0.1, "prismatic": 0.01}
     head = ",".join(["id", *(f"q.{f.name}" for f in drives)])
-    lines = [
-        ",".join([f"m{i}", *(repr(f.position + reach[f.joint] * rng.uniform(-1, 1))
-                             for f in drives)])
-        for i in range(4)
-    ]  # fmt: skip
-    (tmp_path / "targets.csv").write_text("\n".join([head, *lines]) + "\n")
+    q = [[f.position + reach[f.joint] * rng.uniform(-1, 1) for f in drives]
+         for _ in range(4)]  # fmt: skip
+    (tmp_path / "targets.csv").write_text("\n".join([head, *table_rows(q)]) + "\n")
     corrected = replace(robot, effects={"encoder_offset": hidden})
     write_robot(corrected, tmp_path / "corrected.toml")
     targets = read_commands(
@@ -168,12 +158,9 @@ SLIDE = """
 name = "slide"
 platform = "head"
 [[frame]]
-name = "rail"
+name = "carriage"
 parent = "base"
 translation = [0, 0, 1.0]
-[[frame]]
-name = "carriage"
-parent = "rail"
 joint = "prismatic"
 actuated = true
 [[frame]]
@@ -200,7 +187,7 @@ def test_correction_larger_than_the_robot_is_not_applied(off, tmp_path, run):
     code, text, error = run("validation", "compensate", robot, table, "-o", out,
                             "--json", answer)  # fmt: skip
     assert error == ""
-    (row,) = rows_of(out)
+    (row,) = read_table(out)
     told = json.loads(answer.read_text())["without_answer"]
     if abs(off) < 1:
         assert (code, told) == (0, [])

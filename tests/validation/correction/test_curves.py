@@ -71,10 +71,7 @@ def test_function_of_two_variables_has_three_curves(tmp_path, run):
     (("--over", "q.drive=1:0"), (PUBLIC,), "expected MINIMUM:MAXIMUM"),
 ])  # fmt: skip
 def test_explain_rejects_invalid_functions_and_ranges(
-    words, effects, message, tmp_path, run
+    words, effects, message, tmp_path, rejected
 ):
-    code, _, error = run(
-        "validation", "explain", str(arm_with(tmp_path, *effects)), *words
-    )
-    assert code == 2
-    assert message in error
+    path = arm_with(tmp_path, *effects)
+    assert message in rejected("validation", "explain", path, *words)

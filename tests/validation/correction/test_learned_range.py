@@ -17,9 +17,9 @@ ROWS = ["a,0.1,0.2,0.0,0,0", "b,0.5,0.2,0.4,9,0", "c,0.3,0.2,9.0,5,0"]
 KNOWN = 'learned_range = { "cov.tilt" = [0.0, 0.4], "q.one" = [0.1, 0.5] }\n'
 
 
-def robot_file(tmp_path):
+def robot_file(tmp_path, known=KNOWN):
     path = tmp_path / "learned.toml"
-    path.write_text(KNOWN + ARM)
+    path.write_text(known + ARM)
     return path
 
 
@@ -67,9 +67,7 @@ def test_full_turn_of_a_joint_is_inside_the_learned_range(
 
 
 def test_missing_covariate_is_not_outside_the_learned_range(tmp_path):
-    path = tmp_path / "learned.toml"
-    path.write_text('learned_range = { "cov.tilt" = [0.2, 0.4] }\n' + ARM)
-    robot = read_robot(path)
+    robot = read_robot(robot_file(tmp_path, KNOWN.replace("0.0", "0.2")))
     folder = write_campaign(tmp_path / "c", "id,q.one,q.two,meas.tx", ["a,0.1,0.2,0"])
     assert beyond(robot, read_commands(folder, robot)) == ()
 
@@ -97,9 +95,7 @@ def test_commands_report_rows_outside_the_learned_range(tmp_path, run, command):
     assert (one["variable"], one["learned"], one["rows"]) == ("cov.tilt", [0, 0.4], 1)
 
 
-def test_reversed_learned_range_is_rejected(tmp_path, run):
-    path = tmp_path / "wrong.toml"
-    path.write_text('learned_range = { "cov.tilt" = [1.0, 0.4] }\n' + ARM)
-    code, _, error = run("validation", "explain", str(path))
-    assert code == 2
+def test_reversed_learned_range_is_rejected(tmp_path, rejected):
+    path = robot_file(tmp_path, KNOWN.replace("0.0", "1.0"))
+    error = rejected("validation", "explain", path)
     assert "cov.tilt: found [1, 0.4], expected the smaller number first" in error

@@ -26,7 +26,7 @@ from forcefit.validation.diagnosis.saved_covariance import (
 from forcefit.validation.diagnosis.saving import save as save_found
 from forcefit.validation.diagnosis.signatures import conditions_of
 from forcefit.validation.synthetic.machine import Hidden
-from tests.campaigns_for_tests import campaign_of
+from tests.campaigns_for_tests import campaign_of, table_rows
 from tests.elastic_arm_for_tests import arm, with_errors
 from tests.validation.diagnosis.test_sessions import FRAMES, measured
 
@@ -79,9 +79,7 @@ def test_known_sum_of_two_parameters_is_unchanged(tmp_path):
     assert numbers["0"] + numbers["1"] == pytest.approx(0.0, abs=0.01 * a)
 
 
-def test_prior_covariance_increases_for_a_large_parameter_change(
-    tmp_path,
-):
+def test_prior_covariance_increases_for_a_large_parameter_change(tmp_path):
     """The fitted parameter then agrees with the readings."""
     s, y = 2e-6, 4e-5
     saved, declared = wet_post([y] * 40, [1] * 40, [[s**2]], tmp_path, ("1",))
@@ -137,9 +135,8 @@ def test_derivatives_of_functions_equal_finite_differences(
 ):
     """The predictions include a load and the pose of the device."""
     robot, rng = with_errors(arm()), np.random.default_rng(2)
-    lines = ["id,q.j1,q.j2,q.j3,load.fx,load.fz,load.mz"]
-    for i, q in enumerate(rng.uniform(-1, 1, (5, 6))):
-        lines.append(",".join(map(str, [f"m{i}", *q[:3], *(40 * q[3:])])))
+    numbers = rng.uniform(-1, 1, (5, 6)) * np.repeat([1, 40], 3)
+    lines = ["id,q.j1,q.j2,q.j3,load.fx,load.fz,load.mz", *table_rows(numbers)]
     (tmp_path / "plain.csv").write_text("\n".join(lines) + "\n")
     one = Function(where, (component,), ("q.j2",), "powers", {"1": 1e-7}, kind)
     place = {"base.rz": 0.4, "base.rx": -0.2, "base.tx": 0.3}

@@ -1,6 +1,5 @@
 """Tests of predicted readings and their names."""
 
-import csv
 from math import cos, sin
 
 import numpy as np
@@ -10,7 +9,7 @@ from forcefit.assembly.files.robot_file import write_robot
 from forcefit.assembly.robots import load_robot
 from forcefit.validation.campaign.campaign_file import read_commands
 from forcefit.validation.correction.prediction import predict
-from tests.campaigns_for_tests import ARM, write_campaign
+from tests.campaigns_for_tests import ARM, read_table, table_rows, write_campaign
 
 WAVE = """
 [[effect]]
@@ -29,11 +28,6 @@ def robot_file(tmp_path, text=ARM + WAVE):
     return str(path)
 
 
-def rows_of(path):
-    with path.open(newline="") as file:
-        return list(csv.DictReader(file))
-
-
 def test_predict_reads_a_table_of_commands(tmp_path, run):
     """The first joint has an additional rotation a sin q."""
     table = tmp_path / "new.csv"
@@ -42,7 +36,7 @@ def test_predict_reads_a_table_of_commands(tmp_path, run):
     code, _, error = run("validation", "predict", robot_file(tmp_path), str(table),
                          "-o", str(out))  # fmt: skip
     assert (code, error) == (0, "")
-    rows = rows_of(out)
+    rows = read_table(out)
     assert [row["id"] for row in rows] == ["a", "b"]
     assert list(rows[0]) == [
         "id",
@@ -78,7 +72,7 @@ def test_predicted_readings_have_the_names_of_the_campaign(tmp_path, run):
                         "-o", str(out))  # fmt: skip
     assert code == 0
     assert "rms of measured minus predicted" in text
-    rows = rows_of(out)
+    rows = read_table(out)
     assert list(rows[0]) == ["id", "meas.A.tx", "meas.B.ty"]
     # The distance of point A from the tool frame is 0.1 m along the tool.
     turn, angle = 1e-3 * sin(0.1), 0.3
@@ -89,16 +83,15 @@ def test_predicted_readings_have_the_names_of_the_campaign(tmp_path, run):
     assert rows[1]["meas.B.ty"] == ""
 
 
-def test_predict_rejects_a_missing_covariate(tmp_path, run):
+def test_predict_rejects_a_missing_covariate(tmp_path, rejected):
     humid = ARM + WAVE.replace('"q.one"', '"cov.humidity"').replace(
         "1.sine", "1"
     ).replace("waves", "powers")
     table = tmp_path / "new.csv"
     table.write_text("id,q.one,q.two\na,0.3,0.0\n")
     out = tmp_path / "readings.csv"
-    code, _, error = run("validation", "predict", robot_file(tmp_path, humid),
-                         str(table), "-o", str(out))  # fmt: skip
-    assert code == 2
+    robot = robot_file(tmp_path, humid)
+    error = rejected("validation", "predict", robot, table, "-o", out)
     assert "expected a column cov.humidity" in error
     assert not out.exists()
 
@@ -111,14 +104,11 @@ def test_each_session_is_registered_separately(tmp_path):
     q = rng.uniform(-1, 1, (16, 6))
     names = [f.name for f in robot.frames if f.actuated]
     head = ",".join(["id", *(f"q.{n}" for n in names)])
-    lines = [",".join([f"m{i}", *map(repr, row.tolist())]) for i, row in enumerate(q)]
     shift = np.array([[0.3, -0.2, 0.1], [-1.0, 0.5, 0.0]])[np.arange(16) % 2]
-    measured = [
-        ",".join([line, "ab"[i % 2], *map(repr, row.tolist())])
-        for i, (line, row) in enumerate(zip(lines, shift, strict=True))
-    ]
+    rows = table_rows(np.hstack([q, shift]))
+    measured = [f"{row},{'ab'[i % 2]}" for i, row in enumerate(rows)]
     folder = write_campaign(
-        tmp_path / "days", f"{head},session,meas.tx,meas.ty,meas.tz", measured,
+        tmp_path / "days", f"{head},meas.tx,meas.ty,meas.tz,session", measured,
         robot=(tmp_path / "robot.toml").read_text(),
         toml={"registration": '"unknown"'},
     )  # fmt: skip

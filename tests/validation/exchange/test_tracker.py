@@ -122,7 +122,7 @@ def test_spatial_analyzer_readings_are_assigned_to_commands_by_name(lab, run):
     assert 'robot = "../robot.toml"' in declared
 
 
-def test_import_with_diagnose_writes_a_report(lab, run):
+def test_import_with_diagnose_writes_a_report(lab, run, rejected):
     """The readings of the declared arm contain only noise."""
     noise = np.random.default_rng(1).normal(size=(len(ANGLES), 3))
     lab.export("\n".join(points(
@@ -130,9 +130,8 @@ def test_import_with_diagnose_writes_a_report(lab, run):
     )))  # fmt: skip
     lab.targets("A")
     report = lab.folder / "diagnosis.html"
-    status, _, err = run(*lab.words(), "--report", report)
-    assert status == 2
-    assert "--report: found without --diagnose" in err
+    message = rejected(*lab.words(), "--report", report)
+    assert "--report: found without --diagnose" in message
     assert not (lab.folder / "campaign").exists()
     status, out, err = run(
         *lab.words(), "--diagnose", "--json", "-", "--report", report
@@ -272,11 +271,9 @@ def test_invalid_table_of_commands_is_rejected(lab, run, head, message):
     assert message in refused(lab, run, "\n".join(points(line=SPATIAL_ANALYZER)))
 
 
-def test_import_does_not_overwrite_a_campaign(lab, run):
+def test_import_does_not_overwrite_a_campaign(lab, run, rejected):
     imported(lab, run, "\n".join(points(line=SPATIAL_ANALYZER)))
-    status, _, err = run(*lab.words())
-    assert status == 2
-    assert "expected a new folder" in err
+    assert "expected a new folder" in rejected(*lab.words())
 
 
 def test_import_reports_ground_points_and_unknown_names(lab, run):
