@@ -12,7 +12,7 @@ from forcefit.validation.inspection.design_signatures import design_signatures
 from forcefit.validation.inspection.inspection import inspect_campaign
 from forcefit.validation.inspection.measuring_order import revisits
 from forcefit.validation.inspection.repeats import repeat_noise
-from tests.campaigns_for_tests import ARM, campaign_of, write_campaign
+from tests.campaigns_for_tests import ARM, campaign_of, table_rows, write_campaign
 
 BEAM = "link = { beam = { radius = 0.03 }, young = 7e10, poisson = 0.3 }\n"
 ELASTIC = ARM.replace(
@@ -29,13 +29,8 @@ HEAD = ",".join([
 def elastic_campaign(folder, rng, temperature=None, heat=0.0, device=None, **more):
     """Return a campaign of an elastic arm with repeats under two loads.
 
-    Args:
-        folder: folder to which the campaign is written.
-        rng: random number generator.
-        temperature: constant temperature [K], None for varying temperatures.
-        heat: [1/K] thermal expansion of both arms.
-        device: rotation and position of the measuring device.
-        more: further arguments of :func:`write_campaign`.
+    The temperature [K] varies if it is None.  ``heat`` [1/K] is the thermal expansion
+    of both arms, and ``device`` is the rotation and the position of the device.
     """
     q = rng.uniform(-1, 1, (12, 2)) + [0.0, 1.2]
     lines = []
@@ -51,9 +46,9 @@ def elastic_campaign(folder, rng, temperature=None, heat=0.0, device=None, **mor
             shift = device[0].apply(tool + shift) + device[1] - tool
         reading = np.concatenate([turn, shift])
         reading += rng.normal(size=6) * ([1e-5] * 3 + [5e-6] * 3)
-        cells = [f"m{i}", one, two, *load, *reading, T, 60 * i, 1 - 2 * (i % 2)]
-        lines.append(",".join(str(c) for c in cells))
-    return read_campaign(write_campaign(folder, HEAD, lines, robot=ELASTIC, **more))
+        lines.append([one, two, *load, *reading, T, 60 * i, 1 - 2 * (i % 2)])
+    rows = table_rows(lines)
+    return read_campaign(write_campaign(folder, HEAD, rows, robot=ELASTIC, **more))
 
 
 def test_inspection_table_has_a_row_for_each_effect(tmp_path):
@@ -167,11 +162,8 @@ def test_consecutive_outliers_are_reported_as_a_sudden_change(rng):
 def test_expansion_and_length_are_equivalent_at_constant_temperature(tmp_path, rng):
     """They are distinguished by a varying temperature."""
     constant = inspect_campaign(elastic_campaign(tmp_path / "a", rng, temperature=6.0))
-    assert (
-        "thermal_expansion",
-        "delayed_expansion",
-        "link_length",
-    ) in constant.separability.classes()
+    alike = ("thermal_expansion", "delayed_expansion", "link_length")
+    assert alike in constant.separability.classes()
     varied = inspect_campaign(elastic_campaign(tmp_path / "b", rng))
     assert not any("thermal_expansion" in c for c in varied.separability.classes())
     at_calibration = inspect_campaign(

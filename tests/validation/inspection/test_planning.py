@@ -1,8 +1,6 @@
 """Test the planning of campaigns."""
 
-import csv
 import json
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +9,8 @@ from forcefit.assembly.files.robot_file import read_robot, write_robot
 from forcefit.assembly.robots import load_robot
 from forcefit.validation.campaign.campaign_file import read_commands
 from forcefit.validation.inspection.planning import _Criterion
-from tests.campaigns_for_tests import ARM
+from tests.campaigns_for_tests import ARM, read_table
+from tests.robots_for_tests import with_frames
 
 ROWS = 30
 
@@ -39,8 +38,7 @@ def test_plan_command_writes_a_campaign_without_readings(tmp_path, run):
                         "-o", str(folder), "--json", str(answer))  # fmt: skip
     assert code == 0
     assert "12 rows" in text
-    with (folder / "measurements.csv").open(newline="") as file:
-        rows = list(csv.DictReader(file))
+    rows = read_table(folder / "measurements.csv")
     assert len(rows) == 12
     assert {row["meas.tx"] for row in rows} == {""}
     time = [float(row["cov.time"]) for row in rows]
@@ -57,29 +55,25 @@ def test_plan_command_writes_a_campaign_without_readings(tmp_path, run):
     ("--position", "0", "--position: found 0, expected a finite number > 0 [m]"),
     ("--temperature", "hot", 'temperature: found "hot", expected swing'),
 ])  # fmt: skip
-def test_plan_command_rejects_invalid_options(tmp_path, run, option, value, says):
+def test_plan_command_rejects_invalid_options(tmp_path, rejected, option, value, says):
     robot = tmp_path / "arm.toml"
     robot.write_text(ARM)
-    code, _, error = run("validation", "plan", str(robot), option, value,
-                         "-o", str(tmp_path / "plan"))  # fmt: skip
-    assert code == 2
-    assert says in error
-    assert not (tmp_path / "plan").exists()
+    folder = tmp_path / "plan"
+    assert says in rejected("validation", "plan", robot, option, value, "-o", folder)
+    assert not folder.exists()
 
 
 @pytest.mark.slow
-def test_plan_command_rejects_a_loop_that_requires_clearance(tmp_path, run):
+def test_plan_command_rejects_a_loop_that_requires_clearance(tmp_path, rejected):
     """The robot is a rigid planar four-bar linkage with a twisted coupler."""
-    robot = load_robot("four_bar")
-    frames = tuple(
-        replace(f, link=None, joint_stiffness=None,
-                geometric_error=np.array([1e-5, 0, 0, 0, 0, 0]) * (f.name == "middle"))
-        for f in robot.frames
+    twist = np.array([1e-5, 0, 0, 0, 0, 0])
+    robot = with_frames(
+        load_robot("four_bar"), bool, link=None, joint_stiffness=None,
+        geometric_error=lambda f: twist * (f.name == "middle"),
     )  # fmt: skip
     file = tmp_path / "rigid.toml"
-    write_robot(replace(robot, frames=frames), file)
+    write_robot(robot, file)
     folder = tmp_path / "plan"
-    code, _, message = run("validation", "plan", file, "--rows", "12", "-o", folder)
-    assert code == 2
+    message = rejected("validation", "plan", file, "--rows", "12", "-o", folder)
     assert not folder.exists()
     assert "found no effect that changes the readings if all clearances" in message

@@ -71,11 +71,3 @@ def test_angles_between_signatures_agree_with_external_program(name, inspections
         assert cosine == pytest.approx(other["cosine"], abs=4e-4), other["names"]
         compared += 1
     assert compared >= 7 or not hidden
-
-
-def test_expansion_at_constant_temperature_is_equivalent_to_length(inspections):
-    classes = inspections["p06_confounded"].separability.classes()
-    assert ("thermal_expansion", "delayed_expansion", "link_length") in classes
-    for name in ("p02_self_weight", "p03_thermal_expansion"):
-        found = inspections[name].separability.classes()
-        assert not any("thermal_expansion" in c for c in found)

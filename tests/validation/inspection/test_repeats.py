@@ -173,12 +173,10 @@ def test_points_measured_together_are_one_visit():
     points = {"left": np.array([0, 0.1, 0]), "right": np.array([0, -0.1, 0])}
     configuration = np.repeat(np.tile(np.arange(20), 3), 3)
     campaign = replace(
-        campaign_of(np.zeros((180, 6)), repeat=np.tile(np.arange(60), 3)),
-        ids=ids,
-        points=points,
-        point=np.tile(["", "left", "right"], 60),
+        campaign_of(np.zeros((180, 6)), repeat=np.tile(np.arange(60), 3)), ids=ids,
+        points=points, point=np.tile(["", "left", "right"], 60),
         configuration=configuration,
-    )
+    )  # fmt: skip
     visits = revisits(campaign, campaign.configuration)
     assert visits.order == "interleaved"
     assert visits.rows == 60
