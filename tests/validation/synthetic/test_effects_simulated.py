@@ -18,6 +18,7 @@ from forcefit.assembly.robots import load_robot
 from forcefit.validation.multibody.simulation import without_clearance
 from forcefit.validation.synthetic.effects import Row
 from forcefit.validation.synthetic.machine import Hidden, simulate_readings
+from tests.robots_for_tests import with_frames
 
 POINT = np.array([0.02, 0.0, 0.05])
 UNDER = {"temperature": 6.0, "time": 100.0, "approach": -1.0}
@@ -41,9 +42,8 @@ EFFECTS = {
     "load_gain": {"factor": 1.2, "offset.fx": 3.0},
     "drift": {"amplitude.tz": 1e-5, "time_constant": 60.0},
 }
-ELSEWHERE = {  # effects that other files of this folder test
-    "geometric_stiffening", "joint_clearance"
-}  # fmt: skip
+# effects that other files of this folder test
+ELSEWHERE = {"geometric_stiffening", "joint_clearance"}
 
 
 @pytest.fixture(scope="module")
@@ -57,13 +57,10 @@ def robot():
         if f.name.endswith(("elbow", "wrist")) and np.linalg.norm(f.translation) > 0
     }
     robot = robot.with_links(links)
-    frames = tuple(
-        replace(f, joint_stiffness=SPRING if f.actuated else f.joint_stiffness)
-        for f in robot.frames
-    )
+    robot = with_frames(robot, lambda f: f.actuated, joint_stiffness=SPRING)
     rng = np.random.default_rng(3)
     errors = 3e-5 * rng.standard_normal(robot.errors.shape)
-    return replace(robot, frames=frames).with_errors(errors)
+    return robot.with_errors(errors)
 
 
 @pytest.fixture(scope="module")

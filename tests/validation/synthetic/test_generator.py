@@ -304,11 +304,9 @@ def test_impossible_noise_or_design_is_rejected(make, message):
     (["--truth", "no/t.json"], "no folder no"),
 ])  # fmt: skip
 def test_generate_rejects_invalid_options_and_writes_nothing(
-    run, tmp_path, words, message
+    rejected, tmp_path, words, message
 ):
     folder, truth = tmp_path / "c", tmp_path / "t.json"
     generate = ["validation", "generate", "arm6", folder, "--truth", truth]
-    status, _, err = run(*generate, "--program", "springs", *words)
-    assert status == 2
-    assert message in err
+    assert message in rejected(*generate, "--program", "springs", *words)
     assert list(tmp_path.iterdir()) == []

@@ -1,6 +1,5 @@
 """Tests of plans, strengths, files and equivalent effects of synthetic campaigns."""
 
-import csv
 import json
 import tomllib
 from dataclasses import replace
@@ -13,7 +12,7 @@ from forcefit.assembly.files.robot_file import read_robot
 from forcefit.assembly.kinematics.posture import Posture, place_many_joints
 from forcefit.assembly.measurement.conditions import as_declared
 from forcefit.assembly.measurement.predict import predict
-from forcefit.assembly.model.robot import BeamLink, Frame, Robot
+from forcefit.assembly.model.robot import Frame, Robot
 from forcefit.assembly.robots import load_robot
 from forcefit.inputs.table import BadInput
 from forcefit.inputs.writing import plain
@@ -24,11 +23,7 @@ from forcefit.validation.synthetic.design import (
     plan_campaign,
     varied_for,
 )
-from forcefit.validation.synthetic.draws import (
-    SLIDING,
-    NotApplicable,
-    draw_effect,
-)
+from forcefit.validation.synthetic.draws import SLIDING, NotApplicable, draw_effect
 from forcefit.validation.synthetic.effects import LIBRARY, Row
 from forcefit.validation.synthetic.equivalents import alternatives
 from forcefit.validation.synthetic.generator import (
@@ -39,12 +34,12 @@ from forcefit.validation.synthetic.generator import (
 from forcefit.validation.synthetic.machine import Hidden, simulate_readings
 from forcefit.validation.synthetic.outside import OUTSIDE
 from forcefit.validation.synthetic.truth import truth_of
+from tests.campaigns_for_tests import read_table
+from tests.elastic_arm_for_tests import SPRING, TUBE
 
 CAMPAIGNS = Path(__file__).parents[2] / "campaigns"
 TRUTH = json.loads((CAMPAIGNS / "truth.json").read_text(encoding="utf-8"))
 SMALL = CampaignDesign(configurations=8, rows=40, load=20.0)
-TUBE = BeamLink({"radius": 0.03, "inner_radius": 0.025}, 70e9, 0.33, density=2700.0)
-SPRING = np.diag([np.inf, np.inf, 5e4, np.inf, np.inf, np.inf])
 
 
 def two_axes(spring=SPRING):
@@ -171,9 +166,7 @@ def test_spring_program_agrees_with_the_exact_equilibrium(name):
     np.testing.assert_allclose(springs, exact, rtol=0, atol=2e-9)
 
 
-def test_written_campaign_does_not_contain_the_hidden_effects(
-    tmp_path,
-):
+def test_written_campaign_does_not_contain_the_hidden_effects(tmp_path):
     noise = Noise(missing=0.05, outliers=2, hidden_frame=1e-3)
     design = replace(SMALL, reference_point=(0, 0, 0.1))
     campaign = quick({"drift": 5.0}, design=design, seed=7, noise=noise)
@@ -184,13 +177,10 @@ def test_written_campaign_does_not_contain_the_hidden_effects(
     table = tomllib.loads((tmp_path / "c" / "campaign.toml").read_text())
     assert table["registration"] == "unknown"
     assert table["noise"] == {"rotation": 1e-5, "position": 5e-6}
-    with open(tmp_path / "c" / "measurements.csv", newline="") as file:
-        rows = list(csv.DictReader(file))
+    rows = read_table(tmp_path / "c" / "measurements.csv")
     assert len(rows) == 40
-    assert (
-        sum(row["meas.tx"] == "" for row in rows)
-        == np.isnan(campaign.readings[:, 3]).sum()
-    )
+    missing = sum(row["meas.tx"] == "" for row in rows)
+    assert missing == np.isnan(campaign.readings[:, 3]).sum()
     robot = read_robot(tmp_path / "c" / "robot.toml")
     np.testing.assert_array_equal(robot.errors, campaign.robot.errors)
     read = read_campaign(tmp_path / "c")
@@ -315,22 +305,21 @@ def test_effect_that_does_not_apply_to_the_robot_is_rejected():
     with pytest.raises(BadInput, match='found "gravity"') as caught:
         draw_effect("gravity", two_axes(), 1.0, rng)
     assert "self_weight" in str(caught.value)
-    assert " _" not in str(
-        caught.value
-    )  # names of effects outside the library are not listed
+    # names of effects outside the library are not listed
+    assert " _" not in str(caught.value)
     with pytest.raises(BadInput, match="configurations"):
         CampaignDesign(configurations=5, rows=4)
     with pytest.raises(BadInput, match="temperature"):
         CampaignDesign(temperature="warm")
 
 
-def test_generate_writes_a_campaign_and_its_truth_to_a_new_folder(run, tmp_path):
+def test_generate_writes_a_campaign_and_its_truth_to_a_new_folder(
+    run, rejected, tmp_path
+):
     words = ["validation", "generate", "arm6", tmp_path / "c", "--truth",
              tmp_path / "t.json", "--effect", "drift=2", "--rows", 6,
              "--configurations", 3, "--program", "springs"]  # fmt: skip
     assert run(*words)[0] == 0
     truth = json.loads((tmp_path / "t.json").read_text())["c"]
     assert truth["contribution_rms"]["drift"] == pytest.approx(2.0, rel=0.05)
-    status, _, err = run(*words)
-    assert status == 2
-    assert "expected a new folder" in err
+    assert "expected a new folder" in rejected(*words)
