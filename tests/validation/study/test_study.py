@@ -306,6 +306,15 @@ def test_robot_file_as_study_file_is_rejected(tmp_path):
     ("title", "scales = ['a']\ntitle", "scales: found 'a' as number 1, expected"),
     ("title", "scales = [1, -1]\ntitle", "expected at least two different fact"),
     ("title", "title = 1 #", "title: found 1, expected a string"),
+    *(("[pose]", f"[service]\n{line}\n[pose]", "service" + words) for line, words in (
+        ("load = [1, 2]", ".load: found [1, 2] of length 2"),
+        ("gravity = 9.81", ".gravity: found 9.81"),
+        ("stiffness = 1", ".stiffness: found 1, expected true or false"),
+        ("frequencies = -1", ".frequencies: found -1, expected a whole number"),
+        ("frequencies = 2000", ".frequencies: found 2000, expected at most"),
+        ("frequencies = 3", ".frequencies: irsbot2: found no moving mass"),
+        ("lod = 1", ': unknown key "lod"; did you mean "load"?'),
+    )),
 ])  # fmt: skip
 def test_invalid_study_file_is_rejected(tmp_path, old, new, message):
     path = study_file(tmp_path, SMALL.replace(old, new, 1))
