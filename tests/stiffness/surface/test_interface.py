@@ -101,8 +101,7 @@ def test_rigid_faces_with_a_common_edge_are_rejected():
     """The stiffness between two adjacent sides of a cube is infinite."""
     surface = check_surface(CUBE, CUBE_TRIANGLES, "cube")
     one, other = parse_interface("y=0"), parse_interface("z=0.1")
-    with pytest.raises(
-        BadInput, match=r"cube: base .* and tip .* have a common edge near"
-    ):
+    words = r"cube: base .* and tip .* have a common edge near"
+    with pytest.raises(BadInput, match=words):
         refuse_common_edges(surface, one, other)
     refuse_common_edges(surface, one, parse_interface("y=0.1"))

@@ -1,7 +1,5 @@
 """Tests of the reader of surfaces."""
 
-import struct
-
 import numpy as np
 import pytest
 from scipy import constants
@@ -14,15 +12,7 @@ from forcefit.stiffness.surface.surface import (
     signed_volume,
 )
 from tests.solids_for_tests import CUBE, CUBE_TRIANGLES, bar, cylinder
-
-
-def write_stl(path, points, triangles):
-    corners = np.asarray(points, dtype="<f4")[triangles]
-    body = b"".join(
-        struct.pack("<3f", 0, 0, 0) + corner.tobytes() + b"\0\0" for corner in corners
-    )
-    path.write_bytes(b"test".ljust(80) + struct.pack("<I", len(corners)) + body)
-    return path
+from tests.stiffness.surface.test_stl_file import binary_of
 
 
 @pytest.mark.parametrize("kind", ["stl", "ply", "obj", "vtk", "vtp"])
@@ -40,7 +30,8 @@ def test_every_file_format_has_the_same_surface(tmp_path, kind):
 
 def test_surface_unit_scales_the_part_and_a_wrong_unit_is_rejected(tmp_path):
     points, triangles = cylinder()
-    path = write_stl(tmp_path / "bar.stl", 1000 * points, triangles)
+    path = tmp_path / "bar.stl"
+    path.write_bytes(binary_of(1000 * points[triangles]))
     assert read_surface(path, "mm").volume == pytest.approx(bar().volume, rel=1e-6)
     with pytest.raises(BadInput, match='is the unit of the file "mm"'):
         read_surface(path, "m")

@@ -16,10 +16,8 @@ from forcefit.stiffness.surface.step_file import chosen_solids, read_step, sides
 from forcefit.stiffness.surface.surface import read_surface
 from forcefit.stiffness.surface.surface_files import step_solids
 from tests.solids_for_tests import cylinder
+from tests.stiffness.surface.test_obj_file import CORNERS, SIDES
 
-CORNERS = [(x, y, z) for z in (0, 0.1) for y in (0, 0.1) for x in (0, 0.1)]
-SIDES = [(1, 3, 4, 2), (5, 6, 8, 7), (1, 2, 6, 5), (3, 7, 8, 4), (1, 5, 7, 3),
-         (2, 4, 8, 6)]  # fmt: skip
 TRIANGLES = [t for a, b, c, d in SIDES for t in ((a, b, c), (a, c, d))]
 TETRAHEDRA = [(1, 2, 4, 6), (1, 4, 3, 7), (1, 4, 7, 6), (1, 6, 7, 5), (4, 8, 7, 6)]
 
@@ -129,29 +127,35 @@ def test_step_file_is_read_in_its_own_unit_and_its_cylinders_are_recognised(
         assert min(abs(shape.radius - r) for r in (0.02, 0.015)) < 1e-9
 
 
-TWO_SOLIDS = """
+SCRIPT = """
 import sys
 import gmsh
 gmsh.initialize(interruptible=False)
 gmsh.option.setNumber("General.Terminal", 0)
-gmsh.model.occ.addCylinder(0, 0, 0, 0, 0, 100, 20)
-gmsh.model.occ.addBox(50, 0, 0, 10, 20, 30)
+{}
 gmsh.model.occ.synchronize()
 gmsh.write(sys.argv[1])
 """
 
 
+def write_step(path, *shapes):
+    """Write a STEP file of several solids.
+
+    Runs in a separate process, because the unit depends on files that were read before.
+    """
+    pytest.importorskip("gmsh", exc_type=(ImportError, OSError))
+    script = SCRIPT.format("\n".join(f"gmsh.model.occ.add{one}" for one in shapes))
+    command = [sys.executable, "-c", script, str(path)]
+    subprocess.run(command, check=True, capture_output=True)
+    return path
+
+
 def test_one_of_several_solids_is_read_by_its_name(tmp_path, run):
     """The file contains a cylinder and a box."""
-    pytest.importorskip("gmsh", exc_type=(ImportError, OSError))
-    path = tmp_path / "two.step"
-    # runs in a separate process, because the unit depends on files that were read
-    # before
-    script = [sys.executable, "-c", TWO_SOLIDS, str(path)]
-    subprocess.run(script, check=True, capture_output=True)
-    with pytest.raises(
-        BadInput, match=r"found 2 solids \(.*\), expected the name"
-    ) as error:
+    shapes = "Cylinder(0, 0, 0, 0, 0, 100, 20)", "Box(50, 0, 0, 10, 20, 30)"
+    path = write_step(tmp_path / "two.step", *shapes)
+    words = r"found 2 solids \(.*\), expected the name"
+    with pytest.raises(BadInput, match=words) as error:
         read_surface(path)
     names = str(error.value).partition("(")[2].partition(")")[0].split(", ")
     volumes = [read_surface(f"{path}#{name}").volume for name in names]
@@ -166,25 +170,12 @@ def test_one_of_several_solids_is_read_by_its_name(tmp_path, run):
     assert [solid["volume"] for solid in solids] == pytest.approx(exact, rel=1e-6)
 
 
-TOUCHING = """
-import sys
-import gmsh
-gmsh.initialize(interruptible=False)
-gmsh.option.setNumber("General.Terminal", 0)
-gmsh.model.occ.addBox(0, 0, 0, 20, 30, 40)
-gmsh.model.occ.addBox(5, 5, 40, 10, 10, 50)
-gmsh.model.occ.addBox(100, 0, 0, 1, 1, 1)
-gmsh.model.occ.synchronize()
-gmsh.write(sys.argv[1])
-"""
-
-
 def test_touching_solids_are_united_and_separate_solids_are_rejected(tmp_path):
     """The file contains two boxes that touch and a separate box."""
-    pytest.importorskip("gmsh", exc_type=(ImportError, OSError))
-    path = tmp_path / "three.step"
-    script = [sys.executable, "-c", TOUCHING, str(path)]
-    subprocess.run(script, check=True, capture_output=True)
+    path = write_step(
+        tmp_path / "three.step", "Box(0, 0, 0, 20, 30, 40)",
+        "Box(5, 5, 40, 10, 10, 50)", "Box(100, 0, 0, 1, 1, 1)",
+    )  # fmt: skip
     solids = step_solids(path)
     assert [s.volume for s in solids] == pytest.approx([24e-6, 5e-6, 1e-9], rel=1e-6)
     assert solids[1].low == pytest.approx((0.005, 0.005, 0.04), abs=1e-6)
@@ -192,13 +183,11 @@ def test_touching_solids_are_united_and_separate_solids_are_rejected(tmp_path):
     one, other, apart = (s.name for s in solids)
     united = read_surface(f"{path}#{one}+{other}")
     assert united.volume == pytest.approx(29e-6, rel=1e-9)
-    for whole in (f"{one}+{apart}", "*"):
-        with pytest.raises(
-            BadInput, match="solids form 2 separate bodies, expected one"
-        ):
-            read_surface(f"{path}#{whole}")
-    with pytest.raises(BadInput, match='no solid "screw"'):
-        read_surface(f"{path}#{one}+screw")
+    separate = "solids form 2 separate bodies, expected one"
+    for name, words in ((f"{one}+{apart}", separate), ("*", separate),
+                        (f"{one}+screw", 'no solid "screw"')):  # fmt: skip
+        with pytest.raises(BadInput, match=words):
+            read_surface(f"{path}#{name}")
 
 
 @pytest.mark.parametrize("binary", [0, 1])
@@ -219,9 +208,8 @@ def test_files_written_by_gmsh_are_read(tmp_path, gmsh, version, binary, dimensi
 def test_damaged_step_file_is_rejected(tmp_path, gmsh):
     path = tmp_path / "part.step"
     path.write_text("rubbish")
-    with pytest.raises(
-        BadInput, match="not a readable STEP file|contains no triangles"
-    ):
+    words = "not a readable STEP file|contains no triangles"
+    with pytest.raises(BadInput, match=words):
         read_surface(path)
 
 
@@ -242,9 +230,8 @@ def test_reader_is_stopped_at_its_time_limit(tmp_path, monkeypatch):
     path = tmp_path / "part.vtk"
     path.write_text("# vtk DataFile Version 3.0\n")
     monkeypatch.setattr(surface_files, "_TIME_LIMIT", 0.001)
-    with pytest.raises(
-        BadInput, match=r"part\.vtk: the file was not read as VTK within 0\.001 s"
-    ):
+    words = r"part\.vtk: the file was not read as VTK within 0\.001 s"
+    with pytest.raises(BadInput, match=words):
         read_surface(path)
 
 
