@@ -3,11 +3,7 @@
 import numpy as np
 import pytest
 
-from forcefit.stiffness.fem.condensation import (
-    KINDS,
-    _distributed_loads,
-    condense,
-)
+from forcefit.stiffness.fem.condensation import KINDS, _distributed_loads, condense
 from forcefit.stiffness.fem.elements import assemble, isoparametric
 from forcefit.stiffness.link import scaled
 from tests.solids_for_tests import box_solid, constants

@@ -8,12 +8,7 @@ from scipy.sparse.linalg import eigsh
 from forcefit.stiffness.beam.beam import beam_compliance
 from forcefit.stiffness.beam.sections import rectangular_section, round_section
 from forcefit.stiffness.fem.condensation import KINDS, condense, rigid_motions
-from forcefit.stiffness.fem.elements import (
-    assemble,
-    integration,
-    isoparametric,
-    lame,
-)
+from forcefit.stiffness.fem.elements import assemble, integration, isoparametric, lame
 from forcefit.stiffness.fem.sparse_solver import solve
 from forcefit.stiffness.link import inverted, scaled
 from forcefit.stiffness.mesh.edge_grading import layered, split_joining_edges

@@ -7,16 +7,10 @@ import pytest
 
 from forcefit.stiffness.beam.beam import beam_compliance
 from forcefit.stiffness.beam.sections import round_section
-from forcefit.stiffness.fem.adaptive_step import (
-    estimated_error,
-    solve_level,
-)
+from forcefit.stiffness.fem.adaptive_step import estimated_error, solve_level
 from forcefit.stiffness.fem.condensation import condense, rigid_motions
 from forcefit.stiffness.fem.elements import integration, isoparametric
-from forcefit.stiffness.fem.error_indicator import (
-    error_matrices,
-    geometry_errors,
-)
+from forcefit.stiffness.fem.error_indicator import error_matrices, geometry_errors
 from forcefit.stiffness.fem.material import Material
 from forcefit.stiffness.link import inverted, scaled
 from forcefit.stiffness.surface.primitives import Cone

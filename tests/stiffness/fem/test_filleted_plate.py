@@ -12,9 +12,7 @@ BOUNDS = [45822, 48702, 9.5734e6, 1.04078e9, 2.89622e8, 2.92001e6]
 
 
 @pytest.mark.slow
-def test_stiffness_of_a_filleted_plate_is_below_upper_bounds(
-    tmp_path,
-):
+def test_stiffness_of_a_filleted_plate_is_below_upper_bounds(tmp_path):
     """The volume agrees with the exact volume to 0.01 %, and no element is flat."""
     options = FemOptions(0.1, cache=tmp_path)
     materials = [Material(7e10, 0.3)]

@@ -4,14 +4,9 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from forcefit.stiffness.fem.elements import (
-    isoparametric,
-)
+from forcefit.stiffness.fem.elements import isoparametric
 from forcefit.stiffness.fem.error_indicator import VOIGT
-from forcefit.stiffness.fem.stress import (
-    _nodal_stresses,
-    von_mises,
-)
+from forcefit.stiffness.fem.stress import _nodal_stresses, von_mises
 from forcefit.stiffness.fem.stress_error import nodes_by_material
 from forcefit.stiffness.screws import rotation_matrix
 from tests.solids_for_tests import box_solid

@@ -20,9 +20,7 @@ def bar(request):
     return solve_bar(SECTION, Material(2e11, 0.3, DENSITY), options)
 
 
-def test_bending_stress_of_a_heavy_cantilever_equals_beam_theory(
-    bar,
-):
+def test_bending_stress_of_a_heavy_cantilever_equals_beam_theory(bar):
     """The bending moment is rho g A (L - z)^2 / 2."""
     field = stress_influence(with_own_weight(bar), 0.1)
     stress = field.stresses(np.r_[np.zeros(6), 0.0, -G, 0.0])[:, 2]

@@ -5,10 +5,7 @@ import pytest
 from scipy.optimize import brentq
 
 from forcefit.stiffness.fem.elements import isoparametric, lame
-from forcefit.stiffness.fem.error_indicator import (
-    error_matrices,
-    traction_errors,
-)
+from forcefit.stiffness.fem.error_indicator import error_matrices, traction_errors
 from forcefit.stiffness.mesh.quadrature import quadrature
 from tests.solids_for_tests import box_solid, constants
 

@@ -4,40 +4,16 @@ import numpy as np
 import pytest
 
 from forcefit.inputs.table import BadInput
-from forcefit.stiffness.fem.adaptive_step import solve_level
-from forcefit.stiffness.fem.fea import MeshedLink
-from forcefit.stiffness.fem.material import Material
 from forcefit.stiffness.fem.stress import peak_stress, stress_influence
-from forcefit.stiffness.link import LinkStiffness, inverted
 from forcefit.stiffness.report.plot import plot_stress
 from forcefit.stiffness.report.results import stress_results, stress_text
 from tests.solids_for_tests import bar_solid
-
-R, L = 0.04, 0.4
-AREA, SECOND = np.pi * R**2, np.pi / 4 * R**4
+from tests.stiffness.fem.test_stress_error import AREA, SECOND, L, R, meshed
 
 
 @pytest.fixture(scope="module")
 def solved():
-    centers = np.array([[0, 0, 0], [0, 0, L]])
-    steel = [Material(60e9, 0.3, 2700.0)]
-    level = solve_level(bar_solid(2, 20, R, L), steel, centers, "rigid")
-    C = inverted(level.solution.stiffness)
-    link = LinkStiffness("test", C, tip=centers[1], base=centers[0])
-    return MeshedLink(link, level, centers)
-
-
-@pytest.mark.parametrize(("wrench", "expected"), [
-    ([0, 0, 0, 0, 0, 1e3], 1e3 / AREA),
-    ([1e3, 0, 0, 0, 0, 0], 1e3 * R / SECOND),
-    ([0, 0, 1e3, 0, 0, 0], np.sqrt(3) * 1e3 * R / (2 * SECOND)),
-])  # fmt: skip
-def test_stress_in_the_middle_of_a_bar_equals_textbook_values(solved, wrench, expected):
-    """The end effects are negligible at a distance of four radii from both ends. The
-    tolerance of 0.3 % is the mesh error.
-    """
-    stress = stress_influence(solved, away=4 * R)
-    assert stress.peak(wrench)[0] == pytest.approx(expected, rel=3e-3)
+    return meshed(bar_solid(2, 20, R, L), [0.0, 0.0, L])
 
 
 def test_stress_of_a_bar_in_tension_is_axial_only(solved):

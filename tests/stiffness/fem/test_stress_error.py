@@ -47,9 +47,11 @@ def bar(request):
 ])  # fmt: skip
 def test_stress_of_a_bar_agrees_within_the_estimated_error(bar, wrench, expected):
     """The stress is compared with F / A, M R / I and T R / J at a distance of four
-    radii from the ends.
+    radii from the ends.  The mesh error of the fine mesh is 0.3 %.
     """
     peak = peak_stress(bar, wrench, away=4 * R)
+    if len(bar.level.mesh.cells) > 1000:
+        assert peak.von_mises == pytest.approx(expected, rel=3e-3)
     assert abs(peak.von_mises - expected) <= peak.error + 1e-3 * expected
     assert peak.error < 0.25 * expected
     assert "inner edges" not in peak.region
