@@ -10,10 +10,7 @@ from forcefit.stiffness.fem.elements import (
     triangle_areas,
 )
 from forcefit.stiffness.fem.error_indicator import geometry_errors
-from forcefit.stiffness.mesh.curved_elements import (
-    curved_elements,
-    refine_inverted,
-)
+from forcefit.stiffness.mesh.curved_elements import curved_elements, refine_inverted
 from forcefit.stiffness.mesh.edge_grading import layered, split_joining_edges
 from forcefit.stiffness.mesh.lagrange import lattice, shape_functions
 from forcefit.stiffness.mesh.solid import Solid, boundary_faces

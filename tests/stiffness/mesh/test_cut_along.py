@@ -68,9 +68,7 @@ def test_interface_without_a_sharp_edge_has_the_exact_area(tmp_path):
 
 
 @pytest.mark.slow
-def test_stiffness_of_a_rounded_block_is_symmetric_and_below_an_upper_bound(
-    tmp_path,
-):
+def test_stiffness_of_a_rounded_block_is_symmetric_and_below_an_upper_bound(tmp_path):
     """Entries of K are zero because of symmetry planes. The upper bound on K_RZ is 119
     142 N m/rad, computed by another program.
     """

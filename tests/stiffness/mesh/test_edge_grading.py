@@ -13,10 +13,7 @@ from forcefit.stiffness.mesh.edge_grading import (
 )
 from forcefit.stiffness.mesh.lagrange import FACES
 from forcefit.stiffness.mesh.refine import edges_of
-from tests.solids_for_tests import (
-    masked_solid,
-    with_plane_sides,
-)
+from tests.solids_for_tests import masked_solid, with_plane_sides
 
 SIZE = np.array([0.2, 0.2, 0.3])
 CLAMPED = [(0, 1), (0,), ()]  # clamped patches: both ends, the base, none

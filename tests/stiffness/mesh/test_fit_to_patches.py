@@ -21,9 +21,8 @@ ENDS = parse_interface("z=0"), parse_interface("z=0.1")
 @pytest.mark.parametrize("stretch", [0.979, 1.021])
 def test_mesh_with_a_wrong_volume_is_rejected(stretch):
     made = box_solid((2, 2, 2), (0.1, 0.1, 0.1 * stretch))
-    with pytest.raises(
-        MeshFailed, match="the volume of the mesh is 0.00.* inside the surface"
-    ):
+    words = "the volume of the mesh is 0.00.* inside the surface"
+    with pytest.raises(MeshFailed, match=words):
         fit_to_patches(made.points, made.cells, SURFACE, find_patches(SURFACE, *ENDS))
 
 

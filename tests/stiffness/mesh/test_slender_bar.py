@@ -7,6 +7,7 @@ from forcefit.stiffness.fem.fea import FemOptions, solve_link
 from forcefit.stiffness.fem.material import Material
 from forcefit.stiffness.mesh.slender_bar import slender_bar
 from forcefit.stiffness.screws import rotation_matrix
+from forcefit.stiffness.surface.beam_surfaces import shape_surface
 from forcefit.stiffness.surface.interface import Interface, parse_interface
 from forcefit.stiffness.surface.surface import check_surface
 from tests.solids_for_tests import cylinder
@@ -23,14 +24,8 @@ def tube(outer, inner, length):
 
 def box(width, height, length):
     """Return the surface of a solid bar along z."""
-    x, y = width / 2, height / 2
-    points = np.array([
-        [i, j, k] for i in (-x, x) for j in (-y, y) for k in (0, length)
-    ])
-    sides = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4],
-             [1, 5, 7, 3]]  # fmt: skip
-    triangles = [[s[i] for i in turn] for s in sides for turn in ([0, 1, 2], [0, 2, 3])]
-    return check_surface(points, np.array(triangles), "strip")
+    lengths = {"width": width, "height": height, "length": length}
+    return shape_surface("rectangle", lengths)
 
 
 def ends(length):
