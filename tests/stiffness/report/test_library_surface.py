@@ -15,21 +15,11 @@ from forcefit.stiffness.beam.beam import beam_compliance
 from forcefit.stiffness.beam.sections import rectangular_section
 from forcefit.stiffness.link import LinkStiffness, inverted, scaled
 from forcefit.stiffness.report.export import library_csv
-from forcefit.stiffness.report.library import (
-    look_up,
-    read_compliance,
-    read_entry,
-)
-from forcefit.stiffness.report.library_build import Spec, build_library, read_spec
+from forcefit.stiffness.report.library import look_up, read_compliance, read_entry
+from forcefit.stiffness.report.library_build import build_library, read_spec
 from forcefit.stiffness.report.library_surface import SurfaceLink
 from forcefit.stiffness.surface.beam_surfaces import shape_surface
-from tests.libraries_for_tests import GRID, MATERIAL, SPEC, exact
-
-
-@pytest.fixture
-def spec(tmp_path):
-    return Spec(tmp_path / "links", "round", "beam", GRID | MATERIAL)
-
+from tests.libraries_for_tests import SPEC, exact
 
 LINKS = """
 library = "links"
