@@ -1,7 +1,6 @@
 """Tests of the compliance and the stiffness of beams."""
 
 import math
-import re
 
 import numpy as np
 import pytest
@@ -114,15 +113,14 @@ def test_round_section_constants_equal_hand_calculation():
     (lambda: beam_compliance(1, SECTION, -E, NU), "E = -6e+10"),
     (lambda: beam_compliance(1, SECTION, E, NU, theory="eular"), '"euler"?'),
     (lambda: beam_compliance(1, SECTION, E, NU, axis=[0, 0, 0]), "axis is zero"),
-    (
-        lambda: beam_compliance(1, SECTION, E, NU, axis=[1, math.nan, 0]),
-        "expected 3 finite numbers",
-    ),
-    (
-        lambda: beam_compliance(1, SECTION, E, NU, axis=[0, 0, 1], up=[0, 0, 2]),
-        "lies along the axis",
-    ),
+    (lambda: beam_compliance(1, SECTION, E, NU, axis=[1, math.nan, 0]),
+     "expected 3 finite numbers"),
+    (lambda: beam_compliance(1, SECTION, E, NU, axis=[0, 0, 1], up=[0, 0, 2]),
+     "lies along the axis"),
     (lambda: Section(1, 1, 1, 0, 1, 1), "section: J = 0 must be finite and > 0"),
+    (lambda: beam_compliance(1, {"radus": 0.02}, E, NU), 'unknown "radus"; did you'),
+    (lambda: beam_compliance(1, 0.02, E, NU),
+     'section: found 0.02, expected {"radius": 0.02}'),
 ])  # fmt: skip
 def test_invalid_beam_is_rejected(call, message):
     with pytest.raises(BadInput) as caught:
@@ -181,15 +179,3 @@ def test_bending_of_a_section_given_by_dimensions_equals_textbook_value(
     """The deflection is F L^3 / (3 E I) along y, which is the default of ``up``."""
     C = beam_compliance(0.5, section, E=7e10, nu=0.33, theory="euler")
     assert C[4, 4] == pytest.approx(0.5**3 / (3 * 7e10 * moment), rel=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("section", "message"),
-    [
-        ({"radus": 0.02}, 'section: unknown "radus"; did you mean'),
-        (0.02, 'section: found 0.02, expected {"radius": 0.02}'),
-    ],
-)
-def test_invalid_section_is_rejected(section, message):
-    with pytest.raises(BadInput, match=re.escape(message)):
-        beam_compliance(0.5, section, E=7e10, nu=0.33)

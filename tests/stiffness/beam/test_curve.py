@@ -24,18 +24,15 @@ from forcefit.stiffness.beam.sections import (
 )
 from forcefit.stiffness.fem.condensation import condense
 from forcefit.stiffness.fem.elements import isoparametric, lame
-from forcefit.stiffness.link import inverted, scaled
+from forcefit.stiffness.link import inverted
 from forcefit.stiffness.screws import rotation_matrix, screw_map
 from tests.solids_for_tests import bar_solid, box_solid, masked_solid
+from tests.stiffness.beam.test_beam import assert_same
 
 E, NU = 60e9, 0.3
 G = E / (2 * (1 + NU))
 BAR = round_section(0.01, NU)
 CROOKED = Section(1.2e-3, 4e-8, 9e-8, 7e-8, 0.8, 0.6)
-
-
-def assert_same(matrix, expected, tol):
-    np.testing.assert_allclose(scaled(matrix - expected, expected), 0, atol=tol)
 
 
 def test_compliance_of_a_straight_segment_equals_that_of_a_beam(rng):
@@ -50,10 +47,8 @@ def test_compliance_of_an_l_shape_equals_that_of_two_beams_in_series():
     second = beam_compliance(0.15, CROOKED, E, NU, axis=[1, 0, 0], up=[0, 1, 0])
     A = screw_map([-0.15, 0, 0])
     corner, tip = [0, 0, 0.2], [0.15, 0, 0.2]
-    pieces = [
-        straight_piece([0, 0, 0], corner, CROOKED, [0, 1, 0]),
-        straight_piece(corner, tip, CROOKED, [0, 1, 0]),
-    ]
+    ends = ([0, 0, 0], corner), (corner, tip)
+    pieces = [straight_piece(*pair, CROOKED, [0, 1, 0]) for pair in ends]
     assert_same(curve_compliance(pieces, E, NU), A @ first @ A.T + second, 1e-13)
 
 
@@ -195,16 +190,13 @@ def test_dividing_a_curve_does_not_change_compliance_and_length(away, size):
     middle = half.place(1.0)
     end = arc_piece(o, centre, turn, CROOKED).place(1.0)
     assert np.linalg.norm(end - centre) == pytest.approx(0.2 * size)
-    one = [
-        straight_piece(corner, o, CROOKED, [0, 1, 0]),
-        arc_piece(o, centre, turn, CROOKED),
-    ]
-    cut = [
-        straight_piece(corner, (corner + o) / 2, CROOKED, [0, 1, 0]),
-        straight_piece((corner + o) / 2, o, CROOKED, [0, 1, 0]),
-        half,
-        arc_piece(middle, centre, turn / 2, CROOKED),
-    ]
+
+    def leg(start, end):
+        return straight_piece(start, end, CROOKED, [0, 1, 0])
+
+    one = [leg(corner, o), arc_piece(o, centre, turn, CROOKED)]
+    cut = [leg(corner, (corner + o) / 2), leg((corner + o) / 2, o), half]
+    cut.append(arc_piece(middle, centre, turn / 2, CROOKED))
     assert_same(curve_compliance(cut, E, NU), curve_compliance(one, E, NU), 1e-9)
     for pieces in (one, cut):
         assert curve_length(pieces) == pytest.approx((0.3 + 0.2 * 0.6) * size)

@@ -29,29 +29,26 @@ def composed(*parts):
 def test_constants_of_an_i_section_equal_sums_over_web_and_flanges():
     section = i_section(0.06, 0.1, 0.006, 0.008, NU)
     middle = (0.1 - 0.008) / 2
-    area, I_y, I_z = composed(
+    expected = composed(
         (0.006, 0.1 - 2 * 0.008, 0.0, 0.0),
         (0.06, 0.008, 0.0, middle),
         (0.06, 0.008, 0.0, -middle),
     )
-    assert section.area == pytest.approx(area, rel=1e-12)
-    assert section.I_y == pytest.approx(I_y, rel=1e-12)
-    assert section.I_z == pytest.approx(I_z, rel=1e-12)
-    # an open thin wall has J = length times thickness^3 / 3
-    assert section.J == pytest.approx(
-        (2 * 0.06 * 0.008**3 + 0.092 * 0.006**3) / 3, rel=1e-12
+    assert (section.area, section.I_y, section.I_z) == pytest.approx(
+        expected, rel=1e-12
     )
+    # an open thin wall has J = length times thickness^3 / 3
+    J = (2 * 0.06 * 0.008**3 + 0.092 * 0.006**3) / 3
+    assert section.J == pytest.approx(J, rel=1e-12)
 
 
 def test_constants_of_a_box_section_equal_sums_over_its_four_walls():
     box = declared_section({"width": 0.06, "height": 0.1, "wall": 0.004}, NU)
-    area, I_y, I_z = composed(
+    expected = composed(
         (0.06, 0.004, 0.0, 0.048), (0.06, 0.004, 0.0, -0.048),
         (0.004, 0.092, 0.028, 0.0), (0.004, 0.092, -0.028, 0.0),
     )  # fmt: skip
-    assert box.area == pytest.approx(area, rel=1e-12)
-    assert box.I_y == pytest.approx(I_y, rel=1e-12)
-    assert box.I_z == pytest.approx(I_z, rel=1e-12)
+    assert (box.area, box.I_y, box.I_z) == pytest.approx(expected, rel=1e-12)
     # Bredt's formula 4 A^2 t / length, plus the torsion constant of an open wall
     b, h, t = 0.056, 0.096, 0.004
     bredt = 4 * (b * h) ** 2 * t / (2 * (b + h))
@@ -67,10 +64,8 @@ def test_torsion_constant_of_a_rectangle_equals_saint_venants_series(width, heig
     tail = sum(math.tanh(n * math.pi * a / (2 * b)) / n**5 for n in range(1, 2001, 2))
     J = 16 * a * b**3 * (1 / 3 - 64 * b / (math.pi**5 * a) * tail)
     assert rectangle.J == pytest.approx(J, rel=1e-9)
-    area, I_y, I_z = composed((width, height, 0.0, 0.0))
-    assert (rectangle.area, rectangle.I_y, rectangle.I_z) == pytest.approx(
-        (area, I_y, I_z), rel=1e-12
-    )
+    found = rectangle.area, rectangle.I_y, rectangle.I_z
+    assert found == pytest.approx(composed((width, height, 0.0, 0.0)), rel=1e-12)
 
 
 def test_section_check_rejects_implausible_sizes():
