@@ -7,10 +7,9 @@ from scipy.sparse import csc_array, tril
 from forcefit.inputs.errors import BadInput
 from forcefit.stiffness.exchange.import_link import import_link
 from forcefit.stiffness.exchange.matrix_file import read_matrix
-from tests.stiffness.exchange.test_full_matrices import full_matrix, write_solid
+from tests.stiffness.exchange.test_full_matrices import ENDS, solid_in
 from tests.stiffness.exchange.test_links_of_others import assert_same
 
-ENDS = {"base": "z=0", "tip": "z=0.2"}
 HEAD = "%%MatrixMarket matrix coordinate real {}\n%===\n% Creator: ANSYS Inc\n%===\n"
 
 
@@ -60,13 +59,12 @@ def mapping(freedoms):
 
 @pytest.fixture
 def solid(tmp_path):
-    """Return a folder with the files of a solid, its matrix in random row order, and
-    this order."""
-    nodes, K = full_matrix((1, 1, 2))
-    write_solid(tmp_path, nodes, K)
+    """Return a folder with the files of a solid, its matrix in random row order, this
+    order and the expected stiffness."""
+    nodes, K, expected = solid_in(tmp_path)
     order = np.random.default_rng(2).permutation(len(nodes))
     rows = (3 * order[:, None] + np.arange(3)).ravel()
-    return tmp_path, K.tocsr()[rows][:, rows], order
+    return tmp_path, K.tocsr()[rows][:, rows], order, expected.stiffness
 
 
 @pytest.mark.parametrize("symmetry", ["symmetric", "general"])
@@ -74,18 +72,16 @@ def test_matrix_market_rows_have_the_order_of_the_node_vector(solid, symmetry):
     """The file contains only one triangle of the matrix, although its header declares a
     general matrix.
     """
-    folder, K, order = solid
-    expected = import_link(folder / "k.mtx", nodes=folder / "nodes.csv", **ENDS)
+    folder, K, order, expected = solid
     (folder / "full.mmf").write_text(matrix_market(K, symmetry))
     (folder / "full.mapping").write_text(node_vector((order + 1).tolist()))
     link = import_link(folder / "full.mmf", nodes=folder / "nodes.csv", **ENDS)
-    assert_same(link.stiffness, expected.stiffness)
+    assert_same(link.stiffness, expected)
 
 
 @pytest.mark.parametrize("kind", ["RSA", "RUA"])
 def test_harwell_boeing_rows_have_the_order_of_the_mapping_file(solid, kind):
-    folder, K, order = solid
-    expected = import_link(folder / "k.mtx", nodes=folder / "nodes.csv", **ENDS)
+    folder, K, order, expected = solid
     freedoms = [(node + 1, d) for node in order.tolist() for d in (1, 2, 3)]
     shuffled = np.random.default_rng(4).permutation(len(freedoms))
     K = K[shuffled][:, shuffled]
@@ -97,13 +93,12 @@ def test_harwell_boeing_rows_have_the_order_of_the_mapping_file(solid, kind):
         folder / "stiff.matrix", mass=folder / "mass.matrix",
         nodes=folder / "nodes.csv", **ENDS,
     )  # fmt: skip
-    assert_same(link.stiffness, expected.stiffness)
+    assert_same(link.stiffness, expected)
     assert link.mass == pytest.approx(0.324)
 
 
 def test_node_file_with_decimal_commas_is_read(solid):
-    folder, K, order = solid
-    expected = import_link(folder / "k.mtx", nodes=folder / "nodes.csv", **ENDS)
+    folder, K, order, expected = solid
     places = [line.split(",") for line in (folder / "nodes.csv").read_text().split()]
     lines = ["\t".join(words).replace(".", ",") + "\t" for words in places]
     head = "Node Number\tX Location (m)\tY Location (m)\tZ Location (m)\t"
@@ -111,7 +106,7 @@ def test_node_file_with_decimal_commas_is_read(solid):
     (folder / "full.mtx").write_text(matrix_market(K))
     (folder / "full.mapping").write_text(node_vector((order + 1).tolist()))
     link = import_link(folder / "full.mtx", nodes=folder / "nodes.txt", **ENDS)
-    assert_same(link.stiffness, expected.stiffness)
+    assert_same(link.stiffness, expected)
     with pytest.raises(
         BadInput, match="lengths in the file are in m, but --unit is different"
     ):

@@ -33,6 +33,17 @@ def write_solid(folder, nodes, K):
     ))  # fmt: skip
 
 
+ENDS = {"base": "z=0", "tip": "z=0.2"}
+
+
+def solid_in(folder):
+    """Write a small solid, and return its nodes, its matrix and its imported link."""
+    nodes, K = full_matrix((1, 1, 2))
+    write_solid(folder, nodes, K)
+    link = import_link(folder / "k.mtx", nodes=folder / "nodes.csv", **ENDS)
+    return nodes, K, link
+
+
 def deck(nodes, order):
     """Return an input file of Abaqus or CalculiX."""
     lines = [f"{i + 1:7}, {x!r}, {y!r}, {z!r}" for i, (x, y, z) in order(nodes)]
@@ -54,14 +65,11 @@ def backwards(nodes):
 @pytest.mark.parametrize("order", [in_order, backwards])
 def test_three_column_matrix_has_the_nodes_of_the_input_file(order, tmp_path):
     """The file does not name its rows. There are three rows for each node."""
-    nodes, K = full_matrix((1, 1, 2))
-    write_solid(tmp_path, nodes, K)
-    ends = {"base": "z=0", "tip": "z=0.2"}
-    named = import_link(tmp_path / "k.mtx", nodes=tmp_path / "nodes.csv", **ends)
+    nodes, K, named = solid_in(tmp_path)
     rows = [3 * i + d for i, _ in order(nodes) for d in range(3)]
     (tmp_path / "k.mtx").write_text(three_columns(K.toarray()[np.ix_(rows, rows)]))
     (tmp_path / "bar.inp").write_text(deck(nodes, order))
-    link = import_link(tmp_path / "k.mtx", nodes=tmp_path / "bar.inp", **ends)
+    link = import_link(tmp_path / "k.mtx", nodes=tmp_path / "bar.inp", **ENDS)
     assert_same(link.stiffness, named.stiffness)
 
 
@@ -70,10 +78,7 @@ def test_calculix_stiffness_mass_and_dof_files_are_read(tmp_path):
     """The ``.sti`` and ``.mas`` files contain upper triangles, and the ``.dof`` file
     names their rows.
     """
-    nodes, K = full_matrix((1, 1, 2))
-    write_solid(tmp_path, nodes, K)
-    ends = {"base": "z=0", "tip": "z=0.2"}
-    named = import_link(tmp_path / "k.mtx", nodes=tmp_path / "nodes.csv", **ends)
+    nodes, K, named = solid_in(tmp_path)
     rows = np.random.default_rng(3).permutation(3 * len(nodes))
     K = K.toarray()[np.ix_(rows, rows)]
     kilograms = np.full(len(rows), 0.324 / len(nodes))
@@ -86,13 +91,13 @@ def test_calculix_stiffness_mass_and_dof_files_are_read(tmp_path):
     (tmp_path / "bar.dof").write_text("\n".join(names))
     link = import_link(
         tmp_path / "bar.sti", mass=tmp_path / "bar.mas", nodes=tmp_path / "nodes.csv",
-        **ends,
+        **ENDS,
     )  # fmt: skip
     assert_same(link.stiffness, named.stiffness)
     assert link.mass == pytest.approx(0.324)
     (tmp_path / "bar.dof").write_text("\n".join(names[:-1]))
     with pytest.raises(BadInput, match=r"bar\.dof: found \d+ freedoms, expected"):
-        import_link(tmp_path / "bar.sti", nodes=tmp_path / "nodes.csv", **ends)
+        import_link(tmp_path / "bar.sti", nodes=tmp_path / "nodes.csv", **ENDS)
 
 
 @pytest.mark.slow
@@ -102,9 +107,7 @@ def test_condensed_solid_agrees_with_exudyn(tmp_path):
     fem = pytest.importorskip("exudyn.FEM")
     nodes, K = full_matrix()
     write_solid(tmp_path, nodes, K)
-    link = import_link(
-        tmp_path / "k.mtx", nodes=tmp_path / "nodes.csv", base="z=0", tip="z=0.2"
-    )
+    link = import_link(tmp_path / "k.mtx", nodes=tmp_path / "nodes.csv", **ENDS)
     ends = [np.flatnonzero(np.abs(nodes[:, 2] - z) < 1e-9) for z in (0, 0.2)]
     other = fem.FEMinterface()
     other.nodes = {"Position": nodes}

@@ -122,9 +122,7 @@ def test_wrong_dmig_is_rejected(text, message, tmp_path):
         read_matrix(path)
 
 
-def test_mass_matrix_with_an_unknown_name_is_read(
-    tmp_path,
-):
+def test_mass_matrix_with_an_unknown_name_is_read(tmp_path):
     path = tmp_path / "k.pch"
     path.write_text(large_fields(textbook_beam(), "KAAX"))
     with pytest.raises(BadInput, match=r"KAAX \(stiffness\), expected one mass"):
