@@ -24,6 +24,7 @@ from forcefit.validation.multibody.contact import (
 )
 from forcefit.validation.multibody.exudyn_parts import OutOfTime
 from forcefit.validation.multibody.simulation import SimulationModel, simulate_assembly
+from tests.robots_for_tests import with_frames
 
 pytestmark = pytest.mark.exudyn
 
@@ -176,19 +177,13 @@ def test_energy_with_clearances_agrees_with_the_exact_model(irsbot2):
     assert abs(check.metric.energies["linear"][0]) > 1e-2
 
 
-def heavy(length=0.4):
+def heavy():
     """Return two heavy, misaligned beams with bodies of 6 kg and a clearance."""
-    frames = coaxial(
-        [0, 0, 0, 6e-5, 2e-5, 5e-5], Clearance(radial=2e-5, axial=2e-5), length
-    ).robot.frames
-    frames = tuple(
-        replace(
-            f, link=replace(f.link, density=2000.0), mass=6.0,
-            centre_of_mass=[0.0, 0.01, 0.02],
-        ) if f.link is not None else f
-        for f in frames
-    )  # fmt: skip
-    return home_posture(Robot("heavy", "a_tip", frames, (("a_tip", "b"),)))
+    light = coaxial([0, 0, 0, 6e-5, 2e-5, 5e-5], Clearance(radial=2e-5, axial=2e-5))
+    return home_posture(with_frames(
+        light.robot, lambda f: f.link is not None, mass=6.0,
+        link=replace(ROUND, density=2000.0), centre_of_mass=[0.0, 0.01, 0.02],
+    ))  # fmt: skip
 
 
 @pytest.mark.parametrize("links", ["beam", "spring"])

@@ -13,12 +13,15 @@ from forcefit.assembly.model.error_distributions import tolerance_sources
 from forcefit.assembly.model.robot import BeamLink, Clearance, Frame, Robot
 from forcefit.assembly.robots import load_robot
 from forcefit.validation.crosscheck.crosscheck import attempt, crosscheck
+from tests.multibody_for_tests import block
 from tests.mutations_for_tests import BEAM_MUTATIONS, MUTATIONS
-from tests.robots_for_tests import with_papers_errors
+from tests.robots_for_tests import with_frames, with_papers_errors
 
 pytestmark = pytest.mark.exudyn
 
 STEEL = BeamLink({"radius": 0.01}, 200e9, 0.3)
+BENT = [1e-3, -2e-3, 1e-3, 1e-4, 2e-4, -1e-4]
+LOAD = [5.0, -8.0, 3.0, 100.0, 300.0, -200.0]
 
 
 def triangle(error):
@@ -37,9 +40,7 @@ def triangle(error):
     return home_posture(Robot("triangle", "a_tip", frames, (("a_tip", "b_tip"),)))
 
 
-def test_pose_difference_of_irsbot2_has_slope_two(
-    posture,
-):
+def test_pose_difference_of_irsbot2_has_slope_two(posture):
     """The limits of both models agree, too."""
     result = crosscheck(posture)
     assert result.passed
@@ -61,15 +62,17 @@ def test_crosscheck_passes_over_poses_and_draws(signed):
             assert crosscheck(place).passed, (seed, tx, tz)
 
 
-def test_exact_model_explains_the_pose_difference(
-    posture,
-):
+def test_exact_model_explains_the_pose_difference(posture):
     """If links are beams, their finite bending remains."""
     springs = crosscheck(posture, links="spring")
     assert springs.passed
     assert max(springs.metric.unexplained.values()) < 1e-3
     beams = crosscheck(posture)
     assert max(beams.metric.unexplained.values()) < 0.1
+
+
+def failed_checks(result):
+    return [name for name, check in result.checks.items() if check.verdict == "fails"]
 
 
 def test_crosscheck_fails_for_wrong_errors_in_the_exact_model(posture, monkeypatch):
@@ -81,8 +84,7 @@ def test_crosscheck_fails_for_wrong_errors_in_the_exact_model(posture, monkeypat
 
     monkeypatch.setattr("forcefit.validation.crosscheck.pair.solve_exact", wrong)
     result = crosscheck(posture, links="spring")
-    failed = [name for name, check in result.checks.items() if check.verdict == "fails"]
-    assert failed == [
+    assert failed_checks(result) == [
         "rotation that finite rotations do not explain",
         "translation that finite rotations do not explain",
     ]
@@ -91,15 +93,11 @@ def test_crosscheck_fails_for_wrong_errors_in_the_exact_model(posture, monkeypat
 @pytest.mark.parametrize("links", ["beam", "spring"])
 def test_crosscheck_with_weight_passes(links):
     """The bars are heavy, and the centres of mass are not at the frame origins."""
-    posture = triangle([1e-3, -2e-3, 1e-3, 1e-4, 2e-4, -1e-4])
-    heavy = replace(STEEL, density=7800.0)
-    frames = tuple(
-        replace(f, link=heavy, mass=3.0, centre_of_mass=[0.02, 0.05, -0.03])
-        if f.link is not None
-        else f
-        for f in posture.robot.frames
-    )
-    posture = home_posture(replace(posture.robot, frames=frames))
+    posture = triangle(BENT)
+    posture = home_posture(with_frames(
+        posture.robot, lambda f: f.link is not None, mass=3.0,
+        link=replace(STEEL, density=7800.0), centre_of_mass=[0.02, 0.05, -0.03],
+    ))  # fmt: skip
     check = crosscheck(posture, links=links, gravity=[1.0, -2.0, -9.81])
     assert check.passed, check.checks
     light = crosscheck(posture, links=links)
@@ -141,7 +139,7 @@ def test_crosscheck_fails_for_a_wrong_weight_in_the_exact_model(monkeypatch):
         lambda at, w, b, g, p: right(at, w, b, 1.05 * np.asarray(g), p),
     )  # fmt: skip
     result = crosscheck(erring("3rrr", 2700.0), links="spring", gravity=[2, -3, -9.81])
-    failed = [name for name, check in result.checks.items() if check.verdict == "fails"]
+    failed = failed_checks(result)
     assert failed
     assert all("do not explain" in name for name in failed)
 
@@ -155,13 +153,12 @@ def test_free_rotation_of_rods_under_a_load_is_reported():
     still = crosscheck(erring("delta", 1600.0), (1.0, 0.5))
     assert still.passed, still.text()
     assert not still.pairs[0].simulated.held
-    pushed = crosscheck(erring("delta", 1600.0), (1.0, 0.5), load=[0, 0, 0, 50, 20, -9])
+    load = [0, 0, 0, 50, 20, -9]
+    pushed = crosscheck(erring("delta", 1600.0), (1.0, 0.5), load=load)
     assert all(pair.simulated.held for pair in pushed.pairs)
     assert "free motions have springs of" in pushed.text()
     assert max(check.value for check in pushed.metric.limits.values()) < 1e-3
-    springs = crosscheck(
-        erring("delta", 1600.0), (1.0, 0.5), load=[0, 0, 0, 50, 20, -9], links="spring"
-    )
+    springs = crosscheck(erring("delta", 1600.0), (1.0, 0.5), load, links="spring")
     assert springs.passed, springs.text()
     shares = [c for k, c in springs.checks.items() if "do not explain" in k]
     assert [check.verdict for check in shares] == ["ok", "ok"]
@@ -253,18 +250,10 @@ def test_checks_without_signal_are_counted_separately():
 
 
 def test_crosscheck_that_fails_to_run_reports_its_status():
-    frames = (
-        Frame("a", translation=[1, 0, 0]),
-        Frame("b", translation=[1, 0, 0], geometric_error=[0, 0, 0, 1e-4, 0, 0]),
-    )
-    posture = home_posture(Robot("block", "a", frames, (("a", "b"),)))
-    check, failure = attempt(posture.robot.name, lambda: crosscheck(posture))
+    check, failure = attempt("block", lambda: crosscheck(block()))
     assert check is None
     assert failure["status"] == "cannot assemble"
     assert failure["passed"] is False
-
-
-LOAD = [5.0, -8.0, 3.0, 100.0, 300.0, -200.0]
 
 
 # mutations that are tested by default: the smallest ones, and one of each kind
@@ -288,9 +277,6 @@ def test_crosscheck_fails_for_a_wrong_term_of_the_linear_model(
     posture = place_robot(irsbot2, {"tx": 0.1, "tz": -0.45})
     check, _ = attempt("irsbot2", lambda: crosscheck(posture, load=LOAD))
     assert check is None or not check.passed
-
-
-BENT = [1e-3, -2e-3, 1e-3, 1e-4, 2e-4, -1e-4]
 
 
 def test_crosscheck_of_two_crossed_bars_passes():

@@ -83,7 +83,6 @@ def test_failed_crosscheck_has_exit_status_1(check, monkeypatch):
 
 
 @pytest.mark.parametrize("text", ["1", "1,1", "1,0", "1;0.5", "1,nan"])
-def test_crosscheck_rejects_invalid_scales(check, text):
-    status, _, err = check("irsbot2", "--scale", text)
-    assert status == 2
+def test_crosscheck_rejects_invalid_scales(rejected, text):
+    err = rejected("validation", "crosscheck", "irsbot2", "--scale", text)
     assert f'--scale: found "{text}", expected at least two' in err

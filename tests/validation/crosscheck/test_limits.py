@@ -5,10 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from forcefit.validation.crosscheck.limits import (
-    difference_slope,
-    slope_check,
-)
+from forcefit.validation.crosscheck.limits import difference_slope, slope_check
 
 SCALES = np.array([1.0, 0.5, 0.25, 0.125])
 

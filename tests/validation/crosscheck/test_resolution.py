@@ -15,7 +15,7 @@ from forcefit.validation.crosscheck.limits import LIMIT_TOLERANCE
 from forcefit.validation.crosscheck.pair import Pair, scaled
 from forcefit.validation.crosscheck.pose_metric import PoseMetric
 from forcefit.validation.crosscheck.resolution import resolution_text, resolutions
-from tests.robots_for_tests import coaxial_beams
+from tests.robots_for_tests import coaxial_beams, with_frames
 
 ERROR, CLEARANCE, STIFFNESS = 4e-4, 1e-4, 1e6  # [m], [m], [N/m]
 
@@ -25,6 +25,10 @@ def bars(clearance=CLEARANCE):
     loose = Clearance(radial=clearance) if clearance else None
     gap = [0, 0, 0, ERROR, 0, 0]
     return home_posture(coaxial_beams(gap, (STIFFNESS, STIFFNESS), clearance=loose))
+
+
+def with_clearance(robot, clearance):
+    return with_frames(robot, lambda f: f.clearance, clearance=clearance)
 
 
 def found(posture, metric):
@@ -77,12 +81,8 @@ def test_smallest_detected_stiffness_change_is_twice_the_bound():
 
 def test_unloaded_clearance_is_reported_as_unproved():
     """The bars are loaded along x, so a clearance of 20 um along z has no effect."""
-    frames = [
-        f if f.clearance is None
-        else replace(f, clearance=replace(f.clearance, axial=2e-5))
-        for f in bars().robot.frames
-    ]  # fmt: skip
-    posture = replace(bars(), robot=replace(bars().robot, frames=tuple(frames)))
+    loose = Clearance(radial=CLEARANCE, axial=2e-5)
+    posture = replace(bars(), robot=with_clearance(bars().robot, loose))
     by_name = found(posture, with_clearances)
     (axial,) = (r for name, r in by_name.items() if name.endswith(".axial"))
     assert axial.unproved
@@ -105,12 +105,8 @@ def test_crosscheck_fails_above_the_smallest_detectable_change(
     simulate = crosscheck.simulate_assembly
 
     def wrong(given, *arguments, **options):
-        frames = tuple(
-            f if f.clearance is None
-            else replace(f, clearance=Clearance(radial=more * f.clearance.radial))
-            for f in given.robot.frames
-        )  # fmt: skip
-        robot = replace(given.robot, frames=frames)
+        (loose,) = (f.clearance for f in given.robot.frames if f.clearance)
+        robot = with_clearance(given.robot, Clearance(radial=more * loose.radial))
         return simulate(replace(given, robot=robot), *arguments, **options)
 
     monkeypatch.setattr(crosscheck, "simulate_assembly", wrong)
