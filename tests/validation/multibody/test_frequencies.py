@@ -12,6 +12,7 @@ from forcefit.assembly.model.links import link_compliance
 from forcefit.assembly.model.robot import BeamLink, Frame, MatrixLink, Robot
 from forcefit.assembly.platform_stiffness.vibration import natural_modes
 from forcefit.validation.multibody.simulation import simulated_frequencies
+from tests.robots_for_tests import with_frames
 
 pytestmark = pytest.mark.exudyn
 ROOT = Path(__file__).parents[3]
@@ -57,15 +58,14 @@ def test_frequencies_of_robots_agree_with_exudyn(name):
 def with_inertias(robot, rng):
     """Return the robot with a random mass and inertia tensor on each frame."""
 
-    def moments():
+    def moments(frame):
         arm = 0.1 * rng.normal(size=3)
         return (arm @ arm + 1e-3) * np.eye(3) - np.outer(arm, arm)
 
-    return replace(robot, frames=tuple(
-        replace(f, mass=rng.uniform(1, 3), centre_of_mass=0.1 * rng.normal(size=3),
-                inertia=moments())
-        for f in robot.frames
-    ))  # fmt: skip
+    return with_frames(
+        robot, bool, mass=lambda f: rng.uniform(1, 3),
+        centre_of_mass=lambda f: 0.1 * rng.normal(size=3), inertia=moments,
+    )  # fmt: skip
 
 
 @pytest.mark.parametrize("moment", [0.0, 2e-4, 1e-2])
@@ -73,8 +73,7 @@ def test_frequencies_of_a_spherical_wrist_agree_with_exudyn(moment):
     """The three curved legs over-constrain the wrist."""
     robot = load_robot(ROOT / "examples" / "drawn" / "agile_eye.toml")
     J = moment * np.array([[1.0, 0.2, 0], [0.2, 0.9, -0.1], [0, -0.1, 0.8]])
-    frames = (replace(f, inertia=J) if f.name == "camera" else f for f in robot.frames)
-    posture = home_posture(replace(robot, frames=tuple(frames)))
+    posture = home_posture(with_frames(robot, lambda f: f.name == "camera", inertia=J))
     ours = natural_modes(posture).frequencies
     np.testing.assert_allclose(ours, simulated_frequencies(posture), rtol=2e-8)
 
@@ -82,9 +81,9 @@ def test_frequencies_of_a_spherical_wrist_agree_with_exudyn(moment):
 @pytest.mark.parametrize("name", ["exechon", "arm6"])
 def test_frequencies_with_inertia_tensors_agree_with_exudyn(name):
     """Every frame has a mass, and beams are springs without mass."""
-    path = ROOT / "tests" / "validation" / "multibody" / "exechon.toml"
-    robot = with_inertias(load_robot(path if name == "exechon" else name),
-                          np.random.default_rng(3))  # fmt: skip
+    path = Path(__file__).with_name("exechon.toml")
+    robot = load_robot(path if name == "exechon" else name)
+    robot = with_inertias(robot, np.random.default_rng(3))
     springs = {
         f.name: MatrixLink(np.linalg.inv(link_compliance(f)))
         for f in robot.frames if isinstance(f.link, BeamLink)

@@ -154,9 +154,7 @@ def test_error_of_a_heavy_beam_is_of_fourth_order():
     The beam is a steel wire of 1 m length and 8 mm diameter under three times gravity.
     """
     wire = BeamLink({"radius": 0.004}, 200e9, 0.3, density=7800.0)
-    posture = home_posture(
-        Robot("wire", "tip", (Frame("tip", translation=[1.0, 0, 0], link=wire),))
-    )
+    posture = cantilever(wire, 1.0)
     screws = [
         simulate_assembly(
             posture, model=SimulationModel(elements=n), gravity=[0, -30, 0]

@@ -25,12 +25,7 @@ from forcefit.validation.multibody.simulation import (
     closing_sequence,
     simulate_assembly,
 )
-from tests.multibody_for_tests import (
-    FLAT,
-    ROUND,
-    coaxial,
-    random_stiffness,
-)
+from tests.multibody_for_tests import FLAT, ROUND, block, coaxial, random_stiffness
 
 pytestmark = pytest.mark.exudyn
 
@@ -110,15 +105,9 @@ def test_repeated_simulations_are_bit_identical(rng):
 
 
 def test_simulation_fails_for_rigid_bodies_that_do_not_fit():
-    frames = (
-        Frame("a", translation=[1, 0, 0]),
-        Frame("b", translation=[1, 0, 0], geometric_error=[0, 0, 0, 1e-4, 0, 0]),
-    )
-    posture = home_posture(Robot("block", "a", frames, (("a", "b"),)))
-    with pytest.raises(
-        SimulationFailed, match="a closure error of 0.0001 rad or m remains"
-    ) as error:
-        simulate_assembly(posture)
+    words = "a closure error of 0.0001 rad or m remains"
+    with pytest.raises(SimulationFailed, match=words) as error:
+        simulate_assembly(block())
     assert error.value.robot == "block"
 
 
@@ -181,42 +170,38 @@ def resident():
     return int(line.split()[1]) / 1024
 
 
-@pytest.mark.slow
-def test_repeated_simulations_do_not_leak_memory(rng):
-    """A model that is not released occupies half a MiB."""
-    posture = overconstrained(rng, rng.uniform(-2e-3, 2e-3, (3, 6)))
-    for _ in range(50):
-        simulate_assembly(posture)
+def assert_no_leak(simulate, count):
+    """Check the memory, of which a model that is not released occupies half a MiB."""
+    for _ in range(count // 5):
+        simulate()
     before = resident()
-    for _ in range(500):
-        simulate_assembly(posture)
+    for _ in range(count):
+        simulate()
     assert resident() - before < 10
 
 
 @pytest.mark.slow
-def test_simulations_with_contacts_or_failures_do_not_leak_memory():
-    """A model that is not released occupies half a MiB.
+def test_repeated_simulations_do_not_leak_memory(rng):
+    posture = overconstrained(rng, rng.uniform(-2e-3, 2e-3, (3, 6)))
+    assert_no_leak(lambda: simulate_assembly(posture), 500)
 
-    Every second simulation fails because of its time limit.
-    """
+
+@pytest.mark.slow
+def test_simulations_with_contacts_or_failures_do_not_leak_memory():
+    """Every second simulation fails because of its time limit."""
     clearance = Clearance(axial=3e-5, radial=1e-5)
     frames = list(coaxial([0, 0, 0, 1e-5, 0, 1e-4]).robot.frames)
     frames[0] = replace(frames[0], clearance=clearance)
     frames.insert(1, Frame("a_tip", "a"))
     posture = home_posture(Robot("coaxial", "a_tip", tuple(frames), (("a_tip", "b"),)))
 
-    def batch(count):
-        for _ in range(count):
-            simulate_assembly(posture, model=SimulationModel(clearances=True))
-            with pytest.raises(OutOfTime):
-                simulate_assembly(
-                    posture, model=SimulationModel(clearances=True), time_limit=0.0
-                )
+    def both():
+        contacts = SimulationModel(clearances=True)
+        simulate_assembly(posture, model=contacts)
+        with pytest.raises(OutOfTime):
+            simulate_assembly(posture, model=contacts, time_limit=0.0)
 
-    batch(10)
-    before = resident()
-    batch(50)
-    assert resident() - before < 10
+    assert_no_leak(both, 50)
 
 
 def relax(model, start, _steps):

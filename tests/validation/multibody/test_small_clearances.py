@@ -12,33 +12,29 @@ from forcefit.validation.crosscheck.pair import scaled
 from forcefit.validation.multibody.simulation import SimulationModel, simulate_assembly
 
 EXECHON = Path(__file__).with_name("exechon.toml")
-POSE = {"tz": 0.8, "rx": 0.32, "ry": 0.22}
+pytestmark = [pytest.mark.slow, pytest.mark.exudyn]
 
 
-@pytest.mark.slow
-@pytest.mark.exudyn
-@pytest.mark.parametrize("scale", [0.25, 0.125])
-def test_energy_with_small_clearances_agrees_with_linear_model(scale):
-    """The Exechon is overconstrained twice and has clearances of 2 and 1 um."""
-    posture = place_robot(read_robot(EXECHON), pose=POSE)
+def simulated(pose, scale):
+    """Return the simulation and the linear solution at a scale of all imperfections."""
+    posture = place_robot(read_robot(EXECHON), pose=pose)
     load = scale * np.array([0, 0, 0, 0, 0, -200.0])
     found = simulate_assembly(
         posture, scale, SimulationModel(clearances=True), load=load, time_limit=120
     )
-    linear = solve_assembly(scaled(posture, scale), load)
+    return found, solve_assembly(scaled(posture, scale), load)
+
+
+@pytest.mark.parametrize("scale", [0.25, 0.125])
+def test_energy_with_small_clearances_agrees_with_linear_model(scale):
+    """The Exechon is overconstrained twice and has clearances of 2 and 1 um."""
+    found, linear = simulated({"tz": 0.8, "rx": 0.32, "ry": 0.22}, scale)
     assert found.rigid_energy == pytest.approx(linear.energy, rel=0.01)
     assert found.gap < 1e-11
 
 
-@pytest.mark.slow
-@pytest.mark.exudyn
 def test_contact_energy_is_small_at_every_scale():
     """Load, errors and clearances are multiplied by the same scale."""
-    pose = {"tz": 0.7714, "rx": 0.3964, "ry": 0.2341}
-    posture = place_robot(read_robot(EXECHON), pose=pose)
     for scale in (1.0, 0.5, 0.125):
-        load = scale * np.array([0, 0, 0, 0, 0, -200.0])
-        found = simulate_assembly(
-            posture, scale, SimulationModel(clearances=True), load=load, time_limit=120
-        )
+        found, _ = simulated({"tz": 0.7714, "rx": 0.3964, "ry": 0.2341}, scale)
         assert found.contact_energy < 5e-3 * found.energy

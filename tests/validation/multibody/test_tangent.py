@@ -7,7 +7,6 @@ from forcefit.assembly.exact.exact import solve_exact
 from forcefit.assembly.kinematics.posture import home_posture
 from forcefit.assembly.model.robot import Frame, MatrixLink, Robot
 from forcefit.assembly.platform_stiffness.exact_tangent import exact_tangent
-from forcefit.assembly.platform_stiffness.linear_tangent import without_clearance
 from forcefit.assembly.robots import load_robot
 from forcefit.validation.crosscheck.link_models import link_models
 from forcefit.validation.multibody import tangent
@@ -24,20 +23,6 @@ pytestmark = pytest.mark.exudyn
 def relative(C, other):
     size = np.sqrt(np.abs(np.diag(C)))
     return np.abs((C - other) / np.outer(size, size)).max()
-
-
-@pytest.mark.parametrize("links", ["spring", "beam"])
-@pytest.mark.parametrize(
-    "name", ["four_bar", pytest.param("orthoglide", marks=pytest.mark.slow)]
-)
-def test_tangent_without_load_is_the_nominal_compliance(name, links):
-    posture = home_posture(load_robot(name))
-    expected = without_clearance(posture).compliance
-    model = link_models(posture.robot, links)
-    simulated = simulated_tangent(posture, model, steps=False)
-    assert simulated.linearised_error < 1e-8
-    assert relative(expected, simulated.linearised) < 1e-8
-    assert np.isnan(simulated.stepped).all()
 
 
 @pytest.mark.parametrize("share", [-0.8, 0.5, 0.9])
