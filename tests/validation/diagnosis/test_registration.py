@@ -67,9 +67,8 @@ def test_registration_requires_three_points_that_are_not_collinear(points):
     seen[:, :3], seen[points:] = np.nan, np.nan
     campaign = bar(measured=seen)
     if points < 3:
-        with pytest.raises(
-            BadInput, match="nor 3 measured points that are not on one line"
-        ):
+        words = "nor 3 measured points that are not on one line"
+        with pytest.raises(BadInput, match=words):
             coarse_frame(campaign, conditions_of(campaign))
         return
     guess = coarse_frame(campaign, conditions_of(campaign))
