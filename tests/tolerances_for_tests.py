@@ -1,7 +1,10 @@
 """Small robots with errors, and plans for tolerance allocation."""
 
+from dataclasses import replace
+
 import numpy as np
 
+from forcefit.assembly.callouts.callout import Callout, Datum
 from forcefit.assembly.model.error_distributions import tolerance_sources
 from forcefit.assembly.model.robot import Clearance, Frame, MatrixLink, Robot
 from forcefit.assembly.statistics.requirement import Plan
@@ -73,3 +76,36 @@ def plan_for(robot, places, costs, limits, **options):
     return Plan(sources, np.arange(count), tuple(str(p) for p in places),
                 np.array(costs, dtype=float), np.zeros(count), np.full(count, 0.01),
                 limits, **options)  # fmt: skip
+
+
+def two_links(first=0.5, bend=0.8, hand=20e-6, shoulder=None, elbow=None):
+    """Driven arm of 0.4 and 0.3 m, whose link lengths have callouts."""
+    frames = (
+        Frame("shoulder", joint="revolute", actuated=True, position=first,
+              clearance=shoulder),
+        Frame("elbow", "shoulder", np.array([0.4, 0, 0]), joint="revolute",
+              actuated=True, position=bend, clearance=elbow),
+        Frame("tip", "elbow", np.array([0.3, 0, 0])),
+    )  # fmt: skip
+    callouts = (
+        Callout("arm", "elbow", (Datum("shoulder"),), length=(0.4, 50e-6)),
+        Callout("hand", "tip", (Datum("elbow"),), length=(0.3, hand)),
+    )
+    return Robot("arm", "tip", frames, callouts=callouts)
+
+
+def parallel(k1, k2):
+    """Platform between two bars along x of stiffness k1 and k2."""
+    frames = (
+        Frame("one", translation=[0.5, 0, 0], link=MatrixLink(np.eye(6) * k1)),
+        Frame("mount", translation=[1.0, 0, 0]),
+        Frame("two", "mount", [-0.5, 0, 0], link=MatrixLink(np.eye(6) * k2)),
+    )
+    return Robot("parallel", "one", frames, (("one", "two"),))
+
+
+def without_clearances(robot):
+    """The robot with ideal joints."""
+    return replace(
+        robot, frames=tuple(replace(f, clearance=None) for f in robot.frames)
+    )

@@ -6,8 +6,7 @@ import re
 import numpy as np
 import pytest
 
-from forcefit import BeamLink, run_study
-from forcefit.assembly.files.robot_file import write_robot
+from forcefit import BeamLink, run_study, write_robot
 from forcefit.assembly.kinematics.posture import home_posture, place_robot
 from forcefit.assembly.report.pose_errors import pose_error_of, pose_error_text
 from forcefit.assembly.report.results import solution_of, solution_text
@@ -53,9 +52,8 @@ def test_rod_near_its_dead_centre_has_status_singular():
 
     Here, s = crank + rod - distance. The first-order solution has zero energy.
     """
-    angle, short = 0.02, 2e-4
+    angle, short, (crank, length) = 0.02, 2e-4, SLIDER_CRANK
     rod = BeamLink({"radius": 0.01}, 70e9, 0.33)
-    crank, length = SLIDER_CRANK
     down = math.asin(crank * math.sin(angle) / length)
     slack = crank * (1 - math.cos(angle)) + length * (1 - math.cos(down))
     stiffness = 70e9 * math.pi * 0.01**2 / length

@@ -24,17 +24,15 @@ from tests.assembly.drawing.test_mobility_of_mechanisms import (
 
 DRAWN = Path(__file__).parents[3] / "examples" / "drawn"
 ALL = "translates along x, y, z and turns about x, y, z"
+MOVES = "translates along x, y, z"
 WORDS = {
     "sarrus": "1 freedom: translates along z; 1 over-constraint",
     "agile_eye":
         "3 freedoms: turns about x, y, z through (0, 0, 0) m; 6 over-constraints",
-    "tsai": "3 freedoms: translates along x, y, z; 0 over-constraints",
-    "snu":
-        "5 freedoms: translates along x, y, z and turns about x, y; 2 over-constraints",
-    "delta of parallelograms":
-        "3 freedoms: translates along x, y, z; 12 over-constraints",
-    "delta of rods":
-        "9 freedoms, 3 of the platform: translates along x, y, z; 0 over-constraints",
+    "tsai": f"3 freedoms: {MOVES}; 0 over-constraints",
+    "snu": f"5 freedoms: {MOVES} and turns about x, y; 2 over-constraints",
+    "delta of parallelograms": f"3 freedoms: {MOVES}; 12 over-constraints",
+    "delta of rods": f"9 freedoms, 3 of the platform: {MOVES}; 0 over-constraints",
     "6-UPS": f"6 freedoms: {ALL}; 0 over-constraints",
     "6-SPS": f"12 freedoms, 6 of the platform: {ALL}; 0 over-constraints",
 }  # fmt: skip
@@ -105,9 +103,8 @@ def test_ball_joint_rotated_by_a_right_angle_has_three_degrees_of_freedom():
     robot = mechanism("ball", [0, 0, 0.2], joint("spherical", "base", "ball", [0] * 3))
     home = home_posture(robot)
     for axis in (X, Y, Z):
-        turned = place_robot(robot, dict(zip(("rx", "ry", "rz"), np.pi / 2 * axis,
-                                             strict=True)))  # fmt: skip
-        found = mobility_of(turned)
+        pose = dict(zip(("rx", "ry", "rz"), np.pi / 2 * axis, strict=True))
+        found = mobility_of(place_robot(robot, pose))
         assert (found["freedoms"], found["platform_freedoms"]) == (3, 3)
         assert "turns about x, y, z through (0, 0, 0) m" in found["words"]
     assert mobility(home).freedoms == 3
@@ -154,8 +151,7 @@ def rounded(digits):
 
     def make(name, kind, first, second, at, axis, across, axis2, driven):
         axis, axis2 = (unit(np.round(v, digits)) for v in (axis, axis2))
-        across = perpendicular(axis, axis2)
-        at = np.round(at, digits)
+        across, at = perpendicular(axis, axis2), np.round(at, digits)
         return DrawnJoint(name, kind, first, second, at, axis, across, axis2, driven)
 
     return make
@@ -199,7 +195,6 @@ def test_show_command_writes_mobility_without_a_picture(run):
     found = json.loads(out)
     assert found["mobility"]["words"] == WORDS["tsai"]
     slide = found["axes"]["leg1.slide"]
-    np.testing.assert_allclose(
-        slide["z"], np.array([-16, 0, 45]) / np.hypot(16, 45), atol=1e-12
-    )
+    along = np.array([-16, 0, 45]) / np.hypot(16, 45)
+    np.testing.assert_allclose(slide["z"], along, atol=1e-12)
     np.testing.assert_allclose(slide["x"] @ np.array(slide["z"]), 0.0, atol=1e-12)

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from forcefit.assembly.files.robot_file import write_robot
+from forcefit import Frame, Robot, load_robot, solve_assembly, write_robot
 from forcefit.assembly.kinematics.posture import home_posture, place_robot
-from forcefit.assembly.linear.energy import solve_assembly
+from forcefit.assembly.linear import energy
+from forcefit.assembly.report import error_body
 from forcefit.assembly.report.plot import displaced_bodies, robot_plotter
 from forcefit.assembly.report.plot_closing import closing_gaps
-from forcefit.assembly.robots import load_robot
 from tests.robots_for_tests import NUMBERS, irsbot2_with
 
 
@@ -58,25 +58,32 @@ def test_picture_shows_the_axes_of_driven_and_passive_joints():
     assert colours.count("#202020") == len(joints) - driven
 
 
+NO_BODY = ["--figure", "x.png", "--load", "fx=1", "--error-body", "translation",
+           "--assumption", "budget"]  # fmt: skip
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [
         (["--figure", "x.xyz"],
          'x.xyz: found the ending ".xyz", expected a picture: .png'),
-        (["--figure", "x.png", "--load", "fx=1", "--error-body", "translation",
-          "--assumption", "budget"], "--assumption: found budget together"),
+        (NO_BODY, "--assumption: found budget together"),
         (["--figure", "x.png", "--exaggeration", "inf"], "--exaggeration: found inf"),
         (["--figure", "x.png", "--exaggeration", "1e300"],
          "--exaggeration: found 1e+300"),
+        (["--closing"], "--closing: found no --figure, expected --figure FILE.gif"),
+        (["--closing", "--figure", "x.png"],
+         'x.png: found the ending ".png", expected an animation: .gif'),
+        (["--figure", "x.gif"], 'x.gif: found the ending ".gif", expected a picture'),
+        (["--closing", "--figure", "x.gif", "--error-body", "rotation"],
+         "--closing: found together with --error-body"),
     ],
 )  # fmt: skip
 def test_picture_that_cannot_be_drawn_is_rejected_before_solving(
     run, tmp_path, monkeypatch, words, message
 ):
-    import forcefit.assembly.linear.energy
-
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(forcefit.assembly.linear.energy, "solve_assembly", None)
+    monkeypatch.setattr(energy, "solve_assembly", None)
     status, out, err = run("assembly", "show", "five_bar", *words)
     assert (status, out) == (2, "")
     assert err.startswith(f"forcefit: {message}")
@@ -89,16 +96,13 @@ def test_error_body_of_a_loaded_robot_uses_the_frozen_assumption(
     run, tmp_path, monkeypatch
 ):
     """The default assumption ``budget`` is not valid under a load."""
-    import forcefit.assembly.report.error_body
-
-    readings = []
-    reach = forcefit.assembly.report.error_body.reachable_screws
+    readings, reach = [], error_body.reachable_screws
 
     def noted(answer, reading):
         readings.append(reading)
         return reach(answer, reading)
 
-    monkeypatch.setattr(forcefit.assembly.report.error_body, "reachable_screws", noted)
+    monkeypatch.setattr(error_body, "reachable_screws", noted)
     write_robot(irsbot2_with(NUMBERS["cases"][0]), tmp_path / "robot.toml")
     words = [tmp_path / "robot.toml", "--pose", "tx=0.1,tz=-0.5", "--error-body",
              "translation", "--figure", tmp_path / "x.jpg"]  # fmt: skip
@@ -112,11 +116,8 @@ def test_error_body_of_a_loaded_robot_uses_the_frozen_assumption(
 
 def test_robot_that_cannot_be_assembled_is_reported_and_not_drawn(run, tmp_path):
     path = tmp_path / "stuck.toml"
-    path.write_text(
-        'platform = "a"\n[[frame]]\nname = "a"\nparent = "base"\n[[frame]]\n'
-        'name = "b"\nparent = "base"\ngeometric_error = [0, 0, 0, 1e-3, 0, 0]\n'
-        '[[closure]]\nframes = ["a", "b"]\n'
-    )
+    frames = Frame("a"), Frame("b", geometric_error=[0, 0, 0, 1e-3, 0, 0])
+    write_robot(Robot("stuck", "a", frames, (("a", "b"),)), path)
     status, out, err = run("assembly", "show", path, "--figure", tmp_path / "x.png")
     assert (status, err) == (1, "")
     assert out.splitlines()[-1].startswith("cannot assemble: ")
@@ -172,25 +173,13 @@ def test_animation_ends_with_the_assembled_robot(robot, run, tmp_path):
     assert shares[0] > shares[20] > shares[-1] == 0
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (["--closing"], "--closing: found no --figure, expected --figure FILE.gif"),
-        (["--closing", "--figure", "x.png"],
-         'x.png: found the ending ".png", expected an animation: .gif'),
-        (["--figure", "x.gif"], 'x.gif: found the ending ".gif", expected a picture'),
-        (["--closing", "--figure", "x.gif", "--error-body", "rotation"],
-         "--closing: found together with --error-body"),
-        (["--closing", "--figure", "x.gif"],
-         "--closing: five_bar has no open closure; expected geometric errors"),
-    ],
-)  # fmt: skip
-def test_animation_that_cannot_be_drawn_is_rejected(
-    run, tmp_path, monkeypatch, words, message
+def test_animation_of_a_robot_without_an_open_closure_is_rejected(
+    run, tmp_path, monkeypatch
 ):
     monkeypatch.chdir(tmp_path)
-    status, _, err = run("assembly", "show", "five_bar", *words)
-    assert status == 2
+    words = ["assembly", "show", "five_bar", "--closing", "--figure", "x.gif"]
+    message = "--closing: five_bar has no open closure; expected geometric errors"
+    status, _, err = run(*words)
+    assert (status, err.count("\n")) == (2, 1)
     assert err.startswith(f"forcefit: {message}")
-    assert err.count("\n") == 1
     assert list(tmp_path.iterdir()) == []

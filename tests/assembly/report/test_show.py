@@ -11,11 +11,11 @@ from matplotlib import pyplot
 from mpl_toolkits.mplot3d.art3d import Line3D, Poly3DCollection
 
 import forcefit as ff
+from forcefit import BadInput, BeamLink, Frame, MatrixLink, Robot, solve_assembly
 from forcefit.assembly.kinematics.posture import home_posture
-from forcefit.assembly.linear.energy import solve_assembly
-from forcefit.assembly.model.robot import BeamLink, Frame, MatrixLink, Robot
 from forcefit.assembly.platform_stiffness.platform_stiffness import platform_stiffness
-from forcefit.inputs.table import BadInput
+from forcefit.assembly.report.error_body import ErrorBody
+from forcefit.assembly.report.scene import robot_scene
 from tests.forcefit.page.test_browser import browser, wait
 from tests.pages_for_tests import parse
 
@@ -36,18 +36,14 @@ def cantilever():
     return home_posture(Robot("bar <i>", "tip <b>", (tip,)))
 
 
-def bent():
-    return solve_assembly(cantilever(), [0, 0, 0, 0, 0, -FORCE])
+def bent(force=FORCE):
+    return solve_assembly(cantilever(), [0, 0, 0, 0, 0, -force])
 
 
 def lines_of(figure):
-    """Return the points of a line with a given legend entry."""
-    (axes,) = figure.axes
-    return {
-        line.get_label(): np.column_stack(line.get_data_3d())
-        for line in axes.lines
-        if isinstance(line, Line3D)
-    }
+    """Return the points of each line by its legend entry."""
+    lines = [line for line in figure.axes[0].lines if isinstance(line, Line3D)]
+    return {line.get_label(): np.column_stack(line.get_data_3d()) for line in lines}
 
 
 def test_figure_of_a_loaded_bar_has_the_deflection_of_a_cantilever():
@@ -100,9 +96,8 @@ def test_bar_chart_is_proportional_to_compliance():
     """Of two springs k and 2 k in series, the first contributes two thirds of the
     compliance.
     """
-    soft = MatrixLink(np.diag([1e3, 1e3, 1e3, 1e5, 1e5, 1e5]))
-    stiff = MatrixLink(np.diag([2e3, 2e3, 2e3, 2e5, 2e5, 2e5]))
-    frames = (Frame("a", link=soft), Frame("b", "a", link=stiff))
+    K = np.diag([1e3] * 3 + [1e5] * 3)
+    frames = (Frame("a", link=MatrixLink(K)), Frame("b", "a", link=MatrixLink(2 * K)))
     K_C = platform_stiffness(home_posture(Robot("two", "b", frames)))
     (axes,) = K_C.plot().axes
     heights = {c.get_label(): [bar.get_height() for bar in c] for c in axes.containers}
@@ -154,28 +149,19 @@ class Formatter(dict):
     for_type = dict.__setitem__
 
 
-def maps(monkeypatch, known):
-    """Return the PNG of a sweep figure in a notebook."""
+@pytest.mark.parametrize("known", [{}, {pyplot.Figure: str}])
+def test_notebook_displays_maps_unless_the_user_has_chosen_a_format(monkeypatch, known):
+    pytest.importorskip("xarray")
     formats = {"image/png": Formatter(), "image/svg+xml": Formatter(known)}
-    shell = SimpleNamespace(
-        kernel=object(), display_formatter=SimpleNamespace(formatters=formats)
-    )
+    display = SimpleNamespace(formatters=formats)
+    shell = SimpleNamespace(kernel=object(), display_formatter=display)
     module = SimpleNamespace(get_ipython=lambda: shell)
     monkeypatch.setitem(sys.modules, "IPython", module)
     data = ff.sweep("hexapod", grid="tx=0:0.02:0.01,tz=0.53", quantities=["energy"])
-    return ff.show(data.squeeze(), quantities=["energy"]), formats["image/png"]
-
-
-def test_notebook_displays_maps_of_a_sweep(monkeypatch):
-    pytest.importorskip("xarray")
-    figure, functions = maps(monkeypatch, {})
-    assert functions[type(figure)](figure).startswith(b"\x89PNG")
-
-
-def test_figure_format_chosen_by_the_user_is_not_changed(monkeypatch):
-    pytest.importorskip("xarray")
-    _, functions = maps(monkeypatch, {pyplot.Figure: str})
-    assert not functions
+    figure = ff.show(data.squeeze(), quantities=["energy"])
+    functions = formats["image/png"]
+    assert bool(functions) == (not known)
+    assert known or functions[type(figure)](figure).startswith(b"\x89PNG")
 
 
 @pytest.mark.parametrize(
@@ -202,11 +188,54 @@ def test_browser_draws_a_nominal_robot_inside_its_frame(tmp_path):
         tab.switch_to.frame(tab.find_element("tag name", "iframe"))
         wait(tab, "return document.documentElement.dataset.drawn")
         script = "return document.querySelector('.plot').data.map(t => t.name)"
-        assert tab.execute_script(script) == [
-            "nominal, elastic", "nominal, rigid", "joints",
-        ]  # fmt: skip
+        drawn = ["nominal, elastic", "nominal, rigid", "joints"]
+        assert tab.execute_script(script) == drawn
         slider = "return document.querySelector('.exaggeration').offsetParent === null"
         assert tab.execute_script(slider)
         assert not [e for e in tab.get_log("browser") if e["level"] == "SEVERE"]
     finally:
         tab.quit()
+
+
+def scene_of(assembly, closing=None, body=None):
+    (spec,) = parse(robot_scene(assembly, closing, body, "")).figures
+    return spec
+
+
+def test_displacement_of_a_bar_equals_that_of_a_cantilever():
+    """The deflection is w(s) = F s^2 (3 L - s) / (6 E I)."""
+    (bar,) = scene_of(bent())["bodies"]
+    moved, nominal = np.array(bar["moved"]), np.array(bar["nominal"])
+    s = nominal[:, 0]
+    line = -FORCE * s**2 * (3 * LENGTH - s) / (6 * STIFFNESS)
+    np.testing.assert_allclose(moved[:, 2], line, rtol=1e-9, atol=1e-15)
+    assert moved[4, 2] / moved[-1, 2] == pytest.approx(5 / 16)
+    np.testing.assert_allclose(moved[:, :2], 0.0, atol=1e-12)
+    assert bar["name"] == "tip <b>"
+    assert bar["elastic"]
+
+
+def test_arrows_show_the_forces_in_base_axes():
+    (arrow,) = scene_of(bent())["forces"]
+    np.testing.assert_allclose(arrow["force"], [0, 0, -FORCE], atol=1e-9)
+
+
+def test_scene_contains_the_closing_motion_and_the_error_body():
+    assembly = bent()
+    frames = np.tile(assembly.posture.transforms, (3, 1, 1, 1))
+    frames[0, 0, 2, 3] += 1e-3
+    points = 1e-4 * np.array([[1.0, 0, 0], [0, 1, 0], [0, 0, 1], [-1, -1, -1]])
+    faces = np.array([[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]])
+    body = ErrorBody("translation", points, faces, np.eye(3), np.ones(3))
+    spec = scene_of(assembly, frames, body)
+    np.testing.assert_allclose(np.array(spec["closing"])[:, 0, 2], [1e-3, 0, 0])
+    np.testing.assert_array_equal(spec["body"]["points"], points)
+    np.testing.assert_allclose(spec["body"]["origin"], [LENGTH, 0, 0])
+    assert "0.1732 mm" in spec["body"]["text"]  # sqrt(3) times 0.1 mm
+
+
+def test_unloaded_robot_is_drawn_without_displacement():
+    spec = scene_of(bent(0.0))
+    assert spec["forces"] == []
+    assert spec["exaggeration"] == 1.0
+    assert not np.any(spec["bodies"][0]["moved"])

@@ -1,37 +1,38 @@
 """HTML page on a stepwise assembly."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
+from forcefit import load_robot, solve_assembly
 from forcefit.assembly.kinematics.posture import home_posture
-from forcefit.assembly.linear.energy import solve_assembly
 from forcefit.assembly.report.plot import displaced_bodies
 from forcefit.assembly.report.steps import drawn_steps, steps_of
 from forcefit.assembly.report.steps_page import assembly_of, steps_page
-from forcefit.assembly.robots import load_robot
 from forcefit.assembly.steps.machine import machine_at
 from forcefit.assembly.steps.plan import Join, Plan
 from forcefit.page.page import Provenance
 from tests.pages_for_tests import parse
+from tests.tolerances_for_tests import without_clearances
+
+
+def in_sequence(robot):
+    """Return a plan that joins all loops in sequence."""
+    return Plan(tuple(Join(" - ".join(c), c) for c in robot.closures))
 
 
 def pinned(posture):
     """Return the results of joining all loops in sequence, and the states."""
-    plan = Plan(tuple(Join(" - ".join(c), c) for c in posture.robot.closures))
     states = []
-    results = steps_of(plan, posture, states=states)
+    results = steps_of(in_sequence(posture.robot), posture, states=states)
     return results, machine_at(posture), states
 
 
 @pytest.fixture
 def four_bar(rng):
-    robot = load_robot("four_bar")
-    frames = tuple(replace(frame, clearance=None) for frame in robot.frames)
+    robot = without_clearances(load_robot("four_bar"))
     scale = np.repeat([1e-3, 1e-4], 3)
     errors = rng.normal(size=robot.errors.shape) * scale
-    return home_posture(replace(robot, frames=frames).with_errors(errors))
+    return home_posture(robot.with_errors(errors))
 
 
 def test_stepwise_assembly_agrees_with_solve_assembly(four_bar):
@@ -43,9 +44,8 @@ def test_stepwise_assembly_agrees_with_solve_assembly(four_bar):
     assert found.link_screws == pytest.approx(expected.link_screws, abs=1e-12)
     mine, yours = displaced_bodies(found), displaced_bodies(expected)
     platform = four_bar.robot.index(four_bar.robot.platform)
-    assert mine.end_screws[platform] == pytest.approx(
-        yours.end_screws[platform], abs=1e-10
-    )
+    screw = yours.end_screws[platform]
+    assert mine.end_screws[platform] == pytest.approx(screw, abs=1e-10)
 
 
 def test_report_page_contains_the_numbers_of_every_step(four_bar):
@@ -61,7 +61,7 @@ def test_report_page_contains_the_numbers_of_every_step(four_bar):
 
 def test_interrupted_computation_returns_quantiles(four_bar, rng):
     """The computation is interrupted in the second block of robots."""
-    plan = Plan(tuple(Join(" - ".join(c), c) for c in four_bar.robot.closures))
+    plan = in_sequence(four_bar.robot)
     errors = rng.normal(size=(20_001, *four_bar.robot.errors.shape)) * 1e-5
 
     def stop(done, total):

@@ -4,10 +4,7 @@ import numpy as np
 import pytest
 
 import forcefit as ff
-from forcefit.assembly.exact.exact import solve_exact
-from forcefit.assembly.kinematics.posture import place_robot
-from forcefit.assembly.linear.energy import solve_assembly
-from forcefit.assembly.linear.pose_error import bound_pose_error
+from forcefit import bound_pose_error, place_robot, solve_assembly, solve_exact
 from forcefit.assembly.linear.zone import zone_margin
 from forcefit.assembly.sweeps.quantities import Question, variables
 from forcefit.stiffness.screws import SCREW, WRENCH
@@ -42,9 +39,8 @@ def test_assembly_data_set_has_labelled_frames_and_equal_numbers(answer):
 def test_screws_of_the_data_set_sum_to_the_platform_screw(answer):
     """The sum is eq. (8) of the paper."""
     data = answer.to_xarray()
-    total = (
-        data.geometric_error + data.clearance_screw + data.link_screw + data.joint_screw
-    )
+    parts = "geometric_error", "clearance_screw", "link_screw", "joint_screw"
+    total = sum(data[name] for name in parts)
     screw = answer.linearisation.platform @ total.values.ravel()
     np.testing.assert_allclose(screw, data.platform_screw, rtol=1e-12)
 
@@ -91,7 +87,10 @@ def test_table_of_many_points_has_a_row_for_each_point(batches):
     assert set(errors["status", ""]) == {"ok"}
 
 
-def small_stiffness():
+LATERAL = 3 * 2e11 * np.pi * 1e-8 / 4 / 0.4**3  # [N/m] bending stiffness of the bar
+
+
+def bar():
     """Return a round bar of length L = 0.4 m along x, clamped at its base."""
     beam = ff.BeamLink({"radius": 0.01}, 2e11, 0.3, 7850.0, theory="euler")
     tip = ff.Frame("tip", translation=[0.4, 0, 0], link=beam)
@@ -100,9 +99,9 @@ def small_stiffness():
 
 def test_stiffness_data_set_of_a_bar_equals_handbook_values():
     """The stiffness is E A / L along the axis and 3 E I / L^3 across it."""
-    tangent = ff.platform_stiffness(small_stiffness())
+    tangent = ff.platform_stiffness(bar())
     data, table = tangent.to_xarray(), tangent.to_pandas()
-    axial, lateral = 2e11 * np.pi * 1e-4 / 0.4, 3 * 2e11 * np.pi * 1e-8 / 4 / 0.4**3
+    axial, lateral = 2e11 * np.pi * 1e-4 / 0.4, LATERAL
     stiffness = data["stiffness"].sel(wrench_component=["FX", "FY", "FZ"])
     np.testing.assert_allclose(stiffness, [axial, lateral, lateral], rtol=1e-9)
     slope = data["compliance"].sel(screw="RZ", wrench_component="FY")
@@ -126,9 +125,8 @@ def test_stiffness_table_of_many_points_equals_the_points_and_a_sweep():
         assert data[name].attrs["units"] == swept[name].attrs["units"]
         assert data[name].dims[1:] == swept[name].dims[1:]
     assert list(data["part"].values) == list(swept["part"].values)
-    np.testing.assert_allclose(
-        data["read_at"].sel(axis="x"), [-0.05, 0, 0.05], atol=1e-9
-    )
+    x = data["read_at"].sel(axis="x")
+    np.testing.assert_allclose(x, [-0.05, 0, 0.05], atol=1e-9)
     one = many[1].to_xarray()
     np.testing.assert_allclose(one["stiffness"], data["stiffness"][1], rtol=1e-9)
     axial = many.to_pandas()["stiffness", "FZ"]
@@ -136,7 +134,7 @@ def test_stiffness_table_of_many_points_equals_the_points_and_a_sweep():
 
 
 def test_modes_table_has_a_row_for_each_mode_and_shares_that_sum_to_one():
-    modes = ff.natural_modes(small_stiffness(), 3)
+    modes = ff.natural_modes(bar(), 3)
     table = modes.to_pandas()
     assert list(table.index) == [1, 2, 3]
     np.testing.assert_array_equal(table["frequency", ""], modes.frequencies)
@@ -145,9 +143,8 @@ def test_modes_table_has_a_row_for_each_mode_and_shares_that_sum_to_one():
 
 
 def test_load_deflection_table_of_a_bar_obeys_hookes_law():
-    lateral = 3 * 2e11 * np.pi * 1e-8 / 4 / 0.4**3
-    table = ff.deflection_curve(small_stiffness(), 5, [-10, 0, 20]).to_pandas()
+    table = ff.deflection_curve(bar(), 5, [-10, 0, 20]).to_pandas()
     np.testing.assert_array_equal(table["load", ""], [-10, 0, 20])
-    np.testing.assert_allclose(table["deflection", ""], table["load", ""] / lateral)
-    np.testing.assert_allclose(table["stiffness", ""], lateral)
+    np.testing.assert_allclose(table["deflection", ""], table["load", ""] / LATERAL)
+    np.testing.assert_allclose(table["stiffness", ""], LATERAL)
     assert table.attrs["units"]["stiffness"] == "N/m"
