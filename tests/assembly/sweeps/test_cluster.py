@@ -11,14 +11,13 @@ import time
 import numpy as np
 import pytest
 
+from forcefit import BadInput, load_robot
 from forcefit.assembly.model.error_distributions import tolerance_sources
-from forcefit.assembly.robots import load_robot
 from forcefit.assembly.sweeps.cluster import _check_workers, cluster_solver, solve_task
 from forcefit.assembly.sweeps.plan import Sweep
 from forcefit.assembly.sweeps.quantities import Question
 from forcefit.assembly.sweeps.sweep import run_sweep
 from forcefit.assembly.sweeps.targets import grid_targets, parse_grid
-from forcefit.inputs.table import BadInput
 
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning")
 

@@ -5,15 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from forcefit import BadInput, place_robot, solve_assembly
+from forcefit import BadInput, load_robot, place_robot, solve_assembly, sweep
 from forcefit.assembly.effects.robot_effects import apply_robot_effects
 from forcefit.assembly.files.robot_file import read_robot
 from forcefit.assembly.model.function import Function
-from forcefit.assembly.robots import load_robot
 from forcefit.assembly.sweeps.plan import Sweep
 from forcefit.assembly.sweeps.quantities import Question
 from forcefit.assembly.sweeps.request import SweepOptions, ask_sweep
-from forcefit.assembly.sweeps.robot_sweep import sweep
 from forcefit.assembly.sweeps.sweep import sweep_in_memory
 from forcefit.assembly.sweeps.targets import grid_targets, parse_grid
 from tests.assembly.files.test_effect_file import L, arm_with
@@ -137,11 +135,9 @@ def test_sweep_rejects_bounds_under_load_and_missing_covariates(tmp_path):
     path = str(arm_with(tmp_path, warm))
     with pytest.raises(BadInput, match="--under temperature=NUMBER"):
         ask_sweep(path, SweepOptions(grid="q.drive=0:1:0.5"))
-    asked = ask_sweep(
-        path, SweepOptions(grid="q.drive=0:1:0.5", under={"temperature": 0.0})
+    asked, other = (
+        ask_sweep(path, SweepOptions(grid="q.drive=0:1:0.5", under={"temperature": t}))
+        for t in (0.0, 3.0)
     )
     assert "--under temperature=0" in asked.command
-    other = ask_sweep(
-        path, SweepOptions(grid="q.drive=0:1:0.5", under={"temperature": 3.0})
-    )
     assert asked.identity != other.identity

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from forcefit.assembly.robots import load_robot
+from forcefit import BadInput, load_robot
 from forcefit.assembly.sweeps import identity
 from forcefit.assembly.sweeps.identity import question_hash
 from forcefit.assembly.sweeps.journal import open_journal
@@ -27,7 +27,6 @@ from forcefit.assembly.sweeps.sweep import (
     sweep_in_memory,
 )
 from forcefit.assembly.sweeps.targets import grid_targets, parse_grid
-from forcefit.inputs.table import BadInput
 
 ROOT = Path(__file__).parents[3]
 
@@ -194,7 +193,7 @@ def test_hash_of_a_sweep_depends_on_every_option(change):
     assert question_hash(replace(asked, **change)) != question_hash(asked)
 
 
-def test_designs_with_different_numbers_have_different_hashes(tmp_path):
+def test_designs_with_different_numbers_have_different_hashes():
     design = load_design("five_bar")
     path = next(p for p in design.paths if p.endswith("link.young"))
     other = type(design)(design.changed({path: 1e11}), design.file, design.name)
@@ -235,17 +234,15 @@ def test_block_size_does_not_change_the_results():
     small = small_sweep(assumption="frozen", wrenches=("left.elbow",),
                         clearance_only=True)  # fmt: skip
     one = sweep_in_memory(small)
-    other = sweep_in_memory(replace(small, block_size=15))
-    assert one.identical(other)
+    assert one.identical(sweep_in_memory(replace(small, block_size=15)))
     assert np.isfinite(one.rotation_error_clearance).any()
 
 
 @pytest.mark.slow
 def test_commands_killed_at_random_times_resume_and_write_the_same_file():
     """The process is killed 20 times."""
-    kills = [sys.executable, ROOT / "benchmarks" / "kills.py", "20"]
-    run = [*kills, "--seed", "5"]
-    done = subprocess.run(run, capture_output=True, text=True, check=False)
+    words = [sys.executable, ROOT / "benchmarks" / "kills.py", "20", "--seed", "5"]
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
 
 
@@ -257,17 +254,13 @@ def start_command(folder, *words):
     """Start the command, and stop it when its journal has grown."""
     path = folder / "map.nc"
     errors = folder.parent / f"{folder.name}.txt"  # a file, because a pipe must be read
+    interrupted = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)
     with (
         errors.open("w+") as stderr,
-        subprocess.Popen(
-            [*COMMAND, "-o", path, *words],
-            stderr=stderr,
-            start_new_session=True,
-            preexec_fn=partial(signal.signal, signal.SIGINT, signal.SIG_DFL),
-        ) as process,
-    ):
-        journal = journal_path(path)
-        end = time.monotonic() + 120
+        subprocess.Popen([*COMMAND, "-o", path, *words], stderr=stderr,
+                         start_new_session=True, preexec_fn=interrupted) as process,
+    ):  # fmt: skip
+        journal, end = journal_path(path), time.monotonic() + 120
         while not journal.exists() or journal.stat().st_size < 20_000:
             assert process.poll() is None, errors.read_text()
             assert time.monotonic() < end

@@ -5,11 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from forcefit.assembly.model.robot import Frame, MatrixLink, Robot
+from forcefit import BadInput, Frame, MatrixLink, Robot
 from forcefit.assembly.robots import BUILT_IN, load_robot
 from forcefit.assembly.sweeps.identity import robot_hash
 from forcefit.assembly.sweeps.parameters import design_of, load_design, unit_of
-from forcefit.inputs.table import BadInput
 
 
 @pytest.fixture(scope="module")

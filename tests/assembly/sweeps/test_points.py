@@ -1,15 +1,14 @@
 """Results at the points of a sweep."""
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
 
-from forcefit import BeamLink, bound_pose_error, solve_assembly, solve_exact
-from forcefit.assembly.files.robot_file import write_robot
+from forcefit import BeamLink, bound_pose_error, load_robot, solve_assembly, solve_exact
 from forcefit.assembly.kinematics.posture import home_posture, place_robot
 from forcefit.assembly.model.error_distributions import read_sources
-from forcefit.assembly.robots import load_robot
 from forcefit.assembly.sweeps import points
 from forcefit.assembly.sweeps.maps import figure_of
 from forcefit.assembly.sweeps.parameters import load_design
@@ -26,11 +25,9 @@ from tests.robots_for_tests import NUMBERS, irsbot2_with
 from tests.three_upu_for_tests import BASE, HEIGHT, PLATFORM, three_upu
 
 GRID = "tx=-0.2:0.2:0.2,tz=-0.5:-0.4:0.1"
-ERRORS = """
-[[errors]]
-frames = ["elbow", "arm"]
-most = [1e-4, 1e-4, 1e-4, 1e-5, 1e-5, 1e-5]
-"""
+ERRORS = """errors = [
+    { frames = ["elbow", "arm"], most = [1e-4, 1e-4, 1e-4, 1e-5, 1e-5, 1e-5] }
+]"""
 
 
 @pytest.fixture(scope="module")
@@ -96,33 +93,26 @@ def test_sweep_of_a_design_is_bit_identical_to_that_of_its_robot():
 def test_swept_draws_are_bit_identical_to_single_robots(tmp_path):
     path = tmp_path / "errors.toml"
     path.write_text(ERRORS)
-    data = sweep(
-        "five_bar", grid="tx=0:0.02:0.02,ty=0.14", errors=path, draws=3, seed=11
-    )
+    grid = "tx=0:0.02:0.02,ty=0.14"
+    data = sweep("five_bar", grid=grid, errors=path, draws=3, seed=11)
     assert data.energy.dims == ("tx", "ty", "draw")
     robot = load_robot("five_bar")
     sources = read_sources(path, robot)
     errors = sources.errors(sources.draw(0, 3, 11))
     for i in range(3):
-        one = sweep_poses(
-            robot.with_errors(errors[i]), parse_grid("tx=0:0.02:0.02,ty=0.14"),
-            assumption="frozen",
-        )  # fmt: skip
+        one = sweep_poses(robot.with_errors(errors[i]), parse_grid(grid),
+                          assumption="frozen")  # fmt: skip
         there = data.isel(draw=i)
         for name in ("margin", "margin_free", "energy", "rotation_error"):
             assert np.array_equal(there[name], one[name], equal_nan=True), name
 
 
 def test_list_and_grid_of_the_same_postures_have_equal_energies(robot, tmp_path):
-    write_robot(robot, tmp_path / "robot.toml")
     grid = sweep_poses(robot, parse_grid(GRID))
-    x, z = np.meshgrid(grid.tx.values, grid.tz.values, indexing="ij")
-    pairs = zip(x.ravel().tolist(), z.ravel().tolist(), strict=True)
+    pairs = product(grid.tx.values.tolist(), grid.tz.values.tolist())
     rows = [f"{a!r},{b!r}" for a, b in pairs]
     (tmp_path / "path.csv").write_text("\n".join(["pose.tx,pose.tz", *rows]) + "\n")
-    found = sweep(
-        str(tmp_path / "robot.toml"), poses=tmp_path / "path.csv", assumption="none"
-    )
+    found = sweep(robot, poses=tmp_path / "path.csv", assumption="none")
     assert found.energy.dims == ("posture",)
     assert found.tz.dims == ("posture",)
     assert np.array_equal(found.energy.values, grid.energy.values.ravel())
@@ -238,10 +228,8 @@ def test_postures_beyond_joint_limits_have_a_status():
     """The x drive of the orthoglide has the coordinate r_x = p_x - L."""
     robot = load_robot("orthoglide")
     home = home_posture(robot).coordinates[robot.index("x.slide")]
-    frames = tuple(
-        replace(f, limits=(home - 0.05, home + 0.02)) if f.name == "x.slide" else f
-        for f in robot.frames
-    )
+    limits = {"x.slide": (home - 0.05, home + 0.02)}
+    frames = tuple(replace(f, limits=limits.get(f.name)) for f in robot.frames)
     x = np.array([-0.051, -0.05, 0.0, 0.02, 0.021])
     axes = {"tx": x, "ty": np.zeros(1), "tz": np.zeros(1)}
     data = sweep_poses(replace(robot, frames=frames), axes)
@@ -256,8 +244,7 @@ def test_point_with_invalid_linearisation_has_status_singular():
     """A short rod near its dead centre has elastic energy only in the exact
     solution.
     """
-    rod = BeamLink({"radius": 0.01}, 70e9, 0.33)
-    robot = slider_crank(0.3, rod, error=-2e-4)
+    robot = slider_crank(0.3, BeamLink({"radius": 0.01}, 70e9, 0.33), error=-2e-4)
     reach = sum(SLIDER_CRANK)
     targets = grid_targets({"q.slide": np.array([reach - 1e-5, reach - 0.02])})
     question = Question(robot, components=targets.names, linearisation=True)

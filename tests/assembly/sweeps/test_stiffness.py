@@ -3,13 +3,12 @@
 import numpy as np
 import pytest
 
-from forcefit import BadInput, natural_modes, place_robot, platform_stiffness
+from forcefit import BadInput, natural_modes, place_robot, platform_stiffness, sweep
 from forcefit.assembly.platform_stiffness.linear_tangent import without_clearance
 from forcefit.assembly.robots import load_robot
 from forcefit.assembly.sweeps.maps import figure_of
 from forcefit.assembly.sweeps.parameters import load_design
 from forcefit.assembly.sweeps.request import SweepOptions, ask_sweep
-from forcefit.assembly.sweeps.robot_sweep import sweep
 from forcefit.assembly.sweeps.sweep import sweep_in_memory
 
 
@@ -19,11 +18,7 @@ def test_swept_stiffness_equals_single_solutions():
     robot = load_robot("irsbot2")
     one = without_clearance(place_robot(robot, {"tx": 0.1, "tz": -0.4}))
     there = data.sel(tx=0.1, tz=-0.4, method="nearest")
-    size = np.sqrt(np.diag(one.compliance))
-    np.testing.assert_allclose(
-        there.compliance.values / np.outer(size, size),
-        one.compliance / np.outer(size, size), atol=1e-9,
-    )  # fmt: skip
+    assert_same(there.compliance.values, one.compliance, 1e-9)
     np.testing.assert_allclose(
         there.eigen_stiffness.values, one.eigen.values, rtol=1e-8
     )
@@ -39,6 +34,13 @@ def test_swept_stiffness_equals_single_solutions():
 LOAD = (0.0, 0.0, 0.0, 0.0, 0.0, -300.0)
 
 
+def assert_same(found, expected, tol):
+    """Check that compliances agree relative to the root of the diagonal."""
+    size = np.sqrt(np.diag(expected))
+    np.testing.assert_allclose(found / np.outer(size, size),
+                               expected / np.outer(size, size), atol=tol)  # fmt: skip
+
+
 @pytest.mark.parametrize("state", ["contact", "exact"])
 def test_swept_tangent_includes_errors_load_and_clearances(state):
     """The tangent stiffness depends on the errors of the design and on the load."""
@@ -52,11 +54,7 @@ def test_swept_tangent_includes_errors_load_and_clearances(state):
     errors[robot.index("leg1.link_a"), 0] = 0.02
     posture = place_robot(robot.with_errors(errors), {"tx": 0.1, "tz": -0.5})
     expected = platform_stiffness(posture, state, LOAD, side="unloading")
-    size = np.sqrt(np.diag(expected.compliance))
-    np.testing.assert_allclose(
-        data.compliance.values[1] / np.outer(size, size),
-        expected.compliance / np.outer(size, size), atol=1e-6,
-    )  # fmt: skip
+    assert_same(data.compliance.values[1], expected.compliance, 1e-6)
     np.testing.assert_allclose(data.share.sum("part"), 1.0)
     assert np.ptp(data.stiffness.values, axis=0).max() > 0.0
     assert state != "exact" or "internal forces and loads" in data.part.values
@@ -67,12 +65,6 @@ def test_swept_tangent_reports_free_motions():
                  load=LOAD)  # fmt: skip
     assert "the platform moves freely along" in str(data.reason.values.ravel()[0])
     assert float(data.stiffness.sel(wrench_component="FY").squeeze()) == 0.0
-
-
-def test_unknown_state_is_rejected():
-    options = SweepOptions(grid="tx=0,tz=-0.5", assumption="none", state="exakt")
-    with pytest.raises(BadInput, match='--state: found "exakt"'):
-        ask_sweep("irsbot2", options)
 
 
 def test_swept_frequencies_equal_single_solutions():
@@ -91,15 +83,16 @@ def test_swept_frequencies_equal_single_solutions():
 
 
 @pytest.mark.parametrize(
-    ("robot", "count", "message"),
+    ("robot", "option", "message"),
     [
-        ("delta", 0, "--frequencies: found 0, expected 1 to 100"),
-        ("irsbot2", 2, "found no moving mass"),
+        ("delta", {"frequencies": 0}, "--frequencies: found 0, expected 1 to 100"),
+        ("irsbot2", {"frequencies": 2}, "found no moving mass"),
+        ("irsbot2", {"state": "exakt"}, '--state: found "exakt"'),
     ],
 )
-def test_sweep_of_frequencies_without_mass_is_rejected(robot, count, message):
+def test_invalid_frequencies_and_states_are_rejected(robot, option, message):
     with pytest.raises(BadInput, match=message):
-        sweep(robot, grid="tx=0,tz=-0.5", assumption="none", frequencies=count)
+        sweep(robot, grid="tx=0,tz=-0.5", assumption="none", **option)
 
 
 ARM = """

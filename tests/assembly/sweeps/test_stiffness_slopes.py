@@ -5,9 +5,8 @@ import json
 import numpy as np
 import pytest
 
-from forcefit.assembly.kinematics.posture import place_robot
+from forcefit import load_robot, place_robot
 from forcefit.assembly.platform_stiffness.linear_tangent import without_clearance
-from forcefit.assembly.robots import load_robot
 from forcefit.assembly.sweeps.parameters import load_design
 from forcefit.assembly.sweeps.stiffness_slopes import CannotChange, stiffness_slopes
 
@@ -20,15 +19,11 @@ def test_derivative_by_youngs_modulus_equals_closed_form():
     slope = stiffness_slopes(load_design("irsbot2"), [path], POSE)[path]
     robot = load_robot("irsbot2")
     answer = without_clearance(place_robot(robot, POSE))
-    links = [
-        C
-        for part, C in answer.contributions().items()
-        if part.frame.endswith("link_a") and part.kind == "link"
-    ]
+    links = [C for part, C in answer.contributions().items()
+             if part.frame.endswith("link_a") and part.kind == "link"]  # fmt: skip
     assert len(links) == 2
     young = robot.frame("leg1.link_a").link.young
-    size = np.sqrt(np.diag(answer.compliance))
-    size = np.outer(size, size)
+    size = np.sqrt(np.outer(*[np.diag(answer.compliance)] * 2))
     np.testing.assert_allclose(slope * young / size, -sum(links) / size, atol=1e-6)
 
 
@@ -40,18 +35,13 @@ parent = "PARENT"
 translation = [0.5, 0.0, 0.0]
 link = { beam = { radius = 0.01 }, young = 7e10, poisson = 0.3 }
 """
-DRIVE = """
-[[frame]]
+DRIVE = """[[frame]]
 name = "drive"
 parent = "base"
 joint = "revolute"
 actuated = true
 """
-EFFECT = """
-[[effect]]
-name = "drive_compliance"
-parameters = { drive = 5e4 }
-"""
+EFFECT = 'effect = [{ name = "drive_compliance", parameters = { drive = 5e4 } }]'
 
 
 def slope_by_length(tmp_path, text):
@@ -71,18 +61,17 @@ def test_derivative_by_bar_length_equals_textbook_values(tmp_path):
 
 def test_stiffness_command_computes_derivatives_at_the_exact_equilibrium(run):
     """The derivatives depend on the load."""
-    slopes = {}
+    slopes = []
     for words in ([], ["--state", "exact", "--load", "fx=-300"]):
         status, out, _ = run(
             "assembly", "stiffness", "four_bar", "--by", "crank_pin.link.young",
             "--json", "-", *words,
         )  # fmt: skip
-        answer = json.loads(out)
         assert status == 0
-        slopes[len(words)] = np.array(answer["slopes"]["crank_pin.link.young"])
-    assert slopes[4][3, 3] < 0.0
+        slopes.append(json.loads(out)["slopes"]["crank_pin.link.young"][3][3])
     # All other entries are zero except for round-off.
-    assert abs(slopes[4][3, 3] / slopes[0][3, 3] - 1) > 1e-4
+    assert slopes[1] < 0.0
+    assert abs(slopes[1] / slopes[0] - 1) > 1e-4
 
 
 def test_slopes_include_the_effects_in_the_robot_file(tmp_path):
@@ -90,7 +79,7 @@ def test_slopes_include_the_effects_in_the_robot_file(tmp_path):
     derivative 2 L/k.
     """
     arm = BAR.replace("PARENT", "drive") + DRIVE
-    rigid, soft = (slope_by_length(tmp_path, text) for text in (arm, arm + EFFECT))
+    rigid, soft = (slope_by_length(tmp_path, text) for text in (arm, EFFECT + arm))
     difference = np.zeros((6, 6))
     difference[4, 4], difference[2, 4], difference[4, 2] = 2 * 0.5 / 5e4, 2e-5, 2e-5
     np.testing.assert_allclose(soft - rigid, difference, atol=1e-11)

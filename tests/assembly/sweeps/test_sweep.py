@@ -17,12 +17,16 @@ GRID = "tx=-0.4:0.4:0.2,tz=-0.65:-0.45:0.1"
 
 
 @pytest.fixture(scope="module")
-def data():
-    return sweep_poses(irsbot2_with(NUMBERS["cases"][0]), parse_grid(GRID))
+def robot():
+    return irsbot2_with(NUMBERS["cases"][0])
 
 
-def test_swept_points_equal_single_solutions(data):
-    robot = irsbot2_with(NUMBERS["cases"][0])
+@pytest.fixture(scope="module")
+def data(robot):
+    return sweep_poses(robot, parse_grid(GRID))
+
+
+def test_swept_points_equal_single_solutions(robot, data):
     for x in (-0.2, 0.2):
         one = solve_assembly(place_robot(robot, pose={"tx": x, "tz": -0.45}))
         point = data.sel(tx=x, tz=-0.45, method="nearest")
@@ -77,7 +81,7 @@ def test_map_of_a_single_axis_is_rejected(data):
         map_figure(data.isel(tx=[0]))
 
 
-def test_failed_margin_has_status_solver_failed(monkeypatch):
+def test_failed_margin_has_status_solver_failed(robot, monkeypatch):
     """The solver fails at one of two points."""
     solve = points.zone_margin
 
@@ -88,7 +92,6 @@ def test_failed_margin_has_status_solver_failed(monkeypatch):
         return found
 
     monkeypatch.setattr(points, "zone_margin", spoilt)
-    robot = irsbot2_with(NUMBERS["cases"][0])
     data = sweep_poses(robot, {"tx": np.array([0.0, 0.1]), "tz": np.array([-0.4])})
     assert data.status.values.ravel().tolist() == ["solver failed", "ok"]
     assert data.reason.values.ravel().tolist() == ["zone margin: gave up", ""]
@@ -114,14 +117,10 @@ def test_sweep_of_a_robot_object_equals_that_of_its_name():
     named = ff.sweep("five_bar", grid=FIVE_BAR_GRID)
     command = named.attrs.pop("command")
     assert command == f"forcefit assembly sweep five_bar --grid {FIVE_BAR_GRID}"
-    xarray.testing.assert_identical(
-        ff.sweep(ff.load_robot("five_bar"), grid=FIVE_BAR_GRID), named
-    )
-
-
-def test_varying_a_robot_object_is_rejected():
+    robot = ff.load_robot("five_bar")
+    xarray.testing.assert_identical(ff.sweep(robot, grid=FIVE_BAR_GRID), named)
     with pytest.raises(ff.BadInput, match="--vary: found a robot in memory"):
-        ff.sweep(ff.load_robot("five_bar"), grid=FIVE_BAR_GRID, vary=["a.b=1,2"])
+        ff.sweep(robot, grid=FIVE_BAR_GRID, vary=["a.b=1,2"])
 
 
 def test_sweep_stores_its_command_line():

@@ -3,14 +3,13 @@
 import numpy as np
 import pytest
 
-from forcefit.assembly.robots import load_robot
+from forcefit import BadInput, load_robot
 from forcefit.assembly.sweeps.targets import (
     goals_of,
     grid_targets,
     parse_grid,
     read_targets,
 )
-from forcefit.inputs.table import BadInput
 
 
 @pytest.fixture(scope="module")
