@@ -73,10 +73,7 @@ def test_energy_after_clearance_step_agrees_with_slsqp(seed, rows):
 @pytest.mark.parametrize("units", [1e-9, 1.0, 1e6])
 def test_clearance_step_with_negative_curvature_ends_at_bound(units):
     """The energy is concave, with a small force to one side of an interval."""
-    group = np.array([0])
-    p = ClearanceProblem(
-        -units * np.eye(1), np.array([-1e-3 * units]), np.zeros(1), group,
-        np.zeros((0, 1)), np.zeros(0),
-    )  # fmt: skip
+    p = ClearanceProblem(-units * np.eye(1), np.array([-1e-3 * units]), np.zeros(1),
+                         np.array([0]), np.zeros((0, 1)), np.zeros(0))  # fmt: skip
     step, _ = clearance_step(p, near=False)
     assert step == pytest.approx([1.0], abs=1e-6)

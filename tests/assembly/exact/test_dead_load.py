@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+from forcefit import BeamLink, Frame, MatrixLink, Robot, solve_exact
 from forcefit.assembly.exact.dead_load import dead_loads, work_gradient
-from forcefit.assembly.exact.exact import solve_exact
 from forcefit.assembly.exact.finite_robot import FiniteRobot
 from forcefit.assembly.exact.placement import place
 from forcefit.assembly.kinematics.posture import home_posture, place_robot
 from forcefit.assembly.linear.closure import virtual_joints
-from forcefit.assembly.model.robot import BeamLink, Frame, MatrixLink, Robot
 from forcefit.stiffness.screws import rotation_matrix, rotation_vector, screw_map
 from forcefit.validation.multibody.simulation import (
     simulate_assembly,
@@ -31,10 +30,8 @@ def heavy(robot, rng):
         link = frame.link
         if isinstance(link, MatrixLink | BeamLink) and frame.translation.any():
             link = BeamLink({"radius": 0.02}, 7e8, 0.3, density=2000.0)
-        frames.append(replace(
-            frame, link=link, mass=rng.uniform(0.5, 2.0),
-            centre_of_mass=rng.normal(size=3) * 0.1,
-        ))  # fmt: skip
+        frames.append(replace(frame, link=link, mass=rng.uniform(0.5, 2.0),
+                              centre_of_mass=rng.normal(size=3) * 0.1))  # fmt: skip
     return replace(robot, frames=tuple(frames))
 
 
@@ -86,9 +83,7 @@ def test_couple_on_body_acts_as_two_dead_forces():
     """In equilibrium, k a = m cos a, because the work of the couple m is m sin a."""
     posture = on_a_hinge(10.0, Frame("arm", "hinge", [0.5, 0, 0]))
     angle = brentq(lambda a: 10.0 * a - 9.0 * np.cos(a), 0.0, 1.5)
-    bodies = np.zeros((2, 6))
-    bodies[1, 2] = 9.0
-    answer = solve_exact(posture, bodies=bodies)
+    answer = solve_exact(posture, bodies=[[0] * 6, [0, 0, 9.0, 0, 0, 0]])
     assert answer.joint_screws[0, 2] == pytest.approx(angle, abs=1e-9)
 
 
@@ -130,15 +125,12 @@ def test_rotation_of_robot_and_gravity_rotates_the_solution(seed):
     turned = []
     for frame in robot.frames:
         if frame.parent == "base":
-            both = R @ rotation_matrix(frame.rotation)
-            frame = replace(
-                frame, rotation=rotation_vector(both), translation=R @ frame.translation
-            )
+            turn = rotation_vector(R @ rotation_matrix(frame.rotation))
+            frame = replace(frame, rotation=turn, translation=R @ frame.translation)
         turned.append(frame)
     here = solve_exact(home_posture(robot), gravity=[0, 0, -G])
-    there = solve_exact(
-        home_posture(replace(robot, frames=tuple(turned))), gravity=R @ [0, 0, -G]
-    )
+    posture = home_posture(replace(robot, frames=tuple(turned)))
+    there = solve_exact(posture, gravity=R @ [0, 0, -G])
     both = np.kron(np.eye(2), R)
     assert there.potential == pytest.approx(here.potential, rel=1e-9)
     assert there.platform_screw == pytest.approx(both @ here.platform_screw, abs=1e-9)

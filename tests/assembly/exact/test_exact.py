@@ -7,10 +7,9 @@ import pytest
 from scipy.optimize import brentq, root
 
 import forcefit.assembly.exact.exact as exact
+from forcefit import CannotAssemble, solve_assembly, solve_exact
 from forcefit.assembly.exact.descent import NotConverged, energy_of
-from forcefit.assembly.exact.exact import solve_exact
 from forcefit.assembly.kinematics.posture import home_posture, place_many, place_robot
-from forcefit.assembly.linear.energy import CannotAssemble, solve_assembly
 from forcefit.assembly.model.links import link_compliance
 from forcefit.assembly.model.robot import Clearance, Frame, Robot
 from forcefit.assembly.solvers.conic import SolverFailed
@@ -67,9 +66,8 @@ def triangle(length):
 def pendulum(stiffness, length):
     """Return a rigid bar along x on an elastic hinge."""
     hinge = Frame("hinge", joint="revolute", joint_stiffness=only(2, stiffness))
-    return home_posture(
-        Robot("bar", "tip", (hinge, Frame("tip", "hinge", [length, 0, 0])))
-    )
+    tip = Frame("tip", "hinge", [length, 0, 0])
+    return home_posture(Robot("bar", "tip", (hinge, tip)))
 
 
 # Comparison with closed forms at large rotations
@@ -77,7 +75,6 @@ def pendulum(stiffness, length):
 
 @pytest.mark.parametrize("longer", [1e-4, 0.05, 0.12])
 def test_rotations_of_two_bars_equal_law_of_cosines(longer):
-    """The law of cosines determines the rotations of both bars."""
     one, two = triangle(B + longer)
     answer = solve_exact(two_bars(longer))
     assert abs(one) > 0.2 or longer < 0.1
@@ -94,9 +91,8 @@ def test_linearisation_error_equals_closed_form():
     """Both solutions are known in closed form."""
     longer, step = 0.06, 1e-6
     slopes = (triangle(B + step) - triangle(B - step)) / (2 * step)
-    energy = (np.array([K_ONE, K_TWO]) @ (slopes * longer) ** 2) / 2
-    turns = triangle(B + longer)
-    exactly = (np.array([K_ONE, K_TWO]) @ turns**2) / 2
+    turns, springs = triangle(B + longer), np.array([K_ONE, K_TWO])
+    energy, exactly = (springs @ q**2 / 2 for q in (slopes * longer, turns))
     error = solve_exact(two_bars(longer)).linearisation_error
     assert error.energy == pytest.approx(energy - exactly, rel=1e-7)
     assert error.relative_energy == pytest.approx(energy / exactly - 1, rel=1e-7)
@@ -177,9 +173,8 @@ def test_pin_with_clearance_touches_rim_at_minimum_energy(longer):
     assert answer.joint_screws[3, 2] == pytest.approx(two, rel=1e-9)
     energy = (K_ONE * one**2 + K_TWO * two**2) / 2
     assert answer.energy == pytest.approx(energy, rel=1e-11)
-    assert np.hypot(*answer.clearance_screws[1, 3:5]) == pytest.approx(
-        clearance, rel=1e-12
-    )
+    gap = np.hypot(*answer.clearance_screws[1, 3:5])
+    assert gap == pytest.approx(clearance, rel=1e-12)
 
 
 def test_error_within_clearance_causes_no_energy():
@@ -204,12 +199,12 @@ def test_pin_tilts_within_clearance_if_axes_are_not_parallel():
 
 def test_load_on_rigid_loop_closes_the_smaller_clearance():
     """The load is transmitted by the clearance of 0.2 mm, which closes first."""
+    arm = [0.1, 0, 0], [0.5, 0.2, -0.3]
     frames = (
-        Frame("near", clearance=Clearance(axial=1e-3)),
-        Frame("tip", "near", [0.1, 0, 0], [0.5, 0.2, -0.3]),
+        Frame("near", clearance=Clearance(axial=1e-3)), Frame("tip", "near", *arm),
         Frame("far", clearance=Clearance(axial=2e-4),
               geometric_error=[0, 0, 0, 0, 0, 5e-4]),
-        Frame("end", "far", [0.1, 0, 0], [0.5, 0.2, -0.3]),
+        Frame("end", "far", *arm),
     )  # fmt: skip
     posture = home_posture(Robot("slides", "tip", frames, (("tip", "end"),)))
     answer = solve_exact(posture, [0, 0, 0, 0, 0, 5.0])
@@ -257,9 +252,8 @@ def test_unstable_equilibrium_has_negative_curvature():
 
 def test_rigid_loop_that_cannot_close_raises_cannot_assemble():
     robot = coaxial_beams([0, 0, 0, 1e-3, 0, 0], clearance=small_clearance())
-    rigid = robot.with_links({"one": None, "two": None})
     with pytest.raises(CannotAssemble):
-        solve_exact(home_posture(rigid))
+        solve_exact(home_posture(robot.with_links({"one": None, "two": None})))
 
 
 @pytest.mark.parametrize("load", [None, [0, 0, 0, 1, 0, 0]])
@@ -270,9 +264,7 @@ def test_solution_of_another_problem_is_rejected_as_start(load):
         solve_exact(posture, load, start)
 
 
-def test_too_few_steps_raise_not_converged(
-    monkeypatch,
-):
+def test_too_few_steps_raise_not_converged(monkeypatch):
     monkeypatch.setattr(exact, "_STEPS", 1)
     posture = place_robot(irsbot2_with(CASES["literal"]), pose={"tz": -0.5})
     message = (
@@ -306,11 +298,8 @@ def test_exact_solution_of_irsbot2_converges(case):
 
 def as_springs(robot, **options):
     """Return a multibody model in which all links are springs."""
-    stiffness = {
-        frame.name: np.linalg.inv(link_compliance(frame))
-        for frame in robot.frames
-        if frame.link is not None
-    }
+    links = [frame for frame in robot.frames if frame.link is not None]
+    stiffness = {frame.name: np.linalg.inv(link_compliance(frame)) for frame in links}
     return SimulationModel("spring", stiffness, **options)
 
 

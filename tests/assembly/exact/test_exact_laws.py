@@ -43,7 +43,6 @@ def test_linearisation_error_is_of_second_order(case):
 
 @pytest.mark.parametrize("seed", [1, 2, 3, 5])
 def test_energy_derivative_by_geometric_error_equals_force(seed):
-    """The derivative is computed by differences of solutions."""
     rng = np.random.default_rng(seed)
     robot, step = random_robot(rng, legs=3), 1e-6
     answer = solve_exact(home_posture(robot))
@@ -54,9 +53,8 @@ def test_energy_derivative_by_geometric_error_equals_force(seed):
         for side, sign in enumerate((1, -1)):
             errors = robot.errors.copy()
             errors[0, 3 + k] += sign * step
-            energies[k, side] = solve_exact(
-                home_posture(robot.with_errors(errors))
-            ).energy
+            moved = home_posture(robot.with_errors(errors))
+            energies[k, side] = solve_exact(moved).energy
     found = (energies[:, 0] - energies[:, 1]) / (2 * step)
     # the second term is the round-off of the energy divided by the step
     assert np.abs(found - expected).max() < 1e-5 * np.abs(through[:, 3:]).max() + 1e-7
@@ -86,10 +84,8 @@ def test_platform_displacement_satisfies_castigliano_theorem(name, component, va
     """The theorem also applies if some contacts have no force because of symmetry."""
     posture = home_posture(load_robot(name))
     unit, step = np.eye(6)[component], 1e-3
-    low, middle, high = (
-        solve_exact(posture, share * value * unit)
-        for share in (1 - step, 1.0, 1 + step)
-    )
+    low, middle, high = (solve_exact(posture, share * value * unit)
+                         for share in (1 - step, 1.0, 1 + step))  # fmt: skip
     assert middle.stationarity < 1e-7
     slope = (high.potential - low.potential) / (2 * step * value)
     # the tolerance is the error of the central difference
@@ -101,11 +97,8 @@ def loaded_arm(pieces=1):
     robot = load_robot("arm6")
     rng = np.random.default_rng(2)
     errors = rng.uniform(-1, 1, (len(robot.frames), 6)) * [*[2e-2] * 3, *[1e-3] * 3]
-    links = {
-        f.name: replace(f.link, pieces=pieces)
-        for f in robot.frames
-        if hasattr(f.link, "pieces")
-    }
+    beams = [f for f in robot.frames if hasattr(f.link, "pieces")]
+    links = {f.name: replace(f.link, pieces=pieces) for f in beams}
     assert links
     posture = place_robot(robot.with_links(links).with_errors(errors))
     return solve_exact(posture, [1.0, -2.0, 0.5, 20.0, 30.0, -40.0])
@@ -131,10 +124,8 @@ def test_start_from_nearby_solution_finds_same_equilibrium():
     again = solve_exact(posture, 1.01 * load)
     near = solve_exact(posture, 1.01 * load, near=before)
     assert near.platform_screw == pytest.approx(again.platform_screw, rel=1e-9)
-
     other = solve_exact(home_posture(load_robot("five_bar")), [0, 0, 0, 1, 0, 0])
     stranger = solve_exact(posture, load, near=other)
-
     assert np.array_equal(stranger.platform_screw, before.platform_screw)
 
 
@@ -181,13 +172,10 @@ def test_displacement_is_proportional_to_small_loads(pieces, radius):
         for given in ({"load": size * load}, {"bodies": size * load[None]}):
             answer = solve_exact(posture, **given)
             assert answer.stationarity <= 1e-7
-
             for part in (slice(3), slice(3, 6)):
                 found = answer.platform_screw[part] / size
-                rounding = 1e-15 / size
-                assert found == pytest.approx(
-                    C[part], abs=1e-3 * np.abs(C[part]).max() + rounding
-                )
+                tol = 1e-3 * np.abs(C[part]).max() + 1e-15 / size  # second: round-off
+                assert found == pytest.approx(C[part], abs=tol)
 
 
 def test_robot_without_errors_has_no_displacement():

@@ -99,16 +99,10 @@ def test_unknown_method_is_rejected(question):
 @pytest.mark.parametrize("start", ["start", "near"])
 def test_reference_method_rejects_compiled_start(start):
     posture = beams()
-    compiled, reference = (
-        {
-            "start": solve_assembly(posture, LOAD, method=method),
-            "near": solve_exact(posture, LOAD, method=method),
-        }[start]
-        for method in METHODS
-    )
-    with pytest.raises(
-        ValueError, match="start or near: found a solution of the compiled"
-    ):
+    solve = {"start": solve_assembly, "near": solve_exact}[start]
+    compiled, reference = (solve(posture, LOAD, method=m) for m in METHODS)
+    message = "start or near: found a solution of the compiled"
+    with pytest.raises(ValueError, match=message):
         solve_exact(posture, LOAD, method="reference", **{start: compiled})
     found = solve_exact(posture, LOAD, method="reference", **{start: reference})
     assert found.method == "reference"

@@ -24,7 +24,6 @@ from tests.robots_for_tests import random_robot
 
 @pytest.mark.parametrize("size", [1e-7, 1e-2, 0.5, 1.5])
 def test_exponential_of_screw_equals_matrix_exponential(rng, size):
-    """SciPy's matrix exponential is the reference."""
     s = size * rng.normal(size=6)
     generator = np.zeros((4, 4))
     x, y, z = s[:3]
@@ -76,7 +75,6 @@ def moved_unknowns(posture, rng, size):
 
 @pytest.mark.parametrize("seed", range(4))
 def test_closure_and_platform_derivatives_equal_finite_differences(seed):
-    """The derivatives are compared with central differences."""
     rng = np.random.default_rng(seed)
     model, x, h = moved_unknowns(home_posture(random_robot(rng, legs=3)), rng, 0.05)
     here, step = place(model, x), 1e-5

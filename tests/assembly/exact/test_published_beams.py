@@ -12,6 +12,7 @@ Sources:
 """
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -54,15 +55,28 @@ BAUCHAU = [
 ]
 
 
+def chain(steps, links):
+    """Return a chain of beams that is clamped at the base."""
+    frames = tuple(
+        Frame(f"f{k}", f"f{k - 1}" if k else "base", step, link=link)
+        for k, (step, link) in enumerate(zip(steps, links, strict=True))
+    )
+    return home_posture(Robot("chain", frames[-1].name, frames))
+
+
 def cantilever(length, link):
     """Return a beam along x that is clamped at the base."""
-    tip = Frame("tip", translation=[length, 0, 0], link=link)
-    return home_posture(Robot("cantilever", "tip", (tip,)))
+    return chain([[length, 0, 0]], [link])
 
 
 def tip_moved(posture, load):
     """Return the displacement of the platform's origin, (3,) [m]."""
     return solve_exact(posture, load).platform_screw[3:]
+
+
+def extrapolated(tips):
+    """Return the limit for many elements, if each solution has twice as many."""
+    return (4 * tips[-1] - tips[-2]) / 3
 
 
 def test_compliance_does_not_depend_on_number_of_beam_elements():
@@ -127,15 +141,8 @@ def curved_cantilever(chords, pieces):
                "shear_y": 5 / 6, "shear_z": 5 / 6}  # fmt: skip
     link = BeamLink(section, 1e7, 0.0, up=(0, 0, 1), pieces=pieces)
     angles = np.linspace(0, np.pi / 4, chords + 1)
-    nodes = 100.0 * np.column_stack([
-        np.sin(angles), 1 - np.cos(angles), np.zeros(chords + 1)
-    ])  # fmt: skip
-    parents = ["base", *(f"f{k}" for k in range(chords))]
-    frames = tuple(
-        Frame(f"f{k}", parents[k], nodes[k + 1] - nodes[k], link=link)
-        for k in range(chords)
-    )
-    return home_posture(Robot("bend", frames[-1].name, frames))
+    nodes = np.column_stack([np.sin(angles), 1 - np.cos(angles), 0 * angles])
+    return chain(100.0 * np.diff(nodes, axis=0), [link] * chords)
 
 
 ACROSS = [0, 0, 0, 0, 0, 600.0]  # [lb] force normal to the plane of the arc
@@ -149,7 +156,7 @@ def test_curved_cantilever_deflection_agrees_with_literature():
     tips = [tip_moved(curved_cantilever(n, 1), ACROSS) for n in (8, 16, 32)]
     off = [np.linalg.norm(one - two) for one, two in zip(tips, tips[1:], strict=False)]
     assert off[0] / off[1] == pytest.approx(4.0, rel=0.03)
-    tip = (4 * tips[2] - tips[1]) / 3
+    tip = extrapolated(tips)
     np.testing.assert_allclose(tip, [-23.5, -13.4, 53.4], rtol=0.016)
     np.testing.assert_allclose(tip, [-23.64597, -13.72080, 53.57765], rtol=0.009)
 
@@ -159,8 +166,8 @@ def test_curved_cantilever_deflection_agrees_with_exudyn():
     """The result is extrapolated to an infinite number of elements."""
     simulated = simulate_assembly(curved_cantilever(8, 1), load=ACROSS)
     tips = [tip_moved(curved_cantilever(8, n), ACROSS) for n in (2, 4)]
-    tip = (4 * tips[1] - tips[0]) / 3
-    np.testing.assert_allclose(tip, simulated.platform_screw[3:], rtol=1e-4)
+    expected = simulated.platform_screw[3:]
+    np.testing.assert_allclose(extrapolated(tips), expected, rtol=1e-4)
 
 
 def twisted_beam(count):
@@ -170,13 +177,9 @@ def twisted_beam(count):
     shear = 8.2604167e9 / (G * 0.125)
     section = {"area": 0.125, "I_y": 5.20833e8 / E, "I_z": 1.30208333e8 / E,
                "J": 1.41872656e8 / G, "shear_y": shear, "shear_z": shear}  # fmt: skip
-    frames = []
-    for k in range(count):
-        turn = np.pi / 2 * (k + 0.5) / count
-        link = BeamLink(section, E, nu, up=(0, -np.sin(turn), np.cos(turn)))
-        parent = frames[-1].name if frames else "base"
-        frames.append(Frame(f"f{k}", parent, [10 / count, 0, 0], link=link))
-    return home_posture(Robot("twisted", frames[-1].name, tuple(frames)))
+    turns = np.pi / 2 * (np.arange(count) + 0.5) / count
+    links = [BeamLink(section, E, nu, up=(0, -np.sin(t), np.cos(t))) for t in turns]
+    return chain([[10 / count, 0, 0]] * count, links)
 
 
 def test_twisted_beam_deflection_agrees_with_literature():
@@ -185,7 +188,7 @@ def test_twisted_beam_deflection_agrees_with_literature():
     tips = [tip_moved(twisted_beam(n), load) for n in (8, 16, 32)]
     rate = np.linalg.norm(tips[0] - tips[1]) / np.linalg.norm(tips[1] - tips[2])
     assert rate == pytest.approx(4.0, rel=0.02)
-    tip = (4 * tips[2] - tips[1]) / 3
+    tip = extrapolated(tips)
     np.testing.assert_allclose(tip, [-1.141526, -1.718053, -3.593213], rtol=3e-6)
     np.testing.assert_allclose(tip, [-1.134192, -1.714467, -3.58423], rtol=7e-3)
 
@@ -203,18 +206,14 @@ def composite_beam(count):
         to_tip = screw_map([-length * (1 - place) / 2, 0, 0])
         C += weight * length / 2 * to_tip @ np.linalg.inv(section) @ to_tip.T
     link = MatrixLink(np.linalg.inv((C + C.T) / 2))
-    frames = tuple(
-        Frame(f"f{k}", f"f{k - 1}" if k else "base", [length, 0, 0], link=link)
-        for k in range(count)
-    )
-    return home_posture(Robot("composite", frames[-1].name, frames))
+    return chain([[length, 0, 0]] * count, [link] * count)
 
 
 def test_composite_beam_deflection_agrees_with_literature():
     """Six digits agree after extrapolation."""
     tips = [tip_moved(composite_beam(n), [0, 0, 0, 0, 0, 150.0]) for n in (16, 32)]
     published = [-9.02726627566e-2, -6.47488486259e-2, 1.22973648292]
-    np.testing.assert_allclose((4 * tips[1] - tips[0]) / 3, published, rtol=1e-6)
+    np.testing.assert_allclose(extrapolated(tips), published, rtol=1e-6)
 
 
 def test_plane_cantilever_deflection_agrees_with_literature():
@@ -228,13 +227,12 @@ def test_plane_cantilever_deflection_agrees_with_literature():
                "J": 10.0, "shear_y": shear, "shear_z": 1.0}  # fmt: skip
     link = BeamLink(section, 2.07e11, nu, up=(0, 0, 1))
     load = [0, 0, 0, 0, 5e8 * height**3, 0]
-    tips = [
-        tip_moved(cantilever(2.0, replace(link, pieces=n)), load)[:2] for n in (8, 16)
-    ]
+    beams = [cantilever(2.0, replace(link, pieces=n)) for n in (8, 16)]
+    tips = [tip_moved(beam, load)[:2] for beam in beams]
     published = np.array([-0.15097, 0.71057])
     off = [np.abs(tip - published).max() for tip in tips]
     assert off[0] / off[1] == pytest.approx(4.0, rel=0.05)
-    np.testing.assert_allclose((4 * tips[1] - tips[0]) / 3, published, atol=1e-5)
+    np.testing.assert_allclose(extrapolated(tips), published, atol=1e-5)
 
 
 @pytest.mark.parametrize("angle", [1.0, 3.0])
@@ -302,30 +300,30 @@ def bauchau(pieces):
     return Robot("bauchau", "end_a", frames, (("end_a", "end_b"),))
 
 
+def assert_published(row, solve, pieces, in_plane, across):
+    """Check relative errors of the displacement of hinge C in plane and across it."""
+    angle, *published = row
+    posture = place_robot(bauchau(pieces), joints={"crank": -angle})
+    answer = solve(posture)
+    moved = posture.platform[:3, 3] - [0.24, 0.12, 0] + answer.platform_screw[3:]
+    off = 1e3 * moved - published
+    assert np.linalg.norm(off[:2]) < in_plane * np.linalg.norm(published[:2])
+    assert abs(off[2]) < across * abs(published[2])
+
+
 @pytest.mark.parametrize(
     ("pieces", "in_plane", "across"), [(1, 7e-3, 5e-3), (16, 1e-4, 1e-3)]
 )
 def test_four_bar_with_tilted_hinge_has_published_deflections(pieces, in_plane, across):
     """With 16 elements, deflections agree to 1e-4 in plane and 0.1 % out of plane."""
-    robot = bauchau(pieces)
-    for angle, *published in BAUCHAU:
-        posture = place_robot(robot, joints={"crank": -angle})
-        answer = solve_exact(posture)
-        moved = posture.platform[:3, 3] - [0.24, 0.12, 0] + answer.platform_screw[3:]
-        off = 1e3 * moved - published
-        assert np.linalg.norm(off[:2]) < in_plane * np.linalg.norm(published[:2])
-        assert abs(off[2]) < across * abs(published[2])
+    for row in BAUCHAU:
+        assert_published(row, solve_exact, pieces, in_plane, across)
 
 
 @pytest.mark.exudyn
 @pytest.mark.parametrize("row", BAUCHAU)
 def test_simulated_four_bar_with_tilted_hinge_has_published_deflections(row):
     """Deflections agree to 1e-4 in plane and 0.1 % out of plane."""
-    angle, *published = row
-    posture = place_robot(bauchau(1), joints={"crank": -angle})
     model = SimulationModel(links="beam", elements=8)
-    answer = simulate_assembly(posture, model=model)
-    moved = posture.platform[:3, 3] - [0.24, 0.12, 0] + answer.platform_screw[3:]
-    off = 1e3 * moved - published
-    assert np.linalg.norm(off[:2]) < 1e-4 * np.linalg.norm(published[:2])
-    assert abs(off[2]) < 1e-3 * abs(published[2])
+    solve = partial(simulate_assembly, model=model)
+    assert_published(row, solve, 1, 1e-4, 1e-3)

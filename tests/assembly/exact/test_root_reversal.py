@@ -45,9 +45,8 @@ def random_legs(rng):
     for _ in range(2):
         leg, here = [], np.eye(4)
         for _ in range(2):
-            T = transform(
-                rng.uniform(-0.3, 0.3, 3), rotation_matrix(rng.normal(size=3))
-            )
+            shift, turn = rng.uniform(-0.3, 0.3, 3), rng.normal(size=3)
+            T = transform(shift, rotation_matrix(turn))
             here = here @ T
             leg.append((T, rng.choice(["pin", "hinge", "clearance"])))
         leg.append((np.linalg.inv(here) @ platform, None))
@@ -79,7 +78,7 @@ def robot_of(legs):
                 f"{name}{i}", above, one.T[:3, 3], rotation_vector(one.T[:3, :3]),
                 geometric_error=one.error, link=MatrixLink(one.K), **one.joint,
             ))  # fmt: skip
-            above = f"{name}{i}"
+            above = frames[-1].name
         ends.append(above)
     return Robot("two_legs", ends[0], tuple(frames), (tuple(ends),))
 
@@ -100,9 +99,8 @@ def test_solution_does_not_depend_on_choice_of_base(seed):
     other = solve_assembly(home_posture(robot_of(from_the_platform(legs))))
     assert one.energy > 1e-6
     assert other.energy == pytest.approx(one.energy, rel=1e-8)
-    assert other.energy_without_clearance == pytest.approx(
-        one.energy_without_clearance, rel=1e-9
-    )
+    plain = one.energy_without_clearance
+    assert other.energy_without_clearance == pytest.approx(plain, rel=1e-9)
     # the base moves relative to the platform by the inverse motion
     R, p = platform[:3, :3], platform[:3, 3]
     expected = -screw_map(R.T @ p, R.T) @ one.platform_screw
@@ -113,9 +111,8 @@ def test_solution_does_not_depend_on_choice_of_base(seed):
         for k, this in enumerate(legs["ab".index(name)]):
             here = one.wrenches[one.posture.robot.index(f"{name}{k}")]
             there = other.wrenches[other.posture.robot.index(f"{name}{2 - k}")]
-            back = screw_map(this.T[:3, 3], this.T[:3, :3])
-            assert back.T @ there == pytest.approx(-here, rel=1e-4, abs=1e-4 * np.abs(
-                here).max())  # fmt: skip
+            back, tol = screw_map(this.T[:3, 3], this.T[:3, :3]), np.abs(here).max()
+            assert back.T @ there == pytest.approx(-here, rel=1e-4, abs=1e-4 * tol)
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -124,14 +121,11 @@ def test_exact_energy_with_exchanged_base_differs_by_second_order(seed):
     legs, _ = random_legs(np.random.default_rng(seed))
     off = []
     for s in (1.0, 0.5):
-        for leg in legs:
-            for one in leg:
-                one.error = one.error * s
-                one.joint.pop("clearance", None)
-        energies = [
-            solve_exact(home_posture(robot_of(these))).energy
-            for these in (legs, from_the_platform(legs))
-        ]
-        off.append(abs(energies[1] / energies[0] - 1))
+        for one in (*legs[0], *legs[1]):
+            one.error = one.error * s
+            one.joint.pop("clearance", None)
+        here, there = (solve_exact(home_posture(robot_of(these))).energy
+                       for these in (legs, from_the_platform(legs)))  # fmt: skip
+        off.append(abs(there / here - 1))
     assert off[0] < 0.05
     assert off[1] < 0.7 * off[0] + 1e-9
