@@ -23,10 +23,8 @@ def frequencies(*frames):
 
 def mount(rotation, translation, **keys):
     """Return the frequencies of a body on isotropic springs."""
-    seat = Frame(
-        "seat", joint_stiffness=np.diag([rotation] * 3 + [translation] * 3),
-        rotation=rotation_vector(TURN),
-    )  # fmt: skip
+    K = np.diag([rotation] * 3 + [translation] * 3)
+    seat = Frame("seat", joint_stiffness=K, rotation=rotation_vector(TURN))
     return frequencies(seat, Frame("body", "seat", **keys))
 
 

@@ -6,17 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from forcefit import BadInput, load_robot, natural_modes
 from forcefit.assembly.files.robot_file import read_robot
 from forcefit.assembly.files.solved_links import solved_link
 from forcefit.assembly.kinematics.posture import home_posture
 from forcefit.assembly.model.mesh_link import mesh_link_mass
 from forcefit.assembly.model.robot import BeamLink, Clearance, Frame, MeshLink, Robot
-from forcefit.assembly.platform_stiffness.vibration import (
-    discretisation_errors,
-    natural_modes,
-)
-from forcefit.assembly.robots import load_robot
-from forcefit.inputs.table import BadInput
+from forcefit.assembly.platform_stiffness.vibration import discretisation_errors
 from forcefit.stiffness.screws import rotation_matrix
 from tests.assembly.exact.test_exact import only
 
@@ -70,27 +66,24 @@ def test_gravity_lowers_frequency_of_inverted_pendulum(moment):
 
 
 @pytest.mark.parametrize(
-    ("pieces", "first", "second"), [(1, 6e-3, 0.6), (4, 5e-5, 2e-3), (8, 4e-6, 2e-4)]
+    ("pieces", "first", "second"),
+    [(1, 6e-3, 0.6), (2, 6e-3, 0.6), (4, 5e-5, 2e-3), (8, 4e-6, 2e-4)],
 )
 def test_bending_frequencies_of_cantilever_converge_to_closed_form(
     pieces, first, second
 ):
-    """The frequencies are too high, with errors of order 1/n^4 for n elements."""
+    """The frequencies are too high, with errors of order 1/n^4 for n elements.
+
+    With one element, the estimate of the error of the second mode lacks higher orders.
+    """
     modes = natural_modes(cantilever(pieces), 4)
     off = modes.frequencies / np.repeat([bending(1.8751041), bending(4.6940911)], 2) - 1
     assert (off > 0).all()
     assert off[:2].max() < first
     assert off[2:].max() < second
-
-
-@pytest.mark.parametrize("pieces", [1, 2, 4])
-def test_estimated_frequency_error_agrees_with_the_exact_error(pieces):
-    """With one element, the estimate for the second mode lacks higher orders."""
-    modes = natural_modes(cantilever(pieces), 4)
-    exact = np.repeat([bending(1.8751041), bending(4.6940911)], 2)
-    errors = modes.frequencies / exact - 1
-    tolerance = 0.5 if pieces == 1 else 0.1
-    np.testing.assert_allclose(discretisation_errors(modes), errors, rtol=tolerance)
+    if pieces < 8:
+        tolerance = 0.5 if pieces == 1 else 0.1
+        np.testing.assert_allclose(discretisation_errors(modes), off, rtol=tolerance)
 
 
 @pytest.mark.parametrize("pieces", [4, 8])
@@ -151,10 +144,9 @@ def test_natural_modes_ignore_clearances_and_require_a_mass():
     (tip,) = posture.robot.frames
     loose = replace(tip, name="beam", clearance=Clearance(radial=1e-4))
     robot = Robot("loose", "end", (loose, Frame("end", "beam")))
-    np.testing.assert_allclose(
-        natural_modes(home_posture(robot), 2).frequencies,
-        natural_modes(posture, 2).frequencies, rtol=1e-9,
-    )  # fmt: skip
+    both = natural_modes(home_posture(robot), 2), natural_modes(posture, 2)
+    one, other = (modes.frequencies for modes in both)
+    np.testing.assert_allclose(one, other, rtol=1e-9)
     with pytest.raises(BadInput, match="found no moving mass"):
         natural_modes(home_posture(load_robot("irsbot2")))
 
@@ -167,11 +159,9 @@ def test_frequencies_of_meshed_bar_agree_with_beam():
     """
     length, radius = 0.452, 0.04
     solid = MeshLink(MESHES / "distal_plain.stl", "z=0", "z=0.452", E, 0.3, RHO)
-    beam = BeamLink({"radius": radius}, E, 0.3, RHO)
-    solid, beam = (
-        Frame("tip", translation=[length, 0, 0], link=link) for link in (solid, beam)
-    )
-    solid = replace(solid, link=solved_link(solid))
+    beam = Frame("tip", translation=[length, 0, 0],
+                 link=BeamLink({"radius": radius}, E, 0.3, RHO))  # fmt: skip
+    solid = replace(beam, link=solved_link(replace(beam, link=solid)))
     mass, span = mesh_link_mass(solid)
     np.testing.assert_allclose(span, [length, 0, 0], atol=1e-9)
     volume = np.pi * radius**2 * length
@@ -192,11 +182,7 @@ SCREWS_AND_RODS = """
 format = 2
 platform = "plate"
 platform_at = [0.02, 0.03, 0.35]
-[[body]]
-name = "plate"
-mass = 2.5
-centre = [0.01, 0.02, 0.5]
-inertia = [0.02, 0.03, 0.025, 0.002, -0.001, 0.003]
+body = [{ name = "plate", mass = 2.5, centre = [0.01, 0.02, 0.5], inertia = [0.02, 0.03, 0.025, 0.002, -0.001, 0.003] }]
 [[leg]]
 name = "screw"
 repeat = { count = 3, about = [1, 0.2, 2], at = [0.1, 0, 0.1] }
@@ -253,13 +239,11 @@ joint = [
 """  # noqa: E501
 
 
-def test_point_mass_on_six_rods_has_three_modes(tmp_path):
+def test_point_mass_on_six_rods_has_three_modes(write_file):
     """The expected stiffness is condensed to the translations of the mass.
 
     The two bars of a leg are springs EA/L on a drive, which is a spring along z.
     """
-    file = tmp_path / "robot.toml"
-    file.write_text(LINEAR_DELTA)
     rod = np.array([-0.27, 0.0, -0.5])
     length = np.linalg.norm(rod)
     bar = length / (7e10 * np.pi * 0.008**2)
@@ -274,5 +258,5 @@ def test_point_mass_on_six_rods_has_three_modes(tmp_path):
         K += wrenches.T @ leg @ wrenches
     condensed = K[3:, 3:] - K[3:, :3] @ np.linalg.solve(K[:3, :3], K[:3, 3:])
     expected = np.sqrt(np.linalg.eigvalsh(condensed) / 1.5) / (2 * np.pi)
-    modes = natural_modes(home_posture(read_robot(file)), 6)
+    modes = natural_modes(home_posture(read_robot(write_file(LINEAR_DELTA))), 6)
     np.testing.assert_allclose(modes.frequencies, expected, rtol=1e-8)
