@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 from forcefit import BadInput
 from forcefit.assembly.files.robot_file import read_robot
@@ -14,6 +13,7 @@ from forcefit.assembly.model.error_distributions import tolerance_sources
 from forcefit.assembly.statistics.callout_sources import sources_of
 from forcefit.assembly.statistics.experiment import Experiment
 from forcefit.assembly.statistics.importance import linear_importance, source_groups
+from forcefit.assembly.statistics.linear_response import linear_response
 from forcefit.assembly.statistics.monte_carlo import run_draws
 from tests.drawn_four_bar_for_tests import COEFFICIENTS, LEVER, four_bar_file
 from tests.pages_for_tests import parse
@@ -26,27 +26,22 @@ def four_bar(tmp_path_factory):
     return read_robot(path)
 
 
-@pytest.fixture(scope="module")
-def experiment(four_bar):
-    return Experiment(
-        home_posture(four_bar), sources_of(four_bar), clearance="least", margins=False
-    )
-
-
-def test_rotation_of_a_coupler_equals_hand_calculation(experiment):
+def test_rotation_of_a_coupler_equals_hand_calculation(four_bar):
     """The lengths are uniformly distributed within 20 um, so their standard deviation
     is 20 um / sqrt(3).
     """
-    data = run_draws(experiment, 20_000)
+    data = run_draws(Experiment(
+        home_posture(four_bar), sources_of(four_bar), clearance="least", margins=False
+    ), 20_000)  # fmt: skip
     root = np.sqrt(sum(c**2 for c in COEFFICIENTS.values()))
     expected = root * 20e-6 / np.sqrt(3) / LEVER
     turned = data["platform_screw"].values[:, 2]
     assert turned.std() == pytest.approx(expected, rel=0.01)
 
 
-def test_importance_of_each_callout_equals_hand_calculation(experiment):
-    sources = experiment.sources
-    slopes = experiment.energies.screws[2, -6 * len(sources.robot.frames) :]
+def test_importance_of_each_callout_equals_hand_calculation(four_bar):
+    sources, response = sources_of(four_bar), linear_response(home_posture(four_bar))
+    slopes = response.screws[2, -6 * len(four_bar.frames) :]
     shares = linear_importance(
         sources.of_numbers(slopes.reshape(1, -1, 6)), sources,
         groups := source_groups(sources, "source"),
@@ -67,14 +62,13 @@ def test_draw_does_not_depend_on_the_division_into_blocks(four_bar):
 
 def test_independent_errors_are_added_to_callouts(four_bar):
     independent = tolerance_sources(four_bar, np.eye(6)[3] * 1e-5, ("C",))
-    sources = sources_of(four_bar, independent)
-    assert len(sources) == len(sources_of(four_bar)) + 1
-    values = sources.draw(0, 50_000, 1)
-    errors = sources.errors(values)[:, four_bar.index("C")]
-    alone = sources_of(four_bar)
-    of_callouts = alone.errors(alone.draw(0, 50_000, 1))[:, four_bar.index("C")]
-    added = errors[:, 3].var() - of_callouts[:, 3].var()
-    assert added == pytest.approx(1e-10 / 3, rel=0.05)
+    sources, alone = sources_of(four_bar, independent), sources_of(four_bar)
+    assert len(sources) == len(alone) + 1
+    both, of_callouts = (
+        one.errors(one.draw(0, 50_000, 1))[:, four_bar.index("C"), 3].var()
+        for one in (sources, alone)
+    )
+    assert both - of_callouts == pytest.approx(1e-10 / 3, rel=0.05)
     assert [n for n, _ in source_groups(sources, "source")][0] == "C.TX"
 
 
@@ -150,18 +144,16 @@ def test_hole_size_that_differs_from_its_fit_is_rejected(write_file):
         read_robot(write_file(LOOSE.replace('hole = "12 H7"', 'hole = "12 H8"')))
 
 
-def test_command_reports_the_importance_by_callout(tmp_path):
-    from forcefit.commands.app import app
-
-    path, answer = tmp_path / "four_bar.toml", tmp_path / "answer.json"
-    path.write_text(four_bar_file())
-    words = ["assembly", "statistics", str(path), "--draws", "200", "--importance",
-             "128", "--clearance", "least", "--json", str(answer), "-o",
-             str(tmp_path / "draws.nc"), "--limit", "translation=2e-5", "--capability",
-             "--worst-case", "--report", str(tmp_path / "page.html")]  # fmt: skip
-    result = CliRunner().invoke(app, words)
-    assert result.exit_code == 0, result.output
-    assert "length of C on rocker" in result.output
+def test_command_reports_the_importance_by_callout(tmp_path, run, write_file):
+    answer = tmp_path / "answer.json"
+    status, text, err = run(
+        "assembly", "statistics", write_file(four_bar_file()), "--draws", 200,
+        "--importance", 128, "--clearance", "least", "--json", answer, "-o",
+        tmp_path / "draws.nc", "--limit", "translation=2e-5", "--capability",
+        "--worst-case", "--report", tmp_path / "page.html",
+    )  # fmt: skip
+    assert status == 0, err
+    assert "length of C on rocker" in text
     results = json.loads(answer.read_text())
     groups = results["importance"]["platform"]
     assert set(groups) == {
@@ -174,7 +166,7 @@ def test_command_reports_the_importance_by_callout(tmp_path):
     name = max(shares, key=lambda group: shares[group][0])
     value, low, high = (round(100 * min(share, 1.0)) for share in shares[name])
     sentence = f"{name}: {value} % of the variance of the translation ({low} to {high}"
-    assert sentence in result.output
+    assert sentence in text
     page = (tmp_path / "page.html").read_text()
     assert sentence in page.replace("&nbsp;", " ")
     columns = parse(page).table("quantity", "limit", "Cp")[1]

@@ -4,14 +4,13 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from forcefit import Clearance, Frame, MatrixLink, Robot, load_robot
 from forcefit.assembly.kinematics.nominal import size_of
 from forcefit.assembly.kinematics.posture import home_posture, place_robot
 from forcefit.assembly.model.error_distributions import (
     draw_generator,
     tolerance_sources,
 )
-from forcefit.assembly.model.robot import Clearance, Frame, MatrixLink, Robot
-from forcefit.assembly.robots import load_robot
 from forcefit.assembly.solvers.uniform_clearance import sample_uniform_position
 from forcefit.assembly.statistics.clearance_positions import (
     loaded_clearances,
@@ -95,30 +94,6 @@ def test_random_walk_that_does_not_mix_is_reported():
     middle = np.zeros(2)
     assert not sample_uniform_position(along, starts, to_screw, middle, rng, 0)
     assert sample_uniform_position(along, starts, to_screw, middle, rng)
-
-
-def test_platform_with_two_clearances_is_uniform_in_the_common_range():
-    """Two axial clearances of 2 mm and 1 mm act on the platform in parallel.
-
-    The first allows z from -2 to 2 mm. The second is offset by 0.5 mm and allows z from
-    -0.5 to 1.5 mm, which is the common range.
-    """
-    shift = [0.0, 0.0, 0.0, 0.0, 0.0, 5e-4]
-    steel = MatrixLink(np.eye(6) * 1e6)
-    frames = (
-        Frame("one", link=steel, clearance=Clearance(axial=2e-3)),
-        Frame(
-            "two", link=steel, clearance=Clearance(axial=1e-3), geometric_error=shift
-        ),
-    )
-    robot = Robot("two pins", "one", frames, (("one", "two"),))
-    prepared = linear_response(home_posture(robot))
-    draws = prepared.solve(np.repeat(robot.errors[None], 300, axis=0))
-    assert draws.energy.max() == 0.0
-    screws, mixed = position_clearances(prepared, draws, "uniform", generators(300))
-    assert mixed.all()
-    z = screws[:, 5] * 1e3
-    assert stats.kstest((z + 0.5) / 2, "uniform").pvalue > 1e-3
 
 
 @pytest.mark.parametrize(("kind", "first"), [("radial", 3), ("tilt", 0)])

@@ -130,16 +130,12 @@ CASES = {
 @pytest.mark.parametrize("name", CASES)
 def test_worst_case_of_callouts_equals_hand_calculation(write_file, name):
     text, expected, _ = CASES[name]
-    robot = read_robot(write_file(text))
-    prepared = linear_response(home_posture(robot))
-    worst = worst_pose(prepared, sources_of(robot), "translation")
+    worst = worst_pose(home_posture(read_robot(write_file(text))))
     assert worst.attained == pytest.approx(expected * um, rel=1e-6)
     assert worst.attained <= worst.bound <= worst.attained * 1.001
 
 
-@pytest.mark.parametrize(
-    "name", [n for n, case in CASES.items() if case[2] is not None]
-)
+@pytest.mark.parametrize("name", ["shaft", "link", "plate"])
 def test_standard_deviations_of_callouts_equal_hand_calculation(write_file, name):
     """For 200 000 draws, the error of the standard deviation is about 0.3 %."""
     text, _, expected = CASES[name]
@@ -154,9 +150,7 @@ def translations(robot):
     return errors @ prepared.platform[3:].T
 
 
-def test_variance_of_a_bracket_includes_the_datum_shift(
-    write_file,
-):
+def test_variance_of_a_bracket_includes_the_datum_shift(write_file):
     """A bore of 20 mm length has position 0.04 mm and perpendicularity 0.02 mm. The
     expected values are those of an independent sample of both ends in discs. The datum
     shift of up to 9 um adds a variance of 81/12 um^2 along x and y.

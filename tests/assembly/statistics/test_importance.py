@@ -5,10 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from forcefit import Frame, MatrixLink, Robot
+from forcefit import load_robot
 from forcefit.assembly.kinematics.posture import home_posture, place_robot
 from forcefit.assembly.model.error_distributions import tolerance_sources
-from forcefit.assembly.robots import load_robot
 from forcefit.assembly.statistics.clearance_positions import CLEARANCE_MODELS
 from forcefit.assembly.statistics.experiment import Experiment
 from forcefit.assembly.statistics.importance import (
@@ -22,7 +21,9 @@ from forcefit.assembly.statistics.importance_table import ImportanceOptions
 from forcefit.assembly.statistics.linear_response import linear_response
 from forcefit.assembly.statistics.monte_carlo import run_draws
 from forcefit.assembly.statistics.summary import summarise, summary_text
-from tests.tolerances_for_tests import arm
+from tests.tolerances_for_tests import arm, parallel, without_clearances
+
+THREE = [(str(i), np.array([i])) for i in range(3)]  # groups of a single variable
 
 
 def test_sobol_indices_of_ishigami_function_equal_published_values():
@@ -36,8 +37,7 @@ def test_sobol_indices_of_ishigami_function_equal_published_values():
         rng = np.random.default_rng(stream)
         return rng.uniform(-np.pi, np.pi, size=(count, 3))
 
-    groups = [(str(i), np.array([i])) for i in range(3)]
-    found = sobol_importance(ishigami, sample, groups, 20_000)
+    found = sobol_importance(ishigami, sample, THREE, 20_000)
     first, total = [0.3139, 0.4424, 0.0], [0.5576, 0.4424, 0.2437]
     for row in range(2):  # the indices do not depend on scale and offset
         np.testing.assert_allclose(found.first[row, :, 0], first, atol=0.03)
@@ -48,16 +48,11 @@ def test_sobol_indices_of_ishigami_function_equal_published_values():
     assert found.variance[0] == pytest.approx(13.845, rel=0.03)
 
 
-def additive(scale=1.0, shift=0.0):
-    """Return a design of 400 draws and the results 3 x + 2 y + z."""
-    A, B = np.random.default_rng(4).normal(size=(2, 400, 3))
-    design = SaltelliDesign(A, B, [(n, np.array([k])) for k, n in enumerate("xyz")])
-    x = design.rows(0, len(design))
-    return design, scale * (x @ [3.0, 2.0, 1.0])[:, None] + shift
-
-
 def test_sobol_indices_of_a_constant_result_are_nan():
-    design, results = additive()
+    """The first result is 3 x + 2 y + z."""
+    A, B = np.random.default_rng(4).normal(size=(2, 400, 3))
+    design = SaltelliDesign(A, B, THREE)
+    results = design.rows(0, len(design)) @ [[3.0], [2.0], [1.0]]
     rounded = 1e6 + 1e-8 * np.sign(results)
     found = sobol_indices(design, np.hstack([results, rounded, np.nan * results]))
     assert np.isfinite(found.first[0]).all()
@@ -68,10 +63,7 @@ def test_sobol_indices_of_a_constant_result_are_nan():
 @pytest.mark.slow
 def test_sobol_indices_of_a_linear_robot_equal_closed_form():
     """The platform screw is linear in the errors."""
-    robot = load_robot("irsbot2")
-    robot = replace(
-        robot, frames=tuple(replace(f, clearance=None) for f in robot.frames)
-    )
+    robot = without_clearances(load_robot("irsbot2"))
     sources = tolerance_sources(robot, [1e-3] * 3 + [1e-4] * 3)
     one = linear_response(place_robot(robot))
     groups = source_groups(sources, "kind")
@@ -85,27 +77,20 @@ def test_sobol_indices_of_a_linear_robot_equal_closed_form():
     # Four standard errors are about 4 / sqrt(4000).
     np.testing.assert_allclose(found.first[..., 0], expected, atol=0.065)
     np.testing.assert_allclose(found.total[..., 0], expected, atol=0.065)
-    slopes = one.screws[:, columns]
-    spread = (slopes**2 * sources.variance).sum(axis=1)
+    spread = (one.screws[:, columns] ** 2 * sources.variance).sum(axis=1)
     np.testing.assert_allclose(found.variance, spread, rtol=0.1)
 
 
-def failing(x, share):
-    """Return 4 a + b, or NaN if the third variable is small."""
-    value = 2 * x[:, 0] + x[:, 1]
-    return np.where(x[:, 2] < share, np.nan, value)[:, None]
-
-
-def three(stream, k):
-    return np.random.default_rng(stream).random((k, 3))
-
-
-THREE = [(str(i), np.array([i])) for i in range(3)]
-
-
 def test_failed_draws_are_omitted_and_counted():
-    """The failures do not depend on a and b."""
-    found = sobol_importance(lambda x: failing(x, 0.01), three, THREE, 8000)
+    """The failures do not depend on a and b in the result 2 a + b."""
+
+    def failing(x):
+        return np.where(x[:, 2] < 0.01, np.nan, 2 * x[:, 0] + x[:, 1])[:, None]
+
+    def sample(stream, count):
+        return np.random.default_rng(stream).random((count, 3))
+
+    found = sobol_importance(failing, sample, THREE, 8000)
     np.testing.assert_allclose(found.first[0, :, 0], [0.8, 0.2, 0.0], atol=0.05)
     np.testing.assert_allclose(found.total[0, :, 0], [0.8, 0.2, 0.0], atol=0.05)
     # A and B fail independently. For the third variable, the mixed draw fails with B.
@@ -115,15 +100,8 @@ def test_failed_draws_are_omitted_and_counted():
 
 @pytest.fixture(scope="module")
 def stiff():
-    """Return a platform on two springs of 9e6 and 1e6 N/m. It moves by 0.9 and 0.1
-    times their errors.
-    """
-    frames = (
-        Frame("one", translation=[0.5, 0, 0], link=MatrixLink(np.eye(6) * 9e6)),
-        Frame("mount", translation=[1.0, 0, 0]),
-        Frame("two", "mount", [-0.5, 0, 0], link=MatrixLink(np.eye(6) * 1e6)),
-    )
-    robot = Robot("parallel", "one", frames, (("one", "two"),))
+    """Return a platform that moves by 0.9 and 0.1 times the errors of two springs."""
+    robot = parallel(9e6, 1e6)
     sources = tolerance_sources(robot, [0, 0, 0, 1e-5, 0, 0], ("one", "two"))
     return Experiment(home_posture(robot), sources)
 

@@ -194,19 +194,14 @@ def test_nan_shares_have_no_rank():
     assert possible_ranks({}) == {}
 
 
-def test_names_of_all_legs_are_merged():
+def test_names_of_errors_are_merged_if_all_legs_are_named():
     every = [f"leg{i}.hinge.{c}" for i in (1, 2, 3) for c in ("RX", "RY")]
     some = ["leg3.hinge.RX", "leg1.hinge.RX", "leg2.hinge.RX"]
     assert named_together(some, every) == ["hinge.RX of all legs"]
     # If one leg is missing, the other legs keep their names.
     assert named_together(some[:2], every) == some[:2]
-    assert named_together(["leg1.hinge.RY", *some], every) == [
-        "leg1.hinge.RY",
-        "hinge.RX of all legs",
-    ]
-
-
-def test_names_without_a_leg_are_not_merged():
+    one_more = named_together(["leg1.hinge.RY", *some], every)
+    assert one_more == ["leg1.hinge.RY", "hinge.RX of all legs"]
     assert named_together(["tip.RX"], ["tip.RX", "tip.RY"]) == ["tip.RX"]
     assert kind_of("tip.RX") == "tip.RX"
     assert kind_of("leg1.upper.pin.TZ") == "upper.pin.TZ"

@@ -12,7 +12,7 @@ from forcefit.assembly.solvers.conic import SolverFailed
 from forcefit.assembly.statistics.linear_response import linear_response
 from forcefit.assembly.statistics.posture_margins import prepare_margins
 from tests.robots_for_tests import random_robot
-from tests.tolerances_for_tests import drawn_errors
+from tests.tolerances_for_tests import drawn_errors, without_clearances
 
 ROBOTS = ["irsbot2", "five_bar", "3rrr", "orthoglide", "hexapod", "arm6"]
 LOAD, GRAVITY = [1.0, 2.0, 3.0, 30.0, 10.0, -100.0], [1.0, 2.0, -9.81]
@@ -110,9 +110,7 @@ def test_margins_of_draws_of_random_robots_equal_single_solutions(seed):
 
 def test_margin_is_infinite_if_loops_cannot_close():
     """The coupler of a planar four-bar linkage is out of plane."""
-    robot = load_robot("four_bar")
-    tight = tuple(replace(f, clearance=None) for f in robot.frames)
-    robot = replace(robot, frames=tight)
+    robot = without_clearances(load_robot("four_bar"))
     errors = np.zeros((5, len(robot.frames), 6))
     errors[1:, 2, 5] = 1e-9, 1e-6, 1e-3, -1.0
     for compliant in ("rigid", "free"):

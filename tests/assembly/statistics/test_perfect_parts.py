@@ -3,22 +3,20 @@
 import numpy as np
 import pytest
 
-from forcefit.assembly.files.robot_file import write_robot
+from forcefit import load_robot, worst_pose, write_robot
+from forcefit.assembly.files.robot_file import read_robot
 from forcefit.assembly.kinematics.posture import home_posture, place_robot
 from forcefit.assembly.model.error_distributions import tolerance_sources
-from forcefit.assembly.robots import load_robot
+from forcefit.assembly.model.joint_names import joint_of
+from forcefit.assembly.statistics.callout_sources import sources_of
 from forcefit.assembly.statistics.experiment import Experiment
 from forcefit.assembly.statistics.perfect_parts import perfect_parts
+from tests.guided_stage_for_tests import STAGE
 from tests.pages_for_tests import tiles
 from tests.tolerances_for_tests import ARM, arm
 
 RADIAL, TILT = 1e-4, 2e-3
-ERRORS = """
-[[errors]]
-frames = ["tip"]
-distribution = "uniform"
-most = [0, 0, 0, 1e-6, 1e-6, 1e-6]
-"""
+ERRORS = 'errors = [{ frames = ["tip"], most = [0, 0, 0, 1e-6, 1e-6, 1e-6] }]'
 
 
 def experiment(robot, **options):
@@ -109,4 +107,49 @@ def test_motion_of_a_passive_joint_has_a_separate_contribution():
     by_kind = parts["translation"]["clearances"]
     assert by_kind == pytest.approx(
         {"own motion of passive joints": ARM * 1e-3, "pin.radial": RADIAL}, rel=1e-2
+    )
+
+
+# [rad, m] Largest value and contribution of each joint, computed independently with
+# cvxpy. A contribution is the derivative with respect to the logarithm of the
+# clearance.
+WORST = {
+    "rotation": (1.34029e-3, {
+        "clearance of x": 0.92274e-3, "clearance of y": 0.24606e-3,
+        "profile of sole": 0.09187e-3, "clearance of foot": 0.07962e-3,
+    }),
+    "translation": (226.746e-6, {
+        "clearance of x": 135.245e-6, "profile of sole": 42.605e-6,
+        "clearance of foot": 36.924e-6, "clearance of y": 11.972e-6,
+    }),
+}  # fmt: skip
+
+
+@pytest.fixture
+def stage(write_file):
+    """Return an over-constrained stage with clearances in guides."""
+    return read_robot(write_file(STAGE))
+
+
+@pytest.mark.parametrize("quantity", WORST)
+def test_contributions_to_a_rigid_worst_case_are_listed_by_joint(stage, quantity):
+    found = worst_pose(home_posture(stage), quantity=quantity)
+    value, parts = WORST[quantity]
+    assert found.reading == "rigid"
+    assert found.attained == pytest.approx(value, rel=1e-5)
+    assert dict(found.shares) == pytest.approx(parts, rel=1e-3)
+    assert sum(dict(found.shares).values()) == pytest.approx(value, rel=1e-3)
+
+
+def test_every_contact_belongs_to_a_joint(stage):
+    owners = {joint_of(stage, row) for row, f in enumerate(stage.frames) if f.clearance}
+    assert owners == {"x", "y", "foot"}
+
+
+def test_clearance_contributions_are_listed_by_joint(stage):
+    reached = perfect_parts(Experiment(home_posture(stage), sources_of(stage)))
+    parts = reached["rotation"]["clearances"]
+    assert set(parts) <= {"x.clearance", "y.clearance", "foot.clearance"}
+    assert sum(parts.values()) == pytest.approx(
+        reached["rotation"]["reached"], rel=1e-3
     )

@@ -5,16 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from forcefit import BadInput, Clearance, Frame, Robot, load_robot
 from forcefit.assembly.kinematics.posture import home_posture, place_robot
-from forcefit.assembly.model.robot import Clearance, Frame, Robot
-from forcefit.assembly.robots import load_robot
 from forcefit.assembly.statistics.tolerances import (
     grid_postures,
     identity_of,
     left_out_text,
     present_errors,
 )
-from forcefit.inputs.table import BadInput
 from tests.robots_for_tests import coaxial_beams
 from tests.three_upu_for_tests import three_upu
 from tests.tolerances_for_tests import PLAY, plan_for
@@ -25,10 +23,8 @@ K = 1e6  # [N/m]
 def bars(play, errors):
     """Return two coaxial bars with a joint clearance and length errors."""
     robot = coaxial_beams(np.zeros(6), (K, K), clearance=Clearance(radial=play))
-    delta = np.zeros((len(robot.frames), 6))
-    for name, length in errors.items():
-        delta[robot.index(name), 3] = length
-    return home_posture(robot.with_errors(delta))
+    lengths = [errors.get(frame.name, 0.0) for frame in robot.frames]
+    return home_posture(robot.with_errors(np.outer(lengths, np.eye(6)[3])))
 
 
 ERRORS = {"one": 3 * PLAY, "two": -1 * PLAY, "mount": 0.5 * PLAY}
@@ -50,16 +46,16 @@ def test_present_errors_report_contributions_to_the_largest_margin():
     assert found["factor_on_errors"] == pytest.approx(1 / 3.5)
     assert found["assemblable_share"] == pytest.approx(2 / 3)
     assert found["energy_there"] == pytest.approx(K * (2.5 * PLAY) ** 2 / 4, rel=1e-6)
-    slopes = found["slopes"]
-    assert [one["error"] for one in slopes] == ["one.TX", "two.TX", "mount.TX"]
-    assert [one["value"] for one in slopes] == list(ERRORS.values())
-    shares = [one["share_of_margin"] for one in slopes]
-    np.testing.assert_allclose(shares, np.array([3, 1, -0.5]) / 3.5, rtol=1e-6)
+    slopes = {key: [one[key] for one in found["slopes"]] for key in found["slopes"][0]}
+    assert slopes["error"] == ["one.TX", "two.TX", "mount.TX"]
+    assert slopes["value"] == list(ERRORS.values())
     signs = np.array([1.0, -1.0, -1.0])
-    margin_slopes = [one["margin_slope"] for one in slopes]
-    np.testing.assert_allclose(margin_slopes, signs / PLAY, rtol=1e-6)
-    energy_slopes = [one["energy_slope"] for one in slopes]
-    np.testing.assert_allclose(energy_slopes, signs * K * 2.5 * PLAY / 2, rtol=1e-6)
+    for key, expected in (
+        ("share_of_margin", np.array([3, 1, -0.5]) / 3.5),
+        ("margin_slope", signs / PLAY),
+        ("energy_slope", signs * K * 2.5 * PLAY / 2),
+    ):  # fmt: skip
+        np.testing.assert_allclose(slopes[key], expected, rtol=1e-6)
 
 
 def test_energy_of_errors_within_clearance_is_zero():

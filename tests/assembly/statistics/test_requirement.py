@@ -37,21 +37,20 @@ def test_random_clearances_do_not_depend_on_the_batch():
 
 
 @pytest.mark.parametrize(
-    ("limits", "worst_play", "refused"),
+    ("limits", "play", "refused"),
     [
-        ({"translation": 0.9 * PLAY}, True, True),
-        ({"translation": 1.1 * PLAY}, True, False),
-        ({"translation": 0.9 * PLAY}, False, False),
-        ({"energy": 1.0}, True, False),
+        ({"translation": 0.9 * PLAY}, "worst", True),
+        ({"translation": 1.1 * PLAY}, "worst", False),
+        ({"translation": 0.9 * PLAY}, "least", False),
+        ({"energy": 1.0}, "worst", False),
     ],
 )
-def test_limit_exceeded_by_clearances_alone_is_rejected(limits, worst_play, refused):
+def test_limit_exceeded_by_clearances_alone_is_rejected(limits, play, refused):
     """The message contains the posture with the largest error. The limit is rejected
     only in the worst clearance model.
     """
     postures = [home_posture(arm(radial=0.5 * PLAY)), home_posture(arm(radial=PLAY))]
-    plan = plan_for(postures[0].robot, [("tip", 3)], [1], limits,
-                    clearance="worst" if worst_play else "least")  # fmt: skip
+    plan = plan_for(postures[0].robot, [("tip", 3)], [1], limits, clearance=play)
     requirement = Requirement(postures, plan)
     if not refused:
         reached = requirement.perfect_parts()

@@ -1,7 +1,5 @@
 """Limited quantities and their derivatives with respect to errors."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -11,7 +9,7 @@ from forcefit.assembly.robots import load_robot
 from forcefit.assembly.statistics.experiment import Experiment
 from forcefit.assembly.statistics.linear_response import linear_response
 from forcefit.assembly.statistics.responses import respond
-from tests.tolerances_for_tests import PLAY, arm, rigid_pair
+from tests.tolerances_for_tests import PLAY, arm, rigid_pair, without_clearances
 
 QUANTITIES = ["energy", "force", "moment", "stress", "rotation", "translation"]
 
@@ -19,9 +17,7 @@ QUANTITIES = ["energy", "force", "moment", "stress", "rotation", "translation"]
 @pytest.fixture(scope="module")
 def stiff():
     """Return IRSBot-2 without clearances and with errors of its links."""
-    robot = load_robot("irsbot2")
-    frames = tuple(replace(f, clearance=None) for f in robot.frames)
-    robot = replace(robot, frames=frames)
+    robot = without_clearances(load_robot("irsbot2"))
     sources = tolerance_sources(robot, [1e-3] * 3 + [1e-4] * 3)
     prepared = linear_response(place_robot(robot, {"tx": 0.1, "tz": -0.5}))
     return prepared, sources, sources.draw(0, 5, seed=3)
@@ -55,9 +51,8 @@ def test_slopes_of_the_largest_pose_error_equal_closed_form():
     """
     posture, sources = tip()
     values = sources.draw(0, 20, seed=1)
-    size, slopes = respond(
-        linear_response(posture), sources, values, "translation", "worst"
-    )
+    prepared = linear_response(posture)
+    size, slopes = respond(prepared, sources, values, "translation", "worst")
     x, y, z = values[:, 3:].T
     across = np.hypot(x, y)
     R = np.hypot(across + PLAY, z)
@@ -68,9 +63,7 @@ def test_slopes_of_the_largest_pose_error_equal_closed_form():
     np.testing.assert_allclose(slopes[:, 3:], expected.T, atol=1.5e-2)
     np.testing.assert_allclose(slopes[:, :3], 0.0, atol=1e-9)
     turn = values[:, :3]
-    size, slopes = respond(
-        linear_response(posture), sources, values, "rotation", "worst"
-    )
+    size, slopes = respond(prepared, sources, values, "rotation", "worst")
     angle = np.linalg.norm(turn, axis=1)
     np.testing.assert_allclose(size, angle, rtol=1e-9)
     np.testing.assert_allclose(slopes[:, :3], turn / angle[:, None], atol=1e-9)
@@ -95,14 +88,9 @@ def test_response_has_the_random_clearances_of_the_experiment(play, key):
 
 
 @pytest.mark.parametrize("component", [3, 4])
-def test_pin_clearance_compensates_errors_of_the_body_below(
-    component,
-):
-    """The pin clearance compensates the errors of the rigid body below it."""
+def test_pin_clearance_compensates_errors_of_the_body_below(component):
     robot = rigid_pair(radial=PLAY)
-    widths = np.zeros(6)
-    widths[component] = PLAY
-    sources = tolerance_sources(robot, widths, ("one", "two"))
+    sources = tolerance_sources(robot, np.eye(6)[component] * PLAY, ("one", "two"))
     values = np.array([[0.3, 0.6], [-0.2, -0.5]]) * PLAY
     prepared = linear_response(home_posture(robot))
     size, slopes = respond(prepared, sources, values, "translation", "least")

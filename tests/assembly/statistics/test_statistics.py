@@ -11,17 +11,10 @@ from forcefit.assembly.kinematics.posture import home_posture
 from forcefit.assembly.model.robot import Frame, Robot
 
 pytest.importorskip("xarray")
-NORMAL = """
-[[errors]]
-frames = ["tip"]
-distribution = "normal"
-deviation = [0, 0, 0, 0, 0, 1e-4]
-"""
-UNIFORM = """
-[[errors]]
-frames = ["tip"]
-most = [0, 0, 0, 3e-5, 0, 4e-5]
-"""
+NORMAL = """errors = [
+    { frames = ["tip"], distribution = "normal", deviation = [0, 0, 0, 0, 0, 1e-4] }
+]"""
+UNIFORM = 'errors = [{ frames = ["tip"], most = [0, 0, 0, 3e-5, 0, 4e-5] }]'
 
 
 @pytest.fixture
@@ -61,10 +54,9 @@ def test_statistics_convert_to_a_table_and_a_figure(tip, normal):
 
 def test_statistics_in_python_equal_those_of_the_command(run):
     robot = Path(__file__).parents[3] / "examples" / "drawn" / "four_bar.toml"
-    limits = {"translation": 1e-4}
     found = ff.statistics(
-        ff.place_robot(ff.load_robot(robot)), draws=40, seed=3, limits=limits,
-        load={"fx": 2.0}, capability=True,
+        ff.place_robot(ff.load_robot(robot)), draws=40, seed=3,
+        limits={"translation": 1e-4}, load={"fx": 2.0}, capability=True,
     )  # fmt: skip
     status, out, _ = run(
         "assembly", "statistics", robot, "--draws", 40, "--seed", 3, "--capability",
@@ -83,6 +75,8 @@ def test_worst_pose_of_two_uniform_errors_equals_closed_form(tip, tmp_path):
     worst = ff.worst_pose(tip, file)
     assert worst.attained == pytest.approx(5e-5, rel=1e-9)
     assert worst.bound == pytest.approx(5e-5, rel=1e-3)
+    with pytest.raises(ff.BadInput, match="quantity: found 'translaton'"):
+        ff.worst_pose(tip, file, "translaton")
 
 
 @pytest.mark.parametrize(
@@ -98,21 +92,12 @@ def test_worst_pose_of_two_uniform_errors_equals_closed_form(tip, tmp_path):
         ({"capability": True}, "capability: found no limits"),
         ({"contact_length": 0.1}, "contact_length: found together with clearance"),
         ({"limits": {"enrgy": 1.0}}, "limit enrgy: found a quantity"),
+        ({"errors": None}, "neither --errors"),
     ],
 )
 def test_statistics_reject_an_argument_out_of_range(tip, normal, options, message):
     with pytest.raises(ff.BadInput, match=message):
-        ff.statistics(tip, normal, **{"draws": 10, **options})
-
-
-def test_worst_pose_rejects_an_unknown_quantity(tip, normal):
-    with pytest.raises(ff.BadInput, match="quantity: found 'translaton'"):
-        ff.worst_pose(tip, normal, "translaton")
-
-
-def test_statistics_without_errors_are_rejected(tip):
-    with pytest.raises(ff.BadInput, match="neither --errors"):
-        ff.statistics(tip)
+        ff.statistics(tip, **{"errors": normal, "draws": 10, **options})
 
 
 @pytest.mark.parametrize(
@@ -129,11 +114,8 @@ def test_show_rejects_invalid_options_for_draws(tip, normal, options, message):
         ff.show(found, **options)
 
 
-def test_show_rejects_a_file_that_is_not_a_data_set(normal):
+def test_show_rejects_other_files_and_data_set_options_for_a_robot(normal):
     with pytest.raises(ff.BadInput, match="normal.toml"):
         ff.show(normal)
-
-
-def test_show_rejects_data_set_options_for_a_robot():
     with pytest.raises(ff.BadInput, match="valid only for a data set"):
         ff.show(ff.load_robot("five_bar"), quantities=["energy"])

@@ -7,18 +7,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from forcefit import BadInput, load_robot, zone_margin
 from forcefit.assembly.kinematics.posture import home_posture
-from forcefit.assembly.linear.zone import zone_margin
-from forcefit.assembly.robots import load_robot
 from forcefit.assembly.statistics import verification
-from forcefit.assembly.statistics.quantities import UNITS, limit_names, parse_limit
+from forcefit.assembly.statistics.quantities import limit_names, parse_limit
 from forcefit.assembly.statistics.tolerance_file import read_plan
 from forcefit.assembly.statistics.tolerances import (
     grid_postures,
     present_errors,
     present_text,
 )
-from forcefit.inputs.table import BadInput
 from tests.robots_for_tests import NUMBERS, irsbot2_with
 
 
@@ -207,9 +205,8 @@ def test_errors_scaled_by_the_reported_factor_have_margin_one():
     shares = [one["share_of_margin"] for one in found["slopes"]]
     assert sum(shares) == pytest.approx(1.0, rel=1e-6)
     assert shares == sorted(shares, reverse=True)
-    assert "all postures assemble if all errors are multiplied by" in present_text(
-        found
-    )
+    text = "all postures assemble if all errors are multiplied by"
+    assert text in present_text(found)
 
 
 @pytest.mark.parametrize(
@@ -230,11 +227,10 @@ def test_errors_of_a_plan_have_the_requested_distribution(
     assert np.std(drawn) == pytest.approx(deviation, rel=0.02)
 
 
-@pytest.mark.parametrize("name", limit_names())
-def test_limit_is_read_with_and_without_spaces(name):
-    assert parse_limit(f"{name}=2.5e-4") == (name, 2.5e-4)
-    assert parse_limit(f" {name} = 3 ") == (name, 3.0)
-    assert UNITS[name]
+def test_limit_is_read_with_and_without_spaces():
+    for name in limit_names():
+        assert parse_limit(f"{name}=2.5e-4") == (name, 2.5e-4)
+        assert parse_limit(f" {name} = 3 ") == (name, 3.0)
 
 
 @pytest.mark.parametrize("number", ["0", "-1e-9", "inf", "nan", "", "2 J", "1=2"])

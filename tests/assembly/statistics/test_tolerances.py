@@ -8,7 +8,6 @@ import pytest
 
 from forcefit import bound_pose_error, place_robot, solve_assembly, zone_margin
 from forcefit.assembly.model.link_stress import peak_stresses
-from forcefit.assembly.model.robot import Frame, MatrixLink, Robot
 from forcefit.assembly.robots import load_robot
 from forcefit.assembly.statistics.allocated_tolerances import (
     allocation_of,
@@ -26,7 +25,14 @@ from forcefit.assembly.statistics.worst_case import (
     worst_corner,
 )
 from tests.robots_for_tests import coaxial_beams
-from tests.tolerances_for_tests import PLAY, arm, pairs_of_bars, plan_for, rigid_pair
+from tests.tolerances_for_tests import (
+    PLAY,
+    arm,
+    pairs_of_bars,
+    parallel,
+    plan_for,
+    rigid_pair,
+)
 
 ENDS = [("one", 3), ("two", 3)]
 
@@ -215,16 +221,6 @@ def test_allocation_in_the_worst_clearance_model_has_the_required_yield(paper):
     # For a yield of 0.9, fewer than 124 of 150 have a probability of 1/300.
     assert fits >= 124
     assert largest > 0.8 * limit
-
-
-def parallel(k1, k2):
-    """Return a platform between two bars along x of different stiffness."""
-    frames = (
-        Frame("one", translation=[0.5, 0, 0], link=MatrixLink(np.eye(6) * k1)),
-        Frame("mount", translation=[1.0, 0, 0]),
-        Frame("two", "mount", [-0.5, 0, 0], link=MatrixLink(np.eye(6) * k2)),
-    )
-    return Robot("parallel", "one", frames, (("one", "two"),))
 
 
 def test_tolerances_for_a_pose_error_limit_equal_closed_form():

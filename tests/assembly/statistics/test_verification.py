@@ -28,28 +28,23 @@ def springs(stiffnesses, limits, clearance=None):
 @pytest.mark.parametrize(("limit", "scale"), [(0.01, 0.2), (0.25, 1.0), (1.0, 1.0)])
 def test_energy_bound_of_springs_equals_closed_form(limit, scale):
     """The energy is k (t1 + t2)^2 / 4 for the largest stiffness of three postures."""
-    requirement = springs([4e5, 4e6, 1e6], {"energy": limit})
-    k = 4e6
-    truth = k * REACH**2 / 4
-    worst, found = prove_worst(requirement, T, silent)
-    assert truth == pytest.approx(0.25)
-    np.testing.assert_allclose(worst["energy"], truth, rtol=1e-4)
+    worst, found = prove_worst(springs([4e5, 4e6, 1e6], {"energy": limit}), T, silent)
+    np.testing.assert_allclose(worst["energy"], 4e6 * REACH**2 / 4, rtol=1e-4)
     assert found == pytest.approx(scale, rel=1e-4)
 
 
 @pytest.mark.parametrize(("limit", "scale"), [(1.0, 0.2), (4.0, 0.8), (6.0, 1.0)])
 def test_margin_bound_of_springs_equals_closed_form(limit, scale):
     """The margin is (t1 + t2) / p = 5 for any stiffness."""
-    requirement = springs([1e6, 1e5], {"margin": limit}, PLAY)
-    worst, found = prove_worst(requirement, T, silent)
+    worst, found = prove_worst(springs([1e6, 1e5], {"margin": limit}, PLAY), T, silent)
     np.testing.assert_allclose(worst["margin"], 5.0, rtol=1e-5)
     assert found == pytest.approx(scale, rel=1e-5)
 
 
 def test_force_limit_has_no_proven_scale():
     """The largest force found is k (t1 + t2) / 2, without an upper bound."""
-    requirement = springs([1e6], {"energy": 0.01, "force": 60.0})
-    worst, found = prove_worst(requirement, T, silent)
+    limits = {"energy": 0.01, "force": 60.0}
+    worst, found = prove_worst(springs([1e6], limits), T, silent)
     assert worst["force"][0] == pytest.approx(1e6 * REACH / 2, rel=1e-6)
     assert np.isnan(worst["force"][1])
     assert worst["energy"][1] == pytest.approx(1e6 * REACH**2 / 4, rel=1e-4)

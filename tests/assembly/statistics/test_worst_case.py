@@ -34,9 +34,7 @@ def test_worst_energy_and_its_bound_equal_closed_forms(directions, radial):
     """
     posture, sources = bars(Clearance(radial=radial) if radial else None)
     prepared = linear_response(posture)
-    t = np.array([3.0, 2.0, 0.0, 0.0]) * PLAY
-    if directions == 2:
-        t[2:] = [1.0, 4.0] * np.array(PLAY)
+    t = np.array([3.0, 2.0, *((1.0, 4.0) if directions == 2 else (0, 0))]) * PLAY
     truth = K * (np.hypot(t[0] + t[1], t[2] + t[3]) - radial) ** 2 / 4
     corner = worst_corner(prepared, sources, t, random_corners(4, 4))
     assert corner.value == pytest.approx(truth, rel=1e-6)
@@ -115,18 +113,17 @@ def test_energy_bound_is_infinite_in_rigid_directions():
     """The energy is k t^2 / 2 along the axis. The bodies are rigid across the axis,
     where a tolerance of 1e-14 m is treated as zero.
     """
-    spring = np.diag([np.inf] * 6)
-    spring[3, 3] = K
+    spring = np.diag([np.inf] * 3 + [K] + [np.inf] * 2)
     frames = (
         Frame("one", translation=[0.5, 0, 0], joint_stiffness=spring),
         Frame("two", "base", [0.5, 0, 0]),
     )
     robot = Robot("spring", "one", frames, (("one", "two"),))
     prepared = linear_response(home_posture(robot))
+    stored = K * 4e-8 / 2
     for component in (4, 5):
         places = [("two", 3), ("two", component)]
         sources = plan_for(robot, places, [1, 1], {}).sources
-        stored = K * 4e-8 / 2
         for across, bound in ((0.0, stored), (1e-14, stored), (1e-9, np.inf)):
             found = bound_energy(prepared, sources, np.array([2e-4, across]))
             assert found == pytest.approx(bound, rel=1e-6)

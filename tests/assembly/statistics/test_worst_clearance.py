@@ -4,13 +4,12 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from forcefit import Clearance, Frame, MatrixLink, Robot, load_robot
 from forcefit.assembly.kinematics.posture import home_posture, place_robot
 from forcefit.assembly.model.error_distributions import (
     draw_generator,
     tolerance_sources,
 )
-from forcefit.assembly.model.robot import Clearance, Frame, MatrixLink, Robot
-from forcefit.assembly.robots import load_robot
 from forcefit.assembly.statistics.clearance_positions import (
     CLEARANCE_MODELS,
     position_clearances,
@@ -27,10 +26,6 @@ RADIAL, TILT = 1e-4, 2e-3
 POSE = {"tx": 0.1, "tz": -0.5}
 
 
-def tip_errors(robot, size):
-    return tolerance_sources(robot, [0, 0, 0, size, size, size], ("tip",))
-
-
 def papers(share, **options):
     """Return IRSBot-2 with errors of its links."""
     robot = load_robot("irsbot2")
@@ -44,8 +39,7 @@ def test_screws_of_the_worst_model_attain_its_bounds(rng):
 
     A draw without a solution has no bounds.
     """
-    posture = home_posture(arm(radial=RADIAL, tilt=TILT))
-    prepared = linear_response(posture)
+    prepared = linear_response(home_posture(arm(radial=RADIAL, tilt=TILT)))
     errors = np.zeros((3, 2, 6))
     errors[:, 1, 3] = 0.0, 2e-4, 0.0
     draws = prepared.solve(errors)
@@ -53,8 +47,7 @@ def test_screws_of_the_worst_model_attain_its_bounds(rng):
     bounds, screws = bound_worst_errors(draws, (1e-8, 1e-8))
     size = np.hypot(errors[:2, 1, 3] + RADIAL, ARM * TILT)
     np.testing.assert_allclose(bounds[:2, 0], TILT, atol=1e-8)
-    np.testing.assert_allclose(bounds[:2, 1, 0], size, atol=1e-8)
-    np.testing.assert_allclose(bounds[:2, 1, 1], size, atol=1e-8)
+    np.testing.assert_allclose(bounds[:2, 1], np.stack([size, size], 1), atol=1e-8)
     assert np.isnan(bounds[2]).all()
     turned, moved = screws[:2, 0, :3], screws[:2, 1, 3:]
     np.testing.assert_allclose(np.linalg.norm(turned, axis=1), TILT, rtol=1e-4)
@@ -83,26 +76,22 @@ def test_yield_is_zero_in_the_worst_clearance_model():
     """
     limits, share = {"translation": 1e-4}, {}
     for play in CLEARANCE_MODELS:
-        data = run_draws(
-            papers(0.025, clearance=play, precision=precision_for(limits)), 120
-        )
+        experiment = papers(0.025, clearance=play, precision=precision_for(limits))
+        data = run_draws(experiment, 120)
         said = summarise(data, limits)
-        share[play] = said["within_limits"]["probability"]
-        assert (
-            said["within_limits"]["clearance"]
-            == said["exceeds"]["translation"]["clearance"]
-        )
+        within, exceeds = said["within_limits"], said["exceeds"]["translation"]
+        share[play] = within["probability"]
+        assert within["clearance"] == exceeds["clearance"]
         assert f"yield [clearance {play}], all limits met" in summary_text(said)
         assert said["clearance_means"] in data["translation"].attrs["long_name"]
     assert share["least"] > 0.99
-    assert share["worst"] == 0.0
-    assert share["worst"] < share["contact"] < share["uniform"] < share["least"]
+    assert 0.0 == share["worst"] < share["contact"] < share["uniform"] < share["least"]
 
 
 def test_worst_model_adds_no_error_if_all_joints_are_in_contact():
     """The pin is in contact under the load."""
-    robot = arm(radial=RADIAL)
-    sources, load = tip_errors(robot, 1e-4), (0, 0, 0, 10.0, 0, 0)
+    robot, load = arm(radial=RADIAL), (0, 0, 0, 10.0, 0, 0)
+    sources = tolerance_sources(robot, [0, 0, 0, 1e-4, 1e-4, 1e-4], ("tip",))
     values = sources.draw(0, 10, seed=1)
     rows = Experiment(home_posture(robot), sources, load=load, margins=False).evaluate(
         values, range(10)

@@ -16,30 +16,17 @@ from forcefit.assembly.statistics.linear_response import linear_response
 from forcefit.assembly.statistics.responses import respond
 from forcefit.stiffness.screws import rotation_matrix, rotation_vector
 from tests.drawn_four_bar_for_tests import four_bar_file
+from tests.tolerances_for_tests import two_links, without_clearances
 
 FIRST, SECOND = np.radians(30.0), np.radians(45.0)
 PIN = Clearance(radial=10e-6)
 # arm with links of 0.4 m at 30 deg and 0.3 m at 75 deg
-SERIAL = Robot(
-    "serial",
-    "tip",
-    (
-        Frame("shoulder", joint="revolute", actuated=True, position=FIRST,
-              clearance=PIN),
-        Frame("elbow", "shoulder", np.array([0.4, 0, 0]), joint="revolute",
-              actuated=True, position=SECOND, clearance=PIN),
-        Frame("tip", "elbow", np.array([0.3, 0, 0])),
-    ),
-    callouts=(
-        Callout("arm", "elbow", (Datum("shoulder"),), length=(0.4, 50e-6)),
-        Callout("hand", "tip", (Datum("elbow"),), length=(0.3, 50e-6)),
-    ),
-)  # fmt: skip
+SERIAL = two_links(FIRST, SECOND, 50e-6, PIN, PIN)
 
 
-def of_serial(robot=SERIAL):
-    angles = tolerance_sources(robot, np.eye(6)[2] * 1e-4, ("shoulder", "elbow"))
-    return linear_response(home_posture(robot)), sources_of(robot, angles)
+def of_serial():
+    angles = tolerance_sources(SERIAL, np.eye(6)[2] * 1e-4, ("shoulder", "elbow"))
+    return linear_response(home_posture(SERIAL)), sources_of(SERIAL, angles)
 
 
 def test_worst_case_of_a_serial_arm_agrees_with_nonlinear_geometry():
@@ -76,11 +63,8 @@ def test_worst_case_of_two_ball_clearances_is_the_sum_of_their_radii():
             ("arm", "elbow", "shoulder", 40e-6), ("hand", "tip", "elbow", 30e-6),
         )
     )  # fmt: skip
-    tight = tuple(replace(frame, clearance=None) for frame in SERIAL.frames)
-    robot = replace(SERIAL, frames=tight, callouts=balls)
-    found = worst_pose(
-        linear_response(home_posture(robot)), sources_of(robot), "translation"
-    )
+    robot = replace(without_clearances(SERIAL), callouts=balls)
+    found = worst_pose(home_posture(robot))
     assert found.attained == pytest.approx(35e-6, rel=1e-9)
     assert found.bound == pytest.approx(35e-6, rel=1e-9)
 
@@ -136,11 +120,11 @@ def test_largest_displacement_of_a_four_bar_point_equals_hand_calculation(
     """
     prepared, sources = four_bar(tmp_path, clearance)
     sources = with_half_of_the_coupler(sources)
-    found = worst_pose(prepared, sources, "translation")
+    found = worst_pose(prepared, sources)
     assert found.attained * 1e6 == pytest.approx(um, abs=0.03)
     # The contribution of clearances is 29.2 um.
-    none = [replace(one, errors=0 * one.errors) for one in sources.placed]
-    alone = worst_pose(prepared, replace(sources, placed=tuple(none)), "translation")
+    none = tuple(replace(one, errors=0 * one.errors) for one in sources.placed)
+    alone = worst_pose(prepared, replace(sources, placed=none))
     assert alone.attained * 1e6 == pytest.approx(29.24 if clearance else 0, abs=0.005)
 
 
@@ -169,8 +153,7 @@ def test_random_draws_of_the_four_bar_stay_below_its_worst_case(tmp_path):
     assert sizes.max() < 67.35
 
 
-STIFF = np.full(6, np.inf)
-STIFF[5] = 1e6
+STIFF = [np.inf] * 5 + [1e6]
 HEAD = rotation_matrix([0, np.pi / 2, 0]) @ rotation_matrix([np.pi / 2, 0, 0])
 
 
@@ -207,7 +190,7 @@ def test_worst_cases_of_four_springs_equal_hand_calculation():
     the rotation is 233 urad (rigid), 240 urad (equilibrium) and 280 urad (bound).
     """
     robot, sources = on_springs((-0.3, -0.1, 0.1, 0.3), 20e-6)
-    found = worst_pose(linear_response(home_posture(robot)), sources, "rotation")
+    found = worst_pose(home_posture(robot), sources, "rotation")
     assert found.reading == "equilibrium"
     assert found.rigid * 1e6 == pytest.approx(233.3, abs=0.5)
     assert found.attained * 1e6 == pytest.approx(240, abs=0.5)
@@ -230,7 +213,7 @@ def test_worst_equilibrium_is_not_exceeded_at_corners_or_inside():
 def test_response_of_springs_without_clearance_is_linear():
     """The rotation is sum(s d) / sum(s^2) = 50 um * 0.8 m / 0.2 m^2 = 200 urad."""
     robot, sources = on_springs((-0.3, -0.1, 0.1, 0.3), 0.0)
-    found = worst_pose(linear_response(home_posture(robot)), sources, "rotation")
+    found = worst_pose(home_posture(robot), sources, "rotation")
     assert found.reading == "elastic"
     assert found.attained == pytest.approx(200e-6, rel=1e-6)
     assert found.bound == pytest.approx(200e-6, rel=1e-3)
@@ -242,7 +225,7 @@ def test_worst_case_of_rigid_legs_equals_hand_calculation():
     """
     for positions, reading in [((-0.3, 0.3), "linear"), ((-0.3, 0.0, 0.3), "rigid")]:
         robot, sources = on_springs(positions, 20e-6, None)
-        found = worst_pose(linear_response(home_posture(robot)), sources, "rotation")
+        found = worst_pose(home_posture(robot), sources, "rotation")
         assert found.reading == reading
         assert found.attained == pytest.approx(140e-6 / 0.6, rel=1e-4)
         assert found.bound == pytest.approx(140e-6 / 0.6, rel=1e-3)
@@ -253,7 +236,7 @@ def test_unbounded_errors_and_loads_are_rejected():
     posture = home_posture(robot)
     unbounded = replace(sources, kind=np.full(len(sources), 1))
     with pytest.raises(BadInput, match="leg0.foot.TZ, which is unbounded"):
-        worst_pose(linear_response(posture), unbounded, "rotation")
+        worst_pose(posture, unbounded)
     loaded = linear_response(posture, load=(0, 0, 0, 0, 0, -10))
     with pytest.raises(BadInput, match="found a load, expected none"):
-        worst_pose(loaded, sources, "rotation")
+        worst_pose(loaded, sources)
