@@ -17,23 +17,25 @@ def spring(k, component):
 
 
 def leg(name, k, error, s=0.0, clearance=None):
-    """Return a leg at x = s that is elastic along z."""
+    """Return a leg at x = s that is elastic along z, or rigid if k is None."""
     return Frame(
-        name, "base", translation=[s, 0, 0], link=spring(k, 5), clearance=clearance,
+        name, "base", translation=[s, 0, 0], clearance=clearance,
+        link=None if k is None else spring(k, 5),
         geometric_error=[0, 0, 0, 0, 0, error],
     )  # fmt: skip
 
 
-def three_legs(clearances=(None, None, None)):
+def guided(legs, name="legs"):
+    """Return a platform that moves along z, and the legs to which it is joined."""
+    guide = (Frame("guide", "base", joint="prismatic"), Frame("platform", "guide"))
+    closures = tuple(("platform", leg.name) for leg in legs)
+    return home_posture(Robot(name, "platform", (*guide, *legs), closures))
+
+
+def three_legs():
     """Return a platform that moves along z, with three elastic legs."""
-    legs = zip((1e6, 2e6, 3e6), (30e-6, -20e-6, 50e-6), clearances, strict=True)
-    frames = [
-        Frame("guide", "base", joint="prismatic"),
-        Frame("platform", "guide"),
-        *(leg(f"leg{i}", k, d, clearance=c) for i, (k, d, c) in enumerate(legs, 1)),
-    ]
-    closures = tuple(("platform", f"leg{i}") for i in (1, 2, 3))
-    return home_posture(Robot("three legs", "platform", tuple(frames), closures))
+    legs = zip((1e6, 2e6, 3e6), (30e-6, -20e-6, 50e-6), strict=True)
+    return guided([leg(f"leg{i}", k, d) for i, (k, d) in enumerate(legs, 1)])
 
 
 Y_AXIS = rotation_vector(np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]]))
@@ -73,9 +75,8 @@ def portal():
     """Return a portal frame of beams on a base beam."""
 
     def bar(width, height, up):
-        area = {"area": 10.0, "I_z": width**3 * height / 12}
-        I_y = width * height**3 / 12
-        section = area | {"I_y": I_y, "J": 1e-6, "shear_y": 1.0, "shear_z": 1.0}
+        I = {"I_y": width * height**3 / 12, "I_z": width**3 * height / 12, "J": 1e-6}
+        section = {"area": 10.0, "shear_y": 1.0, "shear_z": 1.0} | I
         return BeamLink(section, 2.1e11, 0.3, theory="euler", up=up)
 
     wide = bar(0.06, 0.03, (0.0, 0.0, 1.0))

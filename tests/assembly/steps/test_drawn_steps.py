@@ -15,38 +15,23 @@ format = 2
 platform = "plate"
 platform_at = [0.1, 0.2, 0.3]
 body = [{ name = "plate" }]
-[[joint]]
-name = "foot"
-type = "fixed"
-between = ["base", "plate"]
-at = [0, 0, 0]
-joint_stiffness = [inf, 2e3, inf, 1e6, 2e6, 3e6]
-"""
-SLOTTED = """
-[[joint]]
-name = "peg"
-type = "fixed"
-between = ["base", "plate"]
-at = [0, 0, 0.05]
-axis = [1, 0, 0]
-axis2 = [0, 1, 0]
-geometric_error = [0, 0, 0, 10e-6, 20e-6, 40e-6]
-"""
-BALL = """
-[[joint]]
-name = "peg"
-type = "spherical"
-between = ["base", "plate"]
-at = [0.4, 0, 0]
-geometric_error = [0, 0, 0, 0, 0, 30e-6]
-"""
+joint = [
+    { name = "foot", type = "fixed", between = ["base", "plate"], at = [0, 0, 0], joint_stiffness = [inf, 2e3, inf, 1e6, 2e6, 3e6] },
+    { name = "peg", between = ["base", "plate"], PEG },
+]
+"""  # noqa: E501
+SLOTTED = (
+    'type = "fixed", at = [0, 0, 0.05], axis = [1, 0, 0], axis2 = [0, 1, 0], '
+    "geometric_error = [0, 0, 0, 10e-6, 20e-6, 40e-6]"
+)
+BALL = 'type = "spherical", at = [0.4, 0, 0], geometric_error = [0, 0, 0, 0, 0, 30e-6]'
 JOIN = '[[step]]\njoin = ["peg", "plate"]\n'
 
 
 @pytest.fixture
 def joined(tmp_path):
     def run(joint, plan):
-        (tmp_path / "robot.toml").write_text(PLATE + joint)
+        (tmp_path / "robot.toml").write_text(PLATE.replace("PEG", joint))
         (tmp_path / "plan.toml").write_text(plan)
         robot = read_robot(tmp_path / "robot.toml")
         plan = read_steps(tmp_path / "plan.toml", robot)

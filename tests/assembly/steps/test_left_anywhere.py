@@ -1,25 +1,34 @@
-"""Tests of random positions of bolted joints."""
+"""Tests of random and worst positions of bolted joints."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy import stats
 
-from forcefit.assembly.exchange.robot_files import load_robot
-from forcefit.assembly.files.robot_file import write_robot
-from forcefit.assembly.kinematics.posture import place_robot
+from forcefit import (
+    BadInput,
+    bound_pose_error,
+    load_robot,
+    place_robot,
+    solve_assembly,
+    sweep,
+    write_robot,
+)
+from forcefit.assembly.kinematics.posture import home_posture
 from forcefit.assembly.model.error_distributions import read_sources, tolerance_sources
 from forcefit.assembly.model.robot import Clearance, Frame, LockedAt, Robot
+from forcefit.assembly.report.pose_errors import pose_error_of
 from forcefit.assembly.statistics.experiment import Experiment
 from forcefit.assembly.steps.bolted import bolt_generators, bolt_joints, bolted_errors
-from forcefit.assembly.sweeps.robot_sweep import sweep
-from forcefit.inputs.table import BadInput
+from forcefit.assembly.steps.worst_left import BRACKET, CONVEX, worst_left
 from tests.assembly.steps.robots_for_steps import spring
-from tests.assembly.steps.test_bolted import four_bar
+from tests.assembly.steps.test_bolted import at_angle, four_bar
 
 COUNT = 2000
 UNIFORM = {"left": "uniform"}
+ANYWHERE = '{ joints = { crank = 0.4 }, left = "uniform" }'
 
 
 def pin(name, radius, error, **more):
@@ -102,42 +111,33 @@ def test_pins_with_contact_force_do_not_move_randomly():
     assert stats.kstest(squares, "uniform").pvalue > 1e-3
 
 
-def experiment_of(robot):
+def experiment_of(robot, crank=2.0):
     sources = tolerance_sources(robot, np.array([1e-3] * 3 + [1e-4] * 3), ("pin2",))
-    posture = place_robot(robot, joints={"crank": 2.0})
+    posture = place_robot(robot, joints={"crank": crank})
     return Experiment(posture, sources, 7, "least", margins=False, stress=False)
 
 
 def test_random_position_does_not_depend_on_other_draws(tmp_path):
-    key = '{ joints = { crank = 0.4 }, left = "uniform" }'
-    robot = load_robot(four_bar(tmp_path, key))
+    robot = load_robot(four_bar(tmp_path, ANYWHERE))
     experiment = experiment_of(robot)
     rows, alone = experiment.solve(0, 6), experiment.solve(4, 1)
     assert rows["energy"][4] == pytest.approx(alone["energy"][0], rel=1e-6)
-    least = experiment_of(
-        load_robot(four_bar(tmp_path, "{ joints = { crank = 0.4 } }"))
-    )
+    least = experiment_of(load_robot(four_bar(tmp_path, at_angle(0.4))))
     assert not np.allclose(rows["energy"], least.solve(0, 6)["energy"], rtol=1e-3)
 
 
 def test_random_positions_have_minimum_energy(tmp_path):
     """All random positions have minimum energy at the pose of bolting."""
-    key = '{ joints = { crank = 0.4 }, left = "uniform" }'
-    robot = load_robot(four_bar(tmp_path, key))
-    experiment = experiment_of(robot)
-    there = replace(
-        experiment, posture=place_robot(robot, joints={"crank": 0.4})
-    ).solve(0, 8)
-    loose = load_robot(four_bar(tmp_path))
-    least = replace(
-        experiment_of(loose), posture=place_robot(loose, joints={"crank": 0.4})
-    ).solve(0, 8)
+    robot = load_robot(four_bar(tmp_path, ANYWHERE))
+    there, least = (
+        experiment_of(one, crank=0.4).solve(0, 8)
+        for one in (robot, load_robot(four_bar(tmp_path)))
+    )
     assert there["energy"] == pytest.approx(least["energy"], rel=1e-5, abs=1e-9)
 
 
 def test_sweep_and_statistics_use_same_random_positions(tmp_path):
-    key = '{ joints = { crank = 0.4 }, left = "uniform" }'
-    path = four_bar(tmp_path, key)
+    path = four_bar(tmp_path, ANYWHERE)
     errors = tmp_path / "errors.toml"
     errors.write_text('[[errors]]\nframes = ["pin2"]\nmost = [5e-3, 0, 0, 0, 0, 0]\n')
     data = sweep(
@@ -171,3 +171,99 @@ def test_nominal_robot_is_bolted_at_smallest_sum_of_squares():
     robot = bolt_joints(Robot("slot", "slot.end", frames, ()))
     assert not robot.frame("slot").locked_at.screw.any()
     assert robot.remarks[-1].endswith("at random positions of minimum energy")
+
+
+WORST = {"left": "worst"}
+AT_WORST = '{ joints = { crank = 1.2 }, left = "worst" }'
+
+
+def assert_bracket(found, expected):
+    """Assert that both bounds agree with the exact value within 1e-3."""
+    low, high = found
+    assert expected * (1 - 1e-3) <= low <= expected * (1 + 1e-9)
+    assert expected * (1 - 1e-9) <= high <= expected * (1 + 1e-3)
+
+
+def left(robot, rule):
+    """Return a robot whose bolted joints have another rule ``left``."""
+    bolts = [f.locked_at and replace(f.locked_at, left=rule) for f in robot.frames]
+    frames = zip(robot.frames, bolts, strict=True)
+    return replace(robot, frames=tuple(replace(f, locked_at=b) for f, b in frames))
+
+
+def test_largest_error_of_slot_with_arm_equals_closed_form():
+    """A tilt of 2 mrad at an arm of 0.3 m is added to a radial clearance of 1 mm."""
+    gaps = Clearance(radial=1e-3, axial=2e-4, tilt=2e-3)
+    slot = Frame("slot", "base", locked_at=LockedAt(gaps, **WORST))
+    arm = Frame("arm", "slot", translation=[0, 0, 0.3])
+    robot = bolt_joints(Robot("slot", "arm", (slot, arm), ()))
+    worst = worst_left(home_posture(robot))
+    assert worst.assumption == CONVEX
+    assert_bracket(worst.rotation, 2e-3)
+    assert_bracket(worst.translation, np.hypot(1e-3 + 0.3 * 2e-3, 2e-4))
+
+
+def test_largest_error_on_two_axial_pins_equals_closed_form():
+    """Pins at 0 +- 20 um and 30 +- 20 um allow positions between 10 and 20 um."""
+    frames = [Frame("guide", "base", joint="prismatic"), Frame("platform", "guide")]
+    for name, error in (("left", 0.0), ("right", 30e-6)):
+        axial = {"axial": 20e-6}
+        frames += pin(name, axial, [0, 0, 0, 0, 0, error], **WORST)
+    closures = (("platform", "left.end"), ("platform", "right.end"))
+    robot = bolt_joints(Robot("pins", "platform", tuple(frames), closures))
+    worst = worst_left(home_posture(robot))
+    assert worst.assumption == CONVEX
+    assert_bracket(worst.translation, 20e-6)
+    assert worst.rotation == pytest.approx([0, 0], abs=1e-12)
+
+
+@pytest.mark.parametrize("distance", [1e-4, 1.6e-4])
+def test_largest_error_on_two_round_pins_equals_closed_form(distance):
+    """The positions are in the intersection of two discs with a radius of 0.1 mm."""
+    robot = left(platform_of_two_pins({"radial": 1e-4}, distance), "worst")
+    worst = worst_left(home_posture(bolt_joints(robot)))
+    assert worst.assumption == CONVEX
+    assert_bracket(worst.translation, 1e-4)
+
+
+@pytest.mark.parametrize("angle", [0.4, 1.6])
+def test_upper_bound_exceeds_errors_of_random_positions(tmp_path, angle):
+    """The errors of random positions do not exceed the upper bound."""
+    robot = load_robot(str(four_bar(tmp_path, AT_WORST)))
+    posture = place_robot(bolt_joints(robot), joints={"crank": angle})
+    worst = worst_left(posture)
+    assert worst.assumption == BRACKET
+    count = 200
+    anywhere = left(robot, "uniform")
+    errors = np.repeat(robot.declared_errors[None], count, axis=0)
+    errors = bolted_errors(anywhere, errors, bolt_generators(anywhere, 1, range(count)))
+    found = bound_pose_error(solve_assembly(posture, errors=errors))
+    for name in ("rotation", "translation"):
+        low, high = getattr(worst, name)
+        largest = np.nanmax(getattr(found, f"{name}_error")[:, 0])
+        assert largest <= high
+        assert 0.98 * largest <= low <= high
+
+
+def test_command_error_reports_bounds_of_largest_error(tmp_path, run):
+    """The command and the function return the same values."""
+    path = four_bar(tmp_path, AT_WORST)
+    words = ("assembly", "error", path, "--joint", "crank=0.4")
+    status, text, _ = run(*words)
+    assert status == 0
+    assert "bolted at worst, rotation" in text
+    status, text, _ = run(*words, "--json", "-")
+    found = json.loads(text)["bolted_worst"]
+    robot = bolt_joints(load_robot(path))
+    worst = worst_left(place_robot(robot, joints={"crank": 0.4}))
+    bounds = [found["translation"][key] for key in ("lower", "upper")]
+    assert bounds == pytest.approx(worst.translation)
+    assert found["assumption"] == BRACKET
+
+
+def test_worst_position_under_load_is_rejected(tmp_path):
+    """The worst position is defined only without a load."""
+    robot = bolt_joints(load_robot(str(four_bar(tmp_path, AT_WORST))))
+    posture = place_robot(robot, joints={"crank": 0.4})
+    with pytest.raises(BadInput, match='left = "worst", expected no load'):
+        pose_error_of(posture, load=[0, 0, 0, 0, 0, -1.0])

@@ -40,13 +40,9 @@ def machine(rng):
             A[:3, :3] = A[3:, 3:] = back
             A[3:, :3] = -np.cross(arm, back, axisb=0, axisc=0)
             C, error = C + A @ np.linalg.inv(K) @ A.T, error + A @ own
-            frames.append(
-                Frame(
-                    name, "base" if k == 0 else names[0], translation=shifts[k],
-                    rotation=rotations[k].as_rotvec(), geometric_error=own,
-                    link=MatrixLink(K),
-                )
-            )  # fmt: skip
+            parent, rotation = "base" if k == 0 else names[0], rotations[k].as_rotvec()
+            frames.append(Frame(name, parent, translation=shifts[k], rotation=rotation,
+                                geometric_error=own, link=MatrixLink(K)))  # fmt: skip
         legs.append((np.linalg.inv(C), error))
     closures = tuple(("platform", f"end{i}") for i in range(1, LEGS))
     return Robot("random", "platform", tuple(frames), closures), legs, turn
@@ -104,20 +100,19 @@ def test_energies_of_random_machine_agree_with_dense_model(seed):
     fixed, springs = [(e[2], 1e-4)], [(e[3], 2e-5, 1e6)]
     first = [(row, 0.0) for row in opening(1)]
     third = [(row, 0.0) for row in opening(3)]
+    none = 0 * own
     expected = [
-        least_energy(legs, fixed, springs, 0 * own),
-        least_energy(legs, fixed + first, springs, 0 * own),
+        least_energy(legs, fixed, springs, none),
+        least_energy(legs, fixed + first, springs, none),
         least_energy(legs, fixed + first, springs, own),
     ]
-    lying = opening(2) @ expected[-1][0]
-    second = [
-        (row, lying[c] if c in locked else 0.0) for c, row in enumerate(opening(2))
-    ]
+    at = np.where(np.isin(range(6), locked), opening(2) @ expected[-1][0], 0.0)
+    second = list(zip(opening(2), at, strict=True))
     expected += [
         least_energy(legs, fixed + first + second, springs, own),
         least_energy(legs, first + second, [], own),
         least_energy(legs, first + second + third, [], own),
-        least_energy(legs, first + second + third, [], 0 * own),
+        least_energy(legs, first + second + third, [], none),
     ]
     energies = [result.energy[0] for result in results]
     assert energies == pytest.approx([found[2] for found in expected], rel=1e-8)

@@ -10,12 +10,10 @@ import numpy as np
 import pytest
 
 import forcefit as ff
+from forcefit import BadInput, Clearance, Frame, Robot, load_robot, solve_assembly
 from forcefit.assembly.kinematics.posture import home_posture
-from forcefit.assembly.linear.energy import solve_assembly
 from forcefit.assembly.linear.reference.reduction import FreeMotion
 from forcefit.assembly.model.placed_frames import place_frames
-from forcefit.assembly.model.robot import Clearance, Frame, Robot
-from forcefit.assembly.robots import load_robot
 from forcefit.assembly.robots.placing import at, ball_joint, cardan_joint
 from forcefit.assembly.steps.plan import (
     Adjust,
@@ -27,10 +25,11 @@ from forcefit.assembly.steps.plan import (
     Release,
 )
 from forcefit.assembly.steps.run import assemble_in_steps
-from forcefit.inputs.table import BadInput
 from forcefit.stiffness.screws import SCREW
 from tests.assembly.steps.robots_for_steps import (
     gough_points,
+    guided,
+    leg,
     planar_platform,
     portal,
     spring,
@@ -40,10 +39,16 @@ from tests.assembly.steps.robots_for_steps import (
 
 LEG = {i: ("platform", f"leg{i}") for i in (1, 2, 3)}
 Z = ("TZ",)
+SHIM = Adjust("shim", "leg2", Z, Measure("gap", LEG[2]))
 
 
 def join_leg(i, **more):
     return Join(f"join {i}", LEG[i], **more)
+
+
+def weight(force):
+    """Return a preload along z on the platform."""
+    return Preload("weight", "platform", np.array([0, 0, 0, 0, 0, force]))
 
 
 def test_energy_of_two_bars_equals_closed_form():
@@ -121,9 +126,8 @@ def test_clamped_platform_springs_back_after_release():
 def test_result_depends_on_order_if_pin_moves_slot(place, order, z, turn, energy):
     """A pin at 0.1 m with an error of 40 um moves the slot at 0.3 m."""
     posture = planar_platform([0.0, 0.4, 0.1, place], [0, 0, 40e-6, 0])
-    ways = {3: (), 4: Z}
     steps = tuple(
-        Join(f"join {i}", (f"seat{i}", f"end{i}"), locked=ways.get(i, ()))
+        Join(f"join {i}", (f"seat{i}", f"end{i}"), locked=Z if i == 4 else ())
         for i in (1, 2, *order)
     )
     result = assemble_in_steps(Plan(steps), posture)[-1]
@@ -160,8 +164,8 @@ def test_portal_welded_to_bent_base_springs_back():
 def test_total_work_equals_final_energy_plus_losses():
     steps = (
         join_leg(1), join_leg(2), Fix("clamp", "platform", {"TZ": 10e-6}),
-        Preload("press", "platform", np.array([0, 0, 0, 0, 0, -30.0])),
-        join_leg(3, locked=Z), Release("free", ("clamp",)), Release("end", ("press",)),
+        weight(-30.0), join_leg(3, locked=Z), Release("free", ("clamp",)),
+        Release("end", ("weight",)),
     )  # fmt: skip
     results = assemble_in_steps(Plan(steps), three_legs())
     work = sum(r.work + r.load_work for r in results)
@@ -174,19 +178,9 @@ def test_total_work_equals_final_energy_plus_losses():
 
 def legs_with_pins(places, bounds, k=(None, None, 2e6)):
     """Return a platform that moves along z, with pins and elastic legs."""
-    frames = [Frame("guide", "base", joint="prismatic"), Frame("platform", "guide")]
-    for i, (d, bound, stiffness) in enumerate(zip(places, bounds, k, strict=False), 1):
-        frames.append(
-            Frame(
-                f"leg{i}",
-                "base",
-                geometric_error=[0, 0, 0, 0, 0, d],
-                clearance=None if bound is None else Clearance(axial=bound),
-                link=None if stiffness is None else spring(stiffness, 5),
-            )  # fmt: skip
-        )
-    closures = tuple(("platform", f"leg{i + 1}") for i in range(len(places)))
-    return home_posture(Robot("pins", "platform", tuple(frames), closures))
+    gaps = [None if bound is None else Clearance(axial=bound) for bound in bounds]
+    legs = enumerate(zip(k, places, gaps, strict=False), 1)
+    return guided([leg(f"leg{i}", k, d, clearance=gap) for i, (k, d, gap) in legs])
 
 
 @pytest.mark.parametrize("order", [(1, 2), (2, 1)])
@@ -217,11 +211,8 @@ def test_energy_with_slot_bolted_after_first_pin_equals_closed_form(at, force):
 def test_bolted_joint_keeps_its_position():
     """Pin 1 is bolted at the position -20 um."""
     posture = legs_with_pins((0.0, 30e-6), (20e-6, None), k=(1e6, None))
-    down = np.array([0, 0, 0, 0, 0, -5.0])
-    steps = (
-        join_leg(1), Preload("weight", "platform", down), Join("bolt", "leg1"),
-        Release("no weight", ("weight",)), join_leg(2),
-    )  # fmt: skip
+    steps = (join_leg(1), weight(-5.0), Join("bolt", "leg1"),
+             Release("no weight", ("weight",)), join_leg(2))  # fmt: skip
     last = assemble_in_steps(Plan(steps), posture)[-1]
     # pin 2 lifts the platform from -20 um to 30 um
     assert abs(last.wrenches["join 1"][0, 5]) == pytest.approx(50.0, rel=1e-6)
@@ -274,16 +265,11 @@ def inverse_jacobian():
     return np.linalg.inv(np.hstack([np.cross(arms, along), along]))
 
 
-def join_legs(count, but=()):
-    return tuple(
-        Join(f"join {i}", (f"seat{i}", f"end{i}"))
-        for i in range(1, count + 1)
-        if i not in but
-    )
+JOIN_LEGS = tuple(Join(f"join {i}", (f"seat{i}", f"end{i}")) for i in range(1, 7))
 
 
 def test_displacement_of_gough_platform_agrees_with_jacobian():
-    last = assemble_in_steps(Plan(join_legs(6)), gough(LENGTHS))[-1]
+    last = assemble_in_steps(Plan(JOIN_LEGS), gough(LENGTHS))[-1]
     expected = inverse_jacobian() @ LENGTHS
     assert last.platform_screw[0] == pytest.approx(expected, rel=1e-9)
     assert np.linalg.norm(expected[3:]) == pytest.approx(23.3e-6, abs=0.05e-6)
@@ -297,7 +283,7 @@ def test_displacement_of_gough_platform_agrees_with_jacobian():
 )
 def test_one_adjustable_leg_corrects_one_pose_component(components, change, left):
     reading = Measure("pose", "platform", components)
-    steps = (*join_legs(6), Adjust("shim", "leg6", ("TZ",), reading))
+    steps = (*JOIN_LEGS, Adjust("shim", "leg6", ("TZ",), reading))
     last = assemble_in_steps(Plan(steps), gough(LENGTHS))[-1]
     assert last.adjustment[0, 0] == pytest.approx(change, abs=0.05e-6)
     assert np.linalg.norm(last.platform_screw[0, 3:]) == pytest.approx(left, abs=5e-8)
@@ -313,12 +299,12 @@ def test_adjusted_seventh_leg_has_no_closing_force():
     gamma = shares @ LENGTHS
     S = 5e6 / (1 + shares @ shares)
     posture, last = gough(np.r_[LENGTHS, 0.0], seventh=True), ("seat7", "end7")
-    pinned = assemble_in_steps(Plan((*join_legs(6), Join("last", last))), posture)[-1]
+    pinned = assemble_in_steps(Plan((*JOIN_LEGS, Join("last", last))), posture)[-1]
     assert pinned.closing_force == pytest.approx(S * abs(gamma), rel=1e-6)
     assert pinned.work == pytest.approx(S * gamma**2 / 2, rel=1e-6)
     assert np.linalg.norm(pinned.opening[0, 3:]) == pytest.approx(abs(gamma), rel=1e-6)
     cut = Adjust("cut", "leg7", ("TZ",), Measure("gap", last))
-    results = assemble_in_steps(Plan((*join_legs(6), cut, Join("last", last))), posture)
+    results = assemble_in_steps(Plan((*JOIN_LEGS, cut, Join("last", last))), posture)
     assert abs(results[-2].adjustment[0, 0]) == pytest.approx(abs(gamma), rel=1e-6)
     assert results[-1].closing_force == pytest.approx(0.0, abs=1e-6)
     assert results[-1].platform_screw[0] == pytest.approx(J @ LENGTHS, rel=1e-6)
@@ -327,63 +313,40 @@ def test_adjusted_seventh_leg_has_no_closing_force():
 def test_closing_force_with_elastic_fixture_equals_closed_form():
     """The leg and the fixture are springs in series."""
     fix = Fix("fixture", "platform", {"TZ": 0.0}, {"TZ": 2e6})
-    results = assemble_in_steps(Plan((fix, join_leg(1))), three_legs_alone())
+    one_leg = legs_with_pins((30e-6,), (None,), k=(1e6,))
+    results = assemble_in_steps(Plan((fix, join_leg(1))), one_leg)
     series = 1e6 * 2e6 / 3e6
     assert results[-1].closing_force == pytest.approx(series * 30e-6)
     assert results[-1].energy == pytest.approx(series * 30e-6**2 / 2)
     assert results[-1].platform_screw[0, 5] == pytest.approx(10e-6)
 
 
-def three_legs_alone():
-    """Return a platform that moves along z, with one elastic leg."""
-    return legs_with_pins((30e-6,), (None,), k=(1e6,))
-
-
 def test_weight_compresses_leg_before_slot_is_bolted():
     """A weight of 100 N compresses leg 1 by 100 um before leg 2 is joined."""
     posture = legs_with_pins((0.0, 0.0), (None, None), k=(1e6, 1e6))
-    frames = [
-        replace(f, mass=10.0) if f.name == "platform" else f
-        for f in posture.robot.frames
-    ]
-    posture = home_posture(replace(posture.robot, frames=tuple(frames)))
-    down = [0, 0, -10.0]
-    for second, expected in (
-        (join_leg(2, locked=Z), -100e-6),
-        (join_leg(2), -50e-6),
-    ):
+    guide, platform, *legs = posture.robot.frames
+    frames = (guide, replace(platform, mass=10.0), *legs)
+    posture = home_posture(replace(posture.robot, frames=frames))
+    for second, expected in ((join_leg(2, locked=Z), -100e-6), (join_leg(2), -50e-6)):
         plan = Plan((join_leg(1), second))
-        results = assemble_in_steps(plan, posture, gravity=down)
+        results = assemble_in_steps(plan, posture, gravity=[0, 0, -10.0])
         assert results[0].platform_screw[0, 5] == pytest.approx(-100e-6)
         assert results[1].platform_screw[0, 5] == pytest.approx(expected)
 
 
 def test_preload_on_free_platform_is_rejected():
-    press = Preload("press", "platform", np.array([0, 0, 0, 0, 0, -10.0]))
     with pytest.raises(FreeMotion, match="nothing resists"):
-        assemble_in_steps(Plan((press,)), legs_open())
-
-
-def legs_open():
-    """Return the robot of :func:`three_legs` without closures."""
-    posture = three_legs()
-    return replace(posture, robot=replace(posture.robot, closures=()))
+        assemble_in_steps(Plan((weight(-10.0),)), guided([]))
 
 
 def test_pose_error_equals_jacobian_times_rounding_of_lengths(rng):
     """The leg lengths are adjusted in increments of 10 um, so x = J r, |r| <= 5 um."""
     cuts = tuple(
-        Adjust(
-            f"cut {i}",
-            f"leg{i}",
-            ("TZ",),
-            Measure("gap", (f"seat{i}", f"end{i}")),
-            1e-5,
-        )  # fmt: skip
+        Adjust(f"cut {i}", f"leg{i}", Z, Measure("gap", (f"seat{i}", f"end{i}")), 1e-5)
         for i in range(1, 7)
     )
     held = Fix("fixture", "platform", dict.fromkeys(SCREW, 0.0))
-    plan = Plan((held, *cuts, *join_legs(6), Release("free", ("fixture",))))
+    plan = Plan((held, *cuts, *JOIN_LEGS, Release("free", ("fixture",))))
     posture = gough(np.zeros(6))
     lengths = rng.uniform(-1e-4, 1e-4, (50, 6))
     errors = np.zeros((50, len(posture.robot.frames), 6))
@@ -441,27 +404,26 @@ def test_shim_minimises_energy_of_robot_with_clearances(name, component, rng):
 
 
 @pytest.mark.parametrize("stiffness", [(1e6, 1e6), (1e6, 3e6)])
-@pytest.mark.parametrize("weight", [10.0, -10.0])
-def test_shim_under_weight_minimises_energy(stiffness, weight):
+@pytest.mark.parametrize("force", [10.0, -10.0])
+def test_shim_under_weight_minimises_energy(stiffness, force):
     """The weight moves pin 1 to the end of its clearance of +- 20 um.
 
     The energy is minimal if both legs have the same deformation F / (k1 + k2).
     """
     posture = legs_with_pins((0.0, 50e-6), (20e-6, None), k=stiffness)
-    load = Preload("weight", "platform", np.array([0, 0, 0, 0, 0, weight]))
-    shim = Adjust("shim", "leg2", ("TZ",), Measure("gap", LEG[2]))
-    results = assemble_in_steps(Plan((join_leg(1), load, shim, join_leg(2))), posture)
-    end = np.copysign(20e-6, weight)
+    load = weight(force)
+    results = assemble_in_steps(Plan((join_leg(1), load, SHIM, join_leg(2))), posture)
+    end = np.copysign(20e-6, force)
     assert results[2].adjustment[0, 0] == pytest.approx(end - 50e-6, rel=1e-6)
-    expected = weight**2 / (2 * sum(stiffness))
+    expected = force**2 / (2 * sum(stiffness))
     assert results[3].energy[0] == pytest.approx(expected, rel=1e-6)
 
 
 def test_shim_compensates_height_under_weight():
     """A load of 10 N compresses leg 1 by 10 um and moves pin 1 by 20 um."""
     posture = legs_with_pins((0.0, 50e-6), (20e-6, None), k=(1e6, 1e6))
-    load = Preload("weight", "platform", np.array([0, 0, 0, 0, 0, -10.0]))
-    shim = Adjust("shim", "leg1", ("TZ",), Measure("z", "platform", Z))
+    load = weight(-10.0)
+    shim = Adjust("shim", "leg1", Z, Measure("z", "platform", Z))
     results = assemble_in_steps(Plan((join_leg(1), load, shim, join_leg(2))), posture)
     assert results[2].adjustment[0, 0] == pytest.approx(30e-6, rel=1e-6)
     assert results[2].platform_screw[0, 5] == pytest.approx(0.0, abs=1e-11)
@@ -470,21 +432,19 @@ def test_shim_compensates_height_under_weight():
 def test_shims_of_many_machines_equal_length_differences(rng):
     """The shim is compared with the length error of each machine."""
     posture = legs_with_pins((0.0, 0.0), (20e-6, None), k=(1e6, 2e6))
-    load = Preload("weight", "platform", np.array([0, 0, 0, 0, 0, -10.0]))
-    shim = Adjust("shim", "leg2", ("TZ",), Measure("gap", LEG[2]))
+    load = weight(-10.0)
     lengths = rng.uniform(-1e-4, 1e-4, (20, 2))
     errors = np.zeros((20, len(posture.robot.frames), 6))
     for i in (1, 2):
         errors[:, posture.robot.index(f"leg{i}"), 5] = lengths[:, i - 1]
-    steps = (join_leg(1), load, shim, join_leg(2))
+    steps = (join_leg(1), load, SHIM, join_leg(2))
     found = assemble_in_steps(Plan(steps), posture, errors)[2].adjustment[:, 0]
     assert found == pytest.approx(lengths[:, 0] - 20e-6 - lengths[:, 1], abs=1e-10)
 
 
 def test_shim_in_bolted_joint_is_rejected():
     posture = legs_with_pins((0.0, 30e-6), (20e-6, 20e-6))
-    shim = Adjust("shim", "leg2", ("TZ",), Measure("gap", LEG[2]))
-    steps = (join_leg(1), Join("bolt", "leg2"), shim, join_leg(2))
+    steps = (join_leg(1), Join("bolt", "leg2"), SHIM, join_leg(2))
     with pytest.raises(BadInput, match="whose joint is bolted"):
         assemble_in_steps(Plan(steps), posture)
 

@@ -5,19 +5,31 @@ from itertools import permutations
 import numpy as np
 import pytest
 
-from forcefit.assembly.kinematics.posture import home_posture
-from forcefit.assembly.model.robot import Frame, Robot
 from forcefit.assembly.steps.plan import Adjust, Fix, Join, Measure, Plan, Release
 from forcefit.assembly.steps.run import assemble_in_steps
 from forcefit.assembly.steps.search import OBJECTIVES, best_order
-from tests.assembly.steps.robots_for_steps import leg, planar_platform, three_legs
+from tests.assembly.steps.robots_for_steps import (
+    guided,
+    leg,
+    planar_platform,
+    three_legs,
+)
 from tests.assembly.steps.test_run import LENGTHS, gough
 
-LEG = {i: ("platform", f"leg{i}") for i in (1, 2, 3)}
+LEG = {i: ("platform", f"leg{i}") for i in range(4)}
+JOINS = [Join(f"{i}", LEG[i]) for i in range(2)]
+HEIGHT = Measure("z", "platform", ("TZ",))
 
 
-def join(i, **more):
-    return Join(f"{i}", (f"seat{i}", f"end{i}"), **more)
+PLACES = [0.0, 0.4, 0.1, 0.3, 0.25]  # [m] of five legs
+
+
+def joins_with_slots(count, slots):
+    """Return the joins of all legs, some of which are in slots along z."""
+    return tuple(
+        Join(f"{i}", (f"seat{i}", f"end{i}"), locked=("TZ",) if i in slots else ())
+        for i in range(1, count + 1)
+    )
 
 
 def outcome(plan, posture, objective):
@@ -49,18 +61,15 @@ def test_minimum_peak_force_of_three_legs_equals_closed_form():
 @pytest.mark.parametrize("objective", OBJECTIVES)
 @pytest.mark.parametrize("slots", [(), (2, 5)])
 def test_search_finds_the_best_of_all_orders(objective, slots, rng):
-    errors = rng.normal(size=5) * 40e-6
-    posture = planar_platform([0.0, 0.4, 0.1, 0.3, 0.25], errors)
-    locked = {i: ("TZ",) if i in slots else () for i in range(1, 6)}
-    steps = tuple(join(i, locked=locked[i]) for i in range(1, 6))
+    posture = planar_platform(PLACES, rng.normal(size=5) * 40e-6)
+    steps = joins_with_slots(5, slots)
     found = best_order(Plan(steps), posture, objective)
     every = [outcome(Plan(order), posture, objective) for order in permutations(steps)]
     assert found.value == pytest.approx(min(every), rel=1e-9, abs=1e-15)
     assert found.bound == pytest.approx(found.value)
     assert found.given == pytest.approx(every[0])
-    assert outcome(found.plan, posture, objective) == pytest.approx(
-        found.value, rel=1e-9, abs=1e-15
-    )
+    again = outcome(found.plan, posture, objective)
+    assert again == pytest.approx(found.value, rel=1e-9, abs=1e-15)
 
 
 def test_search_permutes_only_consecutive_joins():
@@ -80,9 +89,8 @@ def test_search_permutes_adjustments_and_joins():
     If leg 1 is joined after the adjustment, it raises the platform by 30 um.
     """
     posture = legs_on_a_guide((10e-6, 60e-6))
-    shim = Adjust("shim", "leg0", ("TZ",), Measure("z", "platform", ("TZ",)))
-    joins = [Join(f"{i}", ("platform", f"leg{i}")) for i in range(2)]
-    given = Plan((joins[0], shim, joins[1]))
+    shim = Adjust("shim", "leg0", ("TZ",), HEIGHT)
+    given = Plan((JOINS[0], shim, JOINS[1]))
     assert outcome(given, posture, "error") == pytest.approx(30e-6)
     found = best_order(given, posture, "error")
     assert found.value == pytest.approx(0.0, abs=1e-12)
@@ -91,7 +99,7 @@ def test_search_permutes_adjustments_and_joins():
 
 def test_search_for_minimum_error_optimises_adjustments():
     """The adjustment that makes TZ zero does not minimise the translation error."""
-    shim = Adjust("shim", "leg6", ("TZ",), Measure("z", "platform", ("TZ",)))
+    shim = Adjust("shim", "leg6", ("TZ",), HEIGHT)
     found = best_order(Plan((shim,)), gough(LENGTHS), "error")
     assert found.given == pytest.approx(6.6e-6, abs=0.05e-6)
     assert found.value == pytest.approx(5.4e-6, abs=0.05e-6)
@@ -103,11 +111,9 @@ def test_search_for_minimum_error_optimises_adjustments():
 def test_search_for_minimum_energy_respects_increments():
     """A shim of 50 um closes the gap.  A shim of 40 um leaves a gap of 10 um."""
     posture = legs_on_a_guide((10e-6, 60e-6))
-    reading = Measure("z", "platform", ("TZ",))
-    joins = tuple(Join(f"{i}", ("platform", f"leg{i}")) for i in range(2))
     for increment, amount, energy in ((0.0, 50e-6, 0.0), (40e-6, 40e-6, 25e-6)):
-        shim = Adjust("shim", "leg0", ("TZ",), reading, increment)
-        found = best_order(Plan((*joins, shim)), posture, "energy")
+        shim = Adjust("shim", "leg0", ("TZ",), HEIGHT, increment)
+        found = best_order(Plan((*JOINS, shim)), posture, "energy")
         (shim,) = (step for step in found.plan.steps if isinstance(step, Adjust))
         assert shim.amount == pytest.approx([amount], rel=1e-6)
         assert found.value == pytest.approx(energy, rel=1e-6, abs=1e-12)
@@ -116,10 +122,8 @@ def test_search_for_minimum_energy_respects_increments():
 def test_search_keeps_adjustment_before_join_of_same_closure():
     """Leg 1 is joined without a force after its length is adjusted."""
     posture = legs_on_a_guide((10e-6, 60e-6))
-    gap = Measure("gap", ("platform", "leg1"))
-    shim = Adjust("shim", "leg1", ("TZ",), gap)
-    joins = [Join(f"{i}", ("platform", f"leg{i}")) for i in range(2)]
-    found = best_order(Plan((joins[0], shim, joins[1])), posture, "force")
+    shim = Adjust("shim", "leg1", ("TZ",), Measure("gap", ("platform", "leg1")))
+    found = best_order(Plan((JOINS[0], shim, JOINS[1])), posture, "force")
     names = [step.name for step in found.plan.steps]
     assert names.index("shim") < names.index("1")
     assert found.value == pytest.approx(0.0, abs=1e-9)
@@ -128,8 +132,7 @@ def test_search_keeps_adjustment_before_join_of_same_closure():
 def test_search_for_minimum_error_of_many_joins_stops_early(rng):
     """There are 362 880 orders of nine joins, and no bound of the error is known."""
     posture = planar_platform(np.linspace(0, 0.4, 9), 40e-6 * rng.normal(size=9))
-    locks = [("TZ",) if i % 3 == 0 else () for i in range(1, 10)]
-    steps = tuple(join(i, locked=lock) for i, lock in enumerate(locks, 1))
+    steps = joins_with_slots(9, (3, 6, 9))
     found = best_order(Plan(steps), posture, "error", most=300)
     assert found.bound == 0.0 <= found.value <= found.given
     assert 300 <= found.searched < 320
@@ -138,9 +141,8 @@ def test_search_for_minimum_error_of_many_joins_stops_early(rng):
 @pytest.mark.parametrize("objective", ["force", "energy"])
 @pytest.mark.parametrize("most", [20, 60])
 def test_search_that_stops_early_returns_lower_bound(objective, most, rng):
-    errors = rng.normal(size=5) * 40e-6
-    posture = planar_platform([0.0, 0.4, 0.1, 0.3, 0.25], errors)
-    steps = tuple(join(i, locked=("TZ",) if i in (2, 5) else ()) for i in range(1, 6))
+    posture = planar_platform(PLACES, rng.normal(size=5) * 40e-6)
+    steps = joins_with_slots(5, (2, 5))
     every = best_order(Plan(steps), posture, objective)
     early = best_order(Plan(steps), posture, objective, most=most)
     assert early.bound <= every.value * (1 + 1e-9)
@@ -149,25 +151,17 @@ def test_search_that_stops_early_returns_lower_bound(objective, most, rng):
 
 
 def legs_on_a_guide(lengths, k=1e6):
-    """Return a platform that moves along z, with legs of equal stiffness."""
-    legs = (leg(f"leg{i}", k, d) for i, d in enumerate(lengths))
-    guide = Frame("guide", "base", joint="prismatic")
-    frames = (guide, Frame("platform", "guide"), *legs)
-    closures = tuple(("platform", f"leg{i}") for i in range(len(lengths)))
-    return home_posture(Robot("legs", "platform", frames, closures))
+    """Return a platform that moves along z, with elastic legs."""
+    k = np.broadcast_to(k, len(lengths))
+    return guided([leg(f"leg{i}", k[i], d) for i, d in enumerate(lengths)])
 
 
 def legs_along_z(rng, count):
     """Return a platform that moves along z, a plan, leg stiffnesses and leg errors."""
     k, d = rng.uniform(1e6, 3e6, count), rng.normal(size=count) * 3e-5
-    frames = [
-        Frame("guide", "base", joint="prismatic"),
-        Frame("platform", "guide"),
-        *(leg(f"leg{i}", *kd) for i, kd in enumerate(zip(k, d, strict=True))),
-    ]
-    closures = tuple(("platform", f"leg{i}") for i in range(count))
-    robot = Robot("legs", "platform", tuple(frames), closures)
-    return home_posture(robot), Plan(tuple(Join(b, (a, b)) for a, b in closures)), k, d
+    posture = legs_on_a_guide(d, k)
+    joins = tuple(Join(b, (a, b)) for a, b in posture.robot.closures)
+    return posture, Plan(joins), k, d
 
 
 def least_peak(k, d):
@@ -187,9 +181,7 @@ def least_peak(k, d):
     return best[-1]
 
 
-def test_minimum_peak_force_of_twelve_legs_equals_dynamic_programming(
-    rng,
-):
+def test_minimum_peak_force_of_twelve_legs_equals_dynamic_programming(rng):
     posture, plan, k, d = legs_along_z(rng, 12)
     found = best_order(plan, posture, "force")
     assert found.value == pytest.approx(least_peak(k, d), rel=1e-9)
@@ -209,7 +201,7 @@ def test_search_over_sets_that_stops_early_returns_lower_bound(most, rng):
 
 def test_interrupted_search_returns_best_order_found():
     posture = planar_platform([0.0, 0.4, 0.1, 0.3], [0, 3e-5, 4e-5, -2e-5])
-    steps = tuple(join(i, locked=("TZ",) if i == 4 else ()) for i in range(1, 5))
+    steps = joins_with_slots(4, (4,))
 
     def stop(done):
         if done == 12:
@@ -223,7 +215,7 @@ def test_search_finds_order_without_energy_for_nine_legs():
     """The energy is zero if the slots are bolted first."""
     errors = np.array([0, 0, 10, 20, -10, 5, 15, -5, 25]) * 1e-6
     posture = planar_platform(np.linspace(0, 0.4, 9), errors)
-    steps = tuple(join(i, locked=("TZ",) if i > 2 else ()) for i in range(1, 10))
+    steps = joins_with_slots(9, range(3, 10))
     found = best_order(Plan(steps[::-1]), posture, "energy")
     assert found.value == pytest.approx(0.0, abs=1e-15)
     assert found.bound == pytest.approx(0.0, abs=1e-15)
