@@ -40,14 +40,12 @@ def spinning_beam(
     turn = _turn_of_z(axis)
     step = np.array([0.5 / pieces, 0, 0])
     first = rotation_matrix(turn).T @ step
-    frames = [
-        hinge("hub", rotation=turn),
-        Frame("piece0", "hub", first, -turn, link=link),
-    ]
+    frames = [hinge("hub", rotation=turn)]
+    frames.append(Frame("piece0", "hub", first, -turn, link=link))
     for k in range(1, pieces):
         frames.append(Frame(f"piece{k}", f"piece{k - 1}", step, link=link))
     robot = Robot("beam", frames[-1].name, tuple(frames))
-    return robot, instants(["q.hub"], [[0.0]], [[rate]], [[acceleration]])
+    return robot, at_one_instant(rate, acceleration)
 
 
 def _turn_of_z(axis):
@@ -65,3 +63,8 @@ def moving_drives(robot, names, path):
     postures, reasons = place_many_joints(robot, goals_of(names, robot, path[0]))
     assert not any(reasons)
     return follow_path(together(postures), names, path)
+
+
+def at_one_instant(rate=0.0, acceleration=0.0, position=0.0):
+    """Return the motion of the hub at one instant."""
+    return instants(["q.hub"], [[position]], [[rate]], [[acceleration]])

@@ -31,23 +31,19 @@ def arm_angles(tip, foot, side):
 
 def robot_of(stiffness):
     """Return a five-bar robot with rigid arms, elastic drives and a mass at its tip."""
-    frames = []
+    frames, angles = [], []
     for name, foot, side in (("left", FEET[0], 1), ("right", FEET[1], -1)):
         near, far = arm_angles(START, foot, side)
-        frames.append(hinge(
-            f"{name}.drive", at=[*foot, 0], position=near,
-            joint_stiffness=only(2, stiffness),
-        ))  # fmt: skip
-        frames.append(Frame(
-            f"{name}.elbow", f"{name}.drive", [NEAR, 0, 0], joint="revolute",
-            position=far - near, **rod(MASSES["near"], NEAR),
-        ))  # fmt: skip
-    turned = np.subtract(
-        arm_angles(START, FEET[1], -1)[1], arm_angles(START, FEET[0], 1)[1]
-    )
+        angles.append(far)
+        frames += [
+            hinge(f"{name}.drive", at=[*foot, 0], position=near,
+                  joint_stiffness=only(2, stiffness)),
+            Frame(f"{name}.elbow", f"{name}.drive", [NEAR, 0, 0], joint="revolute",
+                  position=far - near, **rod(MASSES["near"], NEAR)),
+        ]  # fmt: skip
     frames += [
         Frame("left.pin", "left.elbow", [FAR, 0, 0], joint="revolute",
-              position=float(turned), **rod(MASSES["far"], FAR)),
+              position=float(angles[1] - angles[0]), **rod(MASSES["far"], FAR)),
         Frame("left.tip", "left.pin", mass=TOOL),
         Frame("right.tip", "right.elbow", [FAR, 0, 0], **rod(MASSES["far"], FAR)),
     ]  # fmt: skip
@@ -63,11 +59,9 @@ def simulated(stiffness, steps):
     def body(mass, length, start, angle):
         centre = start + length / 2 * np.array([np.cos(angle), np.sin(angle)])
         node = mbs.AddNode(item.NodeRigidBody2D(referenceCoordinates=[*centre, angle]))
-        inertia = mass * length**2 / 12
-        number = mbs.AddObject(
-            item.ObjectRigidBody2D(mass=mass, inertia=inertia, nodeNumber=node)
-        )
-        return node, number
+        return node, mbs.AddObject(item.ObjectRigidBody2D(
+            mass=mass, inertia=mass * length**2 / 12, nodeNumber=node
+        ))  # fmt: skip
 
     def marker(number, place):
         return mbs.AddMarker(
@@ -135,14 +129,11 @@ def test_quasi_static_deflection_converges_to_dynamic_solution():
     for stiffness, steps in ((2e4, 2000), (8e4, 4000)):
         found = path_errors(robot_of(stiffness), path)
         times, positions = simulated(stiffness, steps)
-        dynamic = np.stack(
-            [np.interp(path.times, times, p) for p in positions.T], axis=1
-        )
+        dynamic = np.stack([np.interp(path.times, times, p) for p in positions.T], 1)
         error = dynamic - path.values - found.inertial[:, 3:5]
         left_out.append(np.abs(error).max() / np.abs(found.inertial[:, 3:5]).max())
         periods.append(found.periods)
     assert periods[0] > 15
     assert left_out[1] < 0.005
-    assert left_out[1] / left_out[0] == pytest.approx(
-        (periods[0] / periods[1]) ** 2, rel=0.2
-    )
+    expected = (periods[0] / periods[1]) ** 2
+    assert left_out[1] / left_out[0] == pytest.approx(expected, rel=0.2)

@@ -5,16 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from forcefit import Frame, Robot, place_robot, platform_stiffness, solve_assembly
 from forcefit.assembly.effects.robot_effects import apply_robot_effects
-from forcefit.assembly.kinematics.posture import place_robot
-from forcefit.assembly.linear.energy import solve_assembly
 from forcefit.assembly.model.function import Function
-from forcefit.assembly.model.robot import Frame, Robot
 from forcefit.assembly.path.path_errors import path_errors
-from forcefit.assembly.platform_stiffness.platform_stiffness import platform_stiffness
 from forcefit.inputs.table import BadInput
-from tests.assembly.path.moving_robots_for_tests import hinge, instants, rod
-from tests.assembly.path.test_path_errors import heavy, without_clearance
+from tests.assembly.path.moving_robots_for_tests import (
+    at_one_instant,
+    hinge,
+    instants,
+    rod,
+)
+from tests.assembly.path.test_path_errors import heavy
+from tests.tolerances_for_tests import without_clearances
 
 MASS, LENGTH, ALPHA = 2.0, 0.5, 40.0
 TORQUE = MASS * LENGTH**2 / 3 * ALPHA  # [N m] torque that accelerates a thin rod
@@ -42,6 +45,8 @@ SOFT = Function(
     "leg2.drive", ("rz",), ("q.leg2.drive",), "powers", {"0": 1e-6, "1": 2e-6},
     kind="compliance",
 )  # fmt: skip
+SPRING = {"drive_compliance": {"hub": 4e3}}
+CONTACT = {"contact_stiffening": {"hub.coefficient": 1e6, "hub.exponent": 1.5}}
 ERRORS = ("encoder_offset", "link_length", "thermal_expansion")
 
 
@@ -53,8 +58,7 @@ def arm(**other):
 
 def turned(robot, **given):
     """Return the rotation error [rad] of the rod due to its acceleration."""
-    path = instants(["q.hub"], [[0.0]], [[0.0]], [[ALPHA]])
-    found = path_errors(robot, path, **given)
+    found = path_errors(robot, at_one_instant(0.0, ALPHA), **given)
     assert found.status[0] == "ok"
     return found.inertial[0, 2]
 
@@ -62,25 +66,16 @@ def turned(robot, **given):
 @pytest.mark.parametrize(
     ("effects", "rotation"),
     [
-        ({"drive_compliance": {"hub": 4e3}}, TORQUE / 4e3),
+        (SPRING, TORQUE / 4e3),
         ({"base_compliance": {"stiffness.rz": 2e3}}, TORQUE / 2e3),
         (
-            {
-                "drive_compliance": {"hub": 4e3},
-                "base_compliance": {"stiffness.rz": 2e3},
-            },
+            SPRING | {"base_compliance": {"stiffness.rz": 2e3}},
             TORQUE / 4e3 + TORQUE / 2e3,
         ),
-        (
-            {"contact_stiffening": {"hub.coefficient": 1e6, "hub.exponent": 1.5}},
-            (TORQUE / 1e6) ** (1 / 1.5),
-        ),
+        (CONTACT, (TORQUE / 1e6) ** (1 / 1.5)),
         # an additional mass of 1 kg at the middle of the rod
         (
-            {
-                "drive_compliance": {"hub": 4e3},
-                "body_mass": {"arm.mass": 1.0, "arm.moment.x": -LENGTH / 2},
-            },
+            SPRING | {"body_mass": {"arm.mass": 1.0, "arm.moment.x": -LENGTH / 2}},
             (TORQUE + 1.0 * (LENGTH / 2) ** 2 * ALPHA) / 4e3,
         ),
     ],
@@ -94,7 +89,7 @@ def test_deflection_equals_compliance_function_times_torque(state):
     """At q = 0.5, the compliance of the drive is 1e-6 + 2e-6 q = 2e-6 rad/(N m)."""
     soft = Function("hub", ("rz",), ("q.hub",), "powers", {"0": 1e-6, "1": 2e-6},
                     kind="compliance")  # fmt: skip
-    path = instants(["q.hub"], [[0.5]], [[0.0]], [[ALPHA]])
+    path = at_one_instant(0.0, ALPHA, 0.5)
     found = path_errors(arm(functions=(soft,)), path, state=state)
     assert found.inertial[0, 2] == pytest.approx(-TORQUE * 2e-6, rel=1e-9)
     assert found.arrays["drive_force"][0, 0] == pytest.approx(TORQUE, rel=1e-9)
@@ -102,7 +97,7 @@ def test_deflection_equals_compliance_function_times_torque(state):
 
 
 def test_first_frequency_includes_drive_compliance():
-    robot = arm(effects={"drive_compliance": {"hub": 4e3}})
+    robot = arm(effects=SPRING)
     path = instants(["q.hub"], [[0.0], [0.1]], [[0.0]] * 2, [[0.0]] * 2)
     expected = np.sqrt(4e3 / (TORQUE / ALPHA)) / (2 * np.pi)
     assert path_errors(robot, path).frequency == pytest.approx(expected, rel=1e-9)
@@ -110,15 +105,11 @@ def test_first_frequency_includes_drive_compliance():
 
 def test_geometric_effects_do_not_change_inertial_deflection():
     """Thermal expansion and a length error do not change the inertial loads."""
-    effects = {
-        "drive_compliance": {"hub": 4e3}, "link_length": {"arm": 3e-5},
-        "thermal_expansion": {"arm": 1e-5},
-    }  # fmt: skip
-    path = instants(["q.hub"], [[0.0]], [[0.0]], [[ALPHA]])
-    found = path_errors(arm(effects=effects), path, under={"temperature": 8.0})
-    assert found.arrays["platform_screw"][0, 3] == pytest.approx(
-        1e-5 * LENGTH * 8.0 + 3e-5, rel=1e-12
-    )
+    lengths = {"link_length": {"arm": 3e-5}, "thermal_expansion": {"arm": 1e-5}}
+    found = path_errors(arm(effects=SPRING | lengths), at_one_instant(0.0, ALPHA),
+                        under={"temperature": 8.0})  # fmt: skip
+    longer = found.arrays["platform_screw"][0, 3]
+    assert longer == pytest.approx(1e-5 * LENGTH * 8.0 + 3e-5, rel=1e-12)
     assert found.inertial[0, 2] == pytest.approx(-TORQUE / 4e3, rel=1e-9)
 
 
@@ -150,7 +141,7 @@ def test_errors_at_zero_speed_equal_errors_at_rest(name):
     )
     functions = (SOFT,) if name in {"all", "function"} else ()
     robot = replace(
-        without_clearance(heavy("irsbot2")), effects=effects, functions=functions
+        without_clearances(heavy("irsbot2")), effects=effects, functions=functions
     )
     found, applied = at_rest(robot, GRAVITY, LOAD)
     for i, one in enumerate(applied):
@@ -179,61 +170,36 @@ def test_energies_at_zero_speed_equal_energies_at_rest():
 
 
 def test_self_weight_effect_equals_gravity_option():
-    path = instants(["q.hub"], [[0.3]], [[2.0]], [[ALPHA]])
-    springs = {"drive_compliance": {"hub": 4e3}}
-    known = path_errors(
-        arm(effects=springs | {"self_weight": {"g.y": -9.81}}), path
-    ).arrays
-    asked = path_errors(arm(effects=springs), path, gravity=GRAVITY).arrays
+    path = at_one_instant(2.0, ALPHA, 0.3)
+    weight = {"self_weight": {"g.y": -9.81}}
+    known = path_errors(arm(effects=SPRING | weight), path).arrays
+    asked = path_errors(arm(effects=SPRING), path, gravity=GRAVITY).arrays
     for name in ("platform_screw", "wrench", "drive_force"):
         np.testing.assert_array_equal(known[name], asked[name])
 
 
+LAG = Function("arm", ("tx",), ("cov.oil",), "lag",
+               {"gain": 1e-6, "time_constant": 60.0})  # fmt: skip
+APPROACH = Function("arm", ("tx",), ("approach",), "powers", {"1": 1.0})
+
+
 @pytest.mark.parametrize(
-    ("changes", "message"),
+    ("changes", "options", "message"),
     [
-        (
-            {"effects": {"friction_hysteresis": {"hub": 1.0}}},
-            '"friction_hysteresis" depends on the direction of approach',
-        ),
-        (
-            {"effects": {"geometric_stiffening": {}}},
-            '"geometric_stiffening" is defined for finite motions',
-        ),
-        ({"effects": {"thermal_expansion": {"arm": 1e-5}}}, "depends on temperature"),
-        (
-            {
-                "functions": (
-                    Function("arm", ("tx",), ("approach",), "powers", {"1": 1.0}),
-                )
-            },
-            "arm tx of approach.* depends on the direction of approach",
-        ),
-        (
-            {
-                "functions": (
-                    Function("arm", ("tx",), ("cov.oil",), "lag",
-                             {"gain": 1e-6, "time_constant": 60.0}),
-                )
-            },
-            '"arm tx of cov.oil" has the form "lag", which depends on earlier rows',
-        ),
+        ({"effects": {"friction_hysteresis": {"hub": 1.0}}}, {},
+         '"friction_hysteresis" depends on the direction of approach'),
+        ({"effects": {"geometric_stiffening": {}}}, {},
+         '"geometric_stiffening" is defined for finite motions'),
+        ({"effects": {"thermal_expansion": {"arm": 1e-5}}}, {},
+         "depends on temperature"),
+        ({"functions": (APPROACH,)}, {},
+         "arm tx of approach.* depends on the direction of approach"),
+        ({"functions": (LAG,)}, {},
+         '"arm tx of cov.oil" has the form "lag", which depends on earlier rows'),
+        ({"effects": CONTACT}, {"state": "contact"}, 'nonlinear law at frame "hub"'),
+        ({}, {"under": {"heat": 1.0}}, '--under: unknown covariate "heat"'),
     ],
 )  # fmt: skip
-def test_unsupported_effect_is_rejected(changes, message):
-    path = instants(["q.hub"], [[0.0]], [[0.0]], [[ALPHA]])
+def test_unsupported_effect_or_covariate_is_rejected(changes, options, message):
     with pytest.raises(BadInput, match=message):
-        path_errors(arm(**changes), path)
-
-
-def test_nonlinear_effect_is_rejected_in_contact_state():
-    effects = {"contact_stiffening": {"hub.coefficient": 1e6, "hub.exponent": 1.5}}
-    path = instants(["q.hub"], [[0.0]], [[0.0]], [[ALPHA]])
-    with pytest.raises(BadInput, match='nonlinear law at frame "hub"'):
-        path_errors(arm(effects=effects), path, state="contact")
-
-
-def test_unknown_covariate_is_rejected():
-    path = instants(["q.hub"], [[0.0]], [[0.0]], [[ALPHA]])
-    with pytest.raises(BadInput, match='--under: unknown covariate "heat"'):
-        path_errors(arm(), path, under={"heat": 1.0})
+        path_errors(arm(**changes), at_one_instant(0.0, ALPHA), **options)

@@ -1,6 +1,7 @@
 """Tests of the inertia of mesh links against beams and rigid bodies."""
 
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -51,10 +52,8 @@ def turned_arm(link):
         Frame("tip", "y", [LENGTH, 0, 0], link=link),
     )  # fmt: skip
     names = ("q.z", "q.x", "q.y")
-    path = tuple(
-        np.array([x]) for x in ([0.3, -0.4, 0.6], [4.0, -7, 5], [60.0, 90.0, -40])
-    )
-    return moving_drives(Robot("arm", "tip", frames), names, path)
+    path = np.array([[[0.3, -0.4, 0.6]], [[4.0, -7, 5]], [[60.0, 90.0, -40]]])
+    return moving_drives(Robot("arm", "tip", frames), names, tuple(path))
 
 
 def with_mass(M):
@@ -112,9 +111,7 @@ def test_loads_of_meshed_bar_agree_with_beam_loads():
     solid = solved_link(Frame("tip", translation=[LENGTH, 0, 0], link=solid))
     beam = BeamLink({"radius": RADIUS}, E, 0.3, RHO)
     by_mesh, by_beam = (inertial_loads(turned_arm(link), G) for link in (solid, beam))
-    for name in ("bodies", "carried"):
-        expected = getattr(by_beam, name)
-        for part in (slice(0, 3), slice(3, 6)):
-            size = np.abs(expected[..., part]).max()
-            found = getattr(by_mesh, name)[..., part]
-            np.testing.assert_allclose(found, expected[..., part], atol=0.02 * size)
+    for name, part in product(("bodies", "carried"), (slice(0, 3), slice(3, 6))):
+        found, expected = (getattr(one, name)[..., part] for one in (by_mesh, by_beam))
+        size = np.abs(expected).max()
+        np.testing.assert_allclose(found, expected, atol=0.02 * size)

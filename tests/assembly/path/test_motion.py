@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from forcefit import Frame, Robot, load_robot
 from forcefit.assembly.kinematics.posture import (
     POSE,
     home_posture,
@@ -10,20 +11,13 @@ from forcefit.assembly.kinematics.posture import (
     place_many_joints,
     together,
 )
-from forcefit.assembly.model.robot import Frame, Robot
 from forcefit.assembly.path.motion import NotFollowed, follow_path
-from forcefit.assembly.robots import load_robot
 from forcefit.assembly.sweeps.targets import goals_of, of_joints
 from forcefit.stiffness.screws import rotation_vector
 from tests.assembly.path.moving_robots_for_tests import hinge
 
-CASES = {
-    "irsbot2": ("tx", "tz"),
-    "hexapod": POSE,
-    "delta": ("tx", "ty", "tz"),
-    "five_bar": ("tx", "ty"),
-    "arm6": POSE,
-}
+CASES = {"irsbot2": ("tx", "tz"), "hexapod": POSE, "delta": ("tx", "ty", "tz"),
+         "five_bar": ("tx", "ty"), "arm6": POSE}  # fmt: skip
 
 
 def path_of(names, home, t):
@@ -66,14 +60,12 @@ def differences(robot, names, home, t, h):
 
 @pytest.mark.parametrize("name", CASES)
 def test_velocities_and_accelerations_equal_finite_differences(name):
-    """The finite differences are of fourth order."""
     robot, names = load_robot(name), CASES[name]
     pose = home_posture(robot).pose()
     home = np.array([pose[one] for one in names])
     t = np.array([0.4])
-    motion = follow_path(
-        placed(robot, names, path_of(names, home, t)[0]), names, path_of(names, home, t)
-    )
+    path = path_of(names, home, t)
+    motion = follow_path(placed(robot, names, path[0]), names, path)
     velocity, acceleration, omega = differences(robot, names, home, 0.4, 4e-3)
     p = motion.postures.transforms[0, :, :3, 3]
     V = motion.twists[0]
@@ -90,7 +82,6 @@ def two_links(a, b):
 
 
 def test_tip_acceleration_of_planar_arm_equals_closed_form():
-    """The acceleration of the tip is known in closed form."""
     a, b = 0.4, 0.3
     robot, names = two_links(a, b), ("q.one", "q.two")
     q, rate, second = ([[0.5, 0.8]], [[3.0, -2.0]], [[20.0, 15.0]])
@@ -99,10 +90,8 @@ def test_tip_acceleration_of_planar_arm_equals_closed_form():
     u, v = np.exp(0.5j), np.exp(1.3j)
     acceleration = a * u * (20j - 9) + b * v * (35j - 1)
     tip = motion.postures.transforms[:, 2, :3, 3]
-    np.testing.assert_allclose(
-        motion.acceleration_of(2, tip)[0], [acceleration.real, acceleration.imag, 0],
-        rtol=1e-13,
-    )  # fmt: skip
+    expected = [acceleration.real, acceleration.imag, 0]
+    np.testing.assert_allclose(motion.acceleration_of(2, tip)[0], expected, rtol=1e-13)
 
 
 def test_drives_without_path_coordinates_do_not_move():

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from forcefit import load_robot, platform_stiffness
 from forcefit.assembly.files.robot_file import read_robot
 from forcefit.assembly.kinematics.posture import (
     POSE,
@@ -19,19 +20,23 @@ from forcefit.assembly.path.path_file import PathTable
 from forcefit.assembly.path.report import path_page
 from forcefit.assembly.path.summary import path_summary
 from forcefit.assembly.path.trajectory import Trajectory, profiled
-from forcefit.assembly.platform_stiffness.platform_stiffness import platform_stiffness
-from forcefit.assembly.robots import load_robot
 from forcefit.assembly.sweeps.targets import goals_of
 from forcefit.page.page import Provenance
 from forcefit.stiffness.beam.sections import declared_section
-from tests.assembly.path.moving_robots_for_tests import GRAVITY, hinge, instants, rod
+from tests.assembly.path.moving_robots_for_tests import (
+    GRAVITY,
+    at_one_instant,
+    hinge,
+    instants,
+    rod,
+)
 from tests.assembly.path.test_motion import CASES, path_of
+from tests.tolerances_for_tests import without_clearances
 
-DENSITY = 2700.0
 GRAVITY_ALONG_Z = [0.0, 0.0, -9.81]
 
 
-def heavy(name, density=DENSITY, mass=1.5):
+def heavy(name, density=2700.0, mass=1.5):
     """Return a built-in robot whose beams and platform have a mass."""
     robot = load_robot(name)
     frames = []
@@ -39,17 +44,10 @@ def heavy(name, density=DENSITY, mass=1.5):
         if isinstance(frame.link, BeamLink):
             frame = replace(frame, link=replace(frame.link, density=density or None))
         if frame.name == robot.platform:
-            frame = replace(
-                frame, mass=mass, centre_of_mass=[0.01, -0.02, 0.03],
-                inertia=np.diag([1e-3, 2e-3, 2.5e-3]),
-            )  # fmt: skip
+            frame = replace(frame, mass=mass, centre_of_mass=[0.01, -0.02, 0.03],
+                            inertia=np.diag([1e-3, 2e-3, 2.5e-3]))  # fmt: skip
         frames.append(frame)
     return replace(robot, frames=tuple(frames))
-
-
-def without_clearance(robot):
-    frames = tuple(replace(frame, clearance=None) for frame in robot.frames)
-    return replace(robot, frames=frames)
 
 
 def energy(motion, gravity):
@@ -89,9 +87,8 @@ def test_drive_power_equals_energy_rate(name):
     motion = follow_path(together(postures), names, path)
     E = energy(motion, GRAVITY)
     rate = (8 * (E[3] - E[1]) - (E[4] - E[0])) / (12 * h)
-    found = path_errors(
-        robot, Trajectory(names, times, *path, "times"), gravity=GRAVITY
-    )
+    way = Trajectory(names, times, *path, "times")
+    found = path_errors(robot, way, gravity=GRAVITY)
     driven = [f.actuated for f in robot.frames]
     power = found.arrays["drive_force"][2] @ motion.rates[2, driven]
     assert (found.status == "ok").all()
@@ -103,7 +100,7 @@ def test_drive_power_equals_energy_rate(name):
 def test_inertial_deflection_equals_compliance_times_inertial_wrench(name):
     """The deflection is the product of C and the d'Alembert wrench of the platform."""
     robot, names = heavy(name, density=0.0), CASES[name]
-    tight = without_clearance(robot)
+    tight = without_clearances(robot)
     pose = home_posture(tight).pose()
     path = path_of(names, np.array([pose[one] for one in names]), np.array([0.3]))
     found = path_errors(tight, Trajectory(names, np.zeros(1), *path, "times"))
@@ -118,17 +115,15 @@ def test_inertial_deflection_equals_compliance_times_inertial_wrench(name):
     place, _ = place_many(tight, goals_of(names, tight, path[0]))
     C = platform_stiffness(place[0]).compliance
     expected = C @ np.r_[moment, force]
-    np.testing.assert_allclose(
-        arrays["inertial_screw"][0], expected, atol=1e-8 * np.abs(expected).max()
-    )
+    tol = 1e-8 * np.abs(expected).max()
+    np.testing.assert_allclose(arrays["inertial_screw"][0], expected, atol=tol)
     size = np.sqrt(np.outer(np.diag(C), np.diag(C)))
     np.testing.assert_allclose(arrays["compliance"][0] / size, C / size, atol=1e-9)
 
 
 def test_deflection_is_proportional_to_squared_speed():
     """If the duration is halved, the deflection is multiplied by four."""
-    robot = heavy("five_bar")
-    tight = without_clearance(robot)
+    tight = without_clearances(heavy("five_bar"))
     table = PathTable(("tx", "ty"), np.array([[0.0, 0.14], [0.02, 0.13]]))
     slow, fast = (
         path_errors(tight, profiled(table, 21, "quintic", 1.0, duration=T))
@@ -149,21 +144,18 @@ def test_clearance_adds_to_deflection_of_accelerated_arm():
         hinge("hub"), Frame("arm", "hub", [0.3, 0, 0], link=link, clearance=joint),
         Frame("tool", "arm", [0.0, 0, 0], mass=0.5),
     )  # fmt: skip
-    path = instants(["q.hub"], [[0.0]], [[50.0]], [[0.0]])
-    found = path_errors(Robot("arm", "tool", frames), path)
+    robot, path = Robot("arm", "tool", frames), at_one_instant(50.0)
+    found = path_errors(robot, path)
     force = 0.5 * 50.0**2 * 0.3
-    stretch = force * 0.3 / (70e9 * np.pi * 0.01**2)
-    assert found.arrays["platform_screw"][0, 3] == pytest.approx(
-        stretch + 1e-5, rel=1e-6
-    )
-    frozen = path_errors(Robot("arm", "tool", frames), path, assumption="frozen")
+    moved = force * 0.3 / (70e9 * np.pi * 0.01**2) + 1e-5
+    assert found.arrays["platform_screw"][0, 3] == pytest.approx(moved, rel=1e-6)
+    frozen = path_errors(robot, path, assumption="frozen")
     lower, upper = frozen.arrays["translation_error"][0]
-    assert lower <= stretch + 1e-5 + 1e-9
-    assert upper >= stretch + 1e-5
+    assert lower - 1e-9 <= moved <= upper
 
 
 def test_robot_without_mass_and_unknown_assumption_are_rejected():
-    path = instants(["q.hub"], [[0.0]], [[1.0]], [[0.0]])
+    path = at_one_instant(1.0)
     frames = (hinge("hub"), Frame("arm", "hub", [0.3, 0, 0]))
     with pytest.raises(ValueError, match="found no moving mass"):
         path_errors(Robot("arm", "arm", frames), path)
@@ -269,24 +261,22 @@ def test_drive_forces_of_gough_platform_equal_closed_form(tmp_path):
     np.testing.assert_allclose(errors.arrays["drive_force"][0], expected, rtol=1e-9)
 
 
-def test_drive_forces_do_not_depend_on_spin_of_legs(tmp_path):
-    """The legs can spin between ball joints, but not on universal joints."""
-    file = tmp_path / "six.toml"
-    forces = [
-        forces_of_six_legs(six_legs(file, kind, mass=0.8)[0])
-        for kind in ("spherical", "universal")
-    ]
-    np.testing.assert_allclose(forces[0], forces[1], rtol=1e-9)
-
-
-def test_drive_forces_do_not_depend_on_axial_inertia_of_legs(tmp_path):
-    """The legs do not spin, so forces do not depend on their axial inertia."""
-    file = tmp_path / "six.toml"
-    forces = [
-        forces_of_six_legs(six_legs(file, "spherical", 0.8, 0.02, about)[0])
-        for about in (0.0, 0.02)
-    ]
-    np.testing.assert_allclose(forces[1], forces[0], rtol=1e-9)
+@pytest.mark.parametrize(
+    "legs",
+    [
+        (("spherical", 0.8), ("universal", 0.8)),
+        (("spherical", 0.8, 0.02, 0.0), ("spherical", 0.8, 0.02, 0.02)),
+    ],
+    ids=["joints", "axial inertia"],
+)
+def test_drive_forces_do_not_depend_on_spin_of_legs(tmp_path, legs):
+    """The legs can spin between ball joints, but not on universal joints. They do not
+    spin, so forces do not depend on their axial inertia.
+    """
+    one, other = (
+        forces_of_six_legs(six_legs(tmp_path / "six.toml", *leg)[0]) for leg in legs
+    )
+    np.testing.assert_allclose(one, other, rtol=1e-9)
 
 
 def test_screw_torque_equals_slide_force_times_lead(tmp_path):
@@ -296,9 +286,7 @@ def test_screw_torque_equals_slide_force_times_lead(tmp_path):
     """
     file = tmp_path / "six.toml"
     slides, _ = six_legs(file, "universal", mass=0.8)
-    threads = file.read_text().replace(
-        'type = "prismatic"', 'type = "helical", pitch = 0.01'
-    )
-    file.write_text(threads)
+    screw = 'type = "helical", pitch = 0.01'
+    file.write_text(file.read_text().replace('type = "prismatic"', screw))
     force, torque = map(forces_of_six_legs, (slides, read_robot(file)))
     np.testing.assert_allclose(torque, 0.01 / (2 * np.pi) * force, rtol=1e-9)

@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from forcefit import BadInput, BeamLink, Frame, Robot, errors_along_path
+from forcefit import BadInput, BeamLink, Clearance, Frame, Robot, errors_along_path
 from forcefit.assembly.model.force_control import with_drive_forces
-from forcefit.assembly.model.frame import Clearance
 from forcefit.assembly.path.path_errors import path_errors
 from forcefit.assembly.path.path_file import PathTable
-from tests.assembly.path.moving_robots_for_tests import hinge, instants
+from tests.assembly.path.moving_robots_for_tests import at_one_instant, hinge, instants
 
 ALONG_X = [0, np.pi / 2, 0]  # rotation vector that rotates z to x
 MASS = 3.0
+TABLE = PathTable(("tx",), np.array([[0.0], [0.1]]))
 
 
 def slide(name, **more):
@@ -24,9 +24,7 @@ def slide(name, **more):
 
 def spring(k):
     """Return the stiffness of a drive that is compliant along its axis only."""
-    K = np.diag(np.full(6, np.inf))
-    K[5, 5] = k
-    return K
+    return np.diag([np.inf] * 5 + [k])
 
 
 def test_compliance_along_contact_rim_equals_clearance_over_force():
@@ -50,8 +48,7 @@ def test_compliance_along_contact_rim_equals_clearance_over_force():
 def test_centrifugal_force_stiffens_elastic_hinge():
     """The stiffness of the hinge is k + m omega^2 L^2."""
     k, length, rates = 200.0, 0.4, np.array([[0.0], [10.0], [25.0]])
-    K = np.diag(np.full(6, np.inf))
-    K[2, 2] = k
+    K = np.diag([np.inf] * 2 + [k] + [np.inf] * 3)
     tip = Frame("tip", "hub", [length, 0, 0], mass=MASS)
     robot = Robot("arm", "tip", (hinge("hub", joint_stiffness=K), tip))
     zero = np.zeros((3, 1))
@@ -68,7 +65,7 @@ def test_exact_state_rejects_link_with_density():
     link = BeamLink({"radius": 0.01}, 70e9, 0.3, 2700.0)
     tip = Frame("tip", "hub", [0.4, 0, 0], link=link)
     robot = Robot("arm", "tip", (hinge("hub"), tip))
-    path = instants(["q.hub"], [[0.0]], [[0.0]], [[0.0]])
+    path = at_one_instant()
     with pytest.raises(BadInput, match='--state exact: found a link .* frame "tip"'):
         path_errors(robot, path, state="exact")
     with pytest.raises(BadInput, match="--state"):
@@ -85,11 +82,8 @@ def two_drives():
 
 def test_forces_of_two_drives_sum_to_inertial_force():
     """At each instant, m a = F_a + F_b."""
-    table = PathTable(("tx",), np.array([[0.0], [0.1]]))
-    found = errors_along_path(
-        two_drives(), table, profile="quintic", duration=0.2, points=21,
-        drive_force={"b": 70.0},
-    )  # fmt: skip
+    found = errors_along_path(two_drives(), TABLE, profile="quintic", duration=0.2,
+                              points=21, drive_force={"b": 70.0})  # fmt: skip
     assert found.drives == ("a",)
     expected = MASS * found.arrays["platform_acceleration"][:, 3] - 70.0
     np.testing.assert_allclose(found.arrays["drive_force"][:, 0], expected, atol=1e-9)
@@ -99,12 +93,10 @@ def test_forces_of_two_drives_sum_to_inertial_force():
 
 def test_interrupted_path_resumes_with_same_results(tmp_path):
     """The computation is interrupted after the first block of points."""
-    table = PathTable(("tx",), np.array([[0.0], [0.1]]))
 
-    def compute(file, progress=lambda done, total: None):
-        robot = two_drives()
+    def compute(file, progress=lambda done, total: None, duration=0.2):
         return errors_along_path(
-            robot, table, profile="quintic", duration=0.2, points=4100,
+            two_drives(), TABLE, profile="quintic", duration=duration, points=4100,
             output=file, progress=progress,
         )  # fmt: skip
 
@@ -128,7 +120,4 @@ def test_interrupted_path_resumes_with_same_results(tmp_path):
     with pytest.raises(KeyboardInterrupt):
         compute(file, stop)
     with pytest.raises(BadInput, match="journal of another sweep: found path_sha256"):
-        errors_along_path(
-            two_drives(), table, output=file,
-            profile="quintic", duration=0.3, points=4100,
-        )  # fmt: skip
+        compute(file, duration=0.3)
