@@ -1,15 +1,16 @@
 """Minimum-energy assembly of a manipulator: screws, wrenches, energy, certificate.
 
-======  ====================  ========  ==============================================
-symbol  code                  shape     meaning
-======  ====================  ========  ==============================================
-dx_p    ``platform_screw``    (6,)      platform's pose error at its origin, base axes
-dc      ``clearance_screws``  (n, 6)    screws of clearances and passive joints de, db
-``link_screws`` ..    (n, 6)    deformations of links and joints w       ``wrenches``
-(n, 6)    wrenches of the links' springs, in frame axes --      ``tip_wrenches``
-(n, 6)    wrenches through the sections at the links' tips E       ``energy``
-J         elastic energy of all springs
-======  ====================  ========  ==============================================
+======  ====================  =========  =============================================
+symbol  code                  shape      meaning
+======  ====================  =========  =============================================
+dx_p    ``platform_screw``    (6,)       platform's pose error at its origin, base axes
+dc      ``clearance_screws``  (n, 6)     motions of clearances and passive joints
+de      ``link_screws``       (n, 6)     deformations of links
+db      ``joint_screws``      (n, 6)     deformations of joints
+w       ``wrenches``          (n, 6)     wrenches of the links' springs, in frame axes
+--      ``tip_wrenches``      (n, 6)     wrenches through the tip sections of links
+E       ``energy``            [J]        elastic energy of all springs
+======  ====================  =========  =============================================
 
 The wrenches are computed from the closure multipliers rather than from eqs (23)-(26).
 Eq. (23) adds the wrenches of springs in series, although these wrenches are equal.  Eqs
@@ -64,7 +65,7 @@ if TYPE_CHECKING:
 
 # Components below this fraction of the largest component are round-off.
 _ROUNDED = 1e-9
-_NOTHING = 1e-12  # [N m, N] smaller wrench components are round-off
+_NOTHING = 1e-12  # [N m, N] wrench components below this value are round-off
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -89,7 +90,7 @@ class Assembly(Solution[N]):
                 "platform error": f"at most {largest(self.platform_screw[solved])}",
             }
         forces = np.linalg.norm(without_rounding(self.tip_wrenches)[:, 3:], axis=1)
-        # Links in series have equal forces; the first of these links is named.
+        # Links in series have equal forces. The first of them is reported.
         most = largest_row(forces)
         return {
             **forced_lines(self),
@@ -106,14 +107,14 @@ class Assembly(Solution[N]):
         return super().to_xarray() if self.of_many else assembly_dataset(self)
 
     def to_pandas(self) -> "pandas.DataFrame":
-        """Return a table with one row per frame or point, by variable and component."""
+        """Return a pandas table with one row per frame, or one row per point."""
         from forcefit.assembly.model.tables import frame_table
 
         return frame_table(self.to_xarray(), "point" if self.of_many else "frame")
 
     @property
     def ranks(self) -> dict[str, int]:
-        """Numbers of free, elastic, rigid and redundant closure equations."""
+        """Numbers of closure equations that are free, elastic, rigid and redundant."""
         return reduce_problem(self.linearisation, self.joints, self.frame_loads).ranks
 
     @property
@@ -125,7 +126,7 @@ class Assembly(Solution[N]):
 
     @cached_property
     def energy(self) -> N:
-        """Elastic energy [J]; 0 where it is not distinguishable from round-off."""
+        """Elastic energy [J]; 0 if it cannot be distinguished from round-off."""
         nonzero = differs_from_zero(
             self.stored, self.duality_gap(), self.multipliers,
             self.closure_residual() + self.rounding,
@@ -145,7 +146,7 @@ class Assembly(Solution[N]):
 
     @cached_property
     def work(self) -> N:
-        """Work [J] of the loads on all small screws except the errors."""
+        """Work [J] of the loads on all small screws except geometric errors."""
         joints = self.clearance_screws + self.joint_screws
         on_bodies = np.vecdot(self.frame_loads.body, _flat(self.link_screws))
         return plain(on_bodies + np.vecdot(self.frame_loads.joint, _flat(joints)))
@@ -175,7 +176,7 @@ class Assembly(Solution[N]):
 
     @cached_property
     def screws(self) -> NDArray:
-        """Total screw at each frame with its geometric error, (..., n, 6) [rad, m]."""
+        """Sum of error, deformations and joint motion, (..., n, 6) [rad, m]."""
         moved = self.clearance_screws + self.link_screws + self.joint_screws
         return self._errors + moved
 
@@ -186,7 +187,7 @@ class Assembly(Solution[N]):
 
     @cached_property
     def closure_wrenches(self) -> NDArray:
-        """Wrench of the second chain on the first, (..., closures, 6) [N m, N].
+        """Wrench of a closure's second chain on its first, (..., closures, 6) [N m, N].
 
         The wrenches act at the platform's origin and are expressed in base axes.  If
         rigid bodies are overconstrained, the wrenches are not unique, and those of
@@ -227,7 +228,7 @@ class Assembly(Solution[N]):
 
     @cached_property
     def joint_wrenches(self) -> NDArray:
-        """Wrench through each joint, K_B times the joint's screw, (..., n, 6) [N m, N].
+        """Wrench through each joint, (..., n, 6) [N m, N].
 
         The difference from :attr:`tip_wrenches` equals the loads that act on the body
         at the frame.
@@ -236,7 +237,7 @@ class Assembly(Solution[N]):
 
     @cached_property
     def _closing(self) -> NDArray:
-        """Wrench on each frame due to the closures, (..., n, 6) [N m, N]."""
+        """Wrench that the closures exert on each frame, (..., n, 6) [N m, N]."""
         at_platform = closure_signs(self.posture.robot).T @ self.closure_wrenches
         return np.einsum("...nji,...nj->...ni", self.posture.paths, at_platform)
 
@@ -283,7 +284,7 @@ class Assembly(Solution[N]):
         )
 
     def closure_residual(self) -> N:
-        """Return the largest closure error, in rad or in reference lengths."""
+        """Return the largest closure error [rad, reference lengths]."""
         return self._residual
 
     @cached_property
@@ -292,7 +293,7 @@ class Assembly(Solution[N]):
         return plain(residual.max(axis=-1, initial=0.0))
 
     def clearance_excess(self, own_axes_free: bool = False) -> N:
-        """Return the largest relative excess of a clearance over its bound."""
+        """Return the largest relative amount by which a clearance exceeds its bound."""
         if not own_axes_free and "_excess" in vars(self):
             return self._excess
         bounds = clearance_bounds(self.posture.robot, own_axes_free)
@@ -305,7 +306,7 @@ class Assembly(Solution[N]):
 
     @cached_property
     def rounding(self) -> N:
-        """Largest closure error due to round-off, in rad or in reference lengths."""
+        """Largest closure error that round-off can cause [rad, reference lengths]."""
         size = self.linearisation.size
         return plain(closure_rounding(self._errors, self.joints, size))
 
@@ -315,8 +316,8 @@ class Assembly(Solution[N]):
 
         The energy minus its bound equals |y - s|^2 / 2.  Here y are the spring
         deformations, and s the deformations in equilibrium with the wrenches.  Two
-        terms are added: the work that the wrench on each cone could still do, and the
-        work of the multipliers on the closure residual.
+        terms are added: the largest further work of each contact force within its
+        clearance, and the work of the multipliers on the closure residual.
         """
         joint, springs = _flat(self.joint_wrenches), self.elastic - self._balancing
         group, on_cones = self.joints.group, joint @ self.joints.cones
@@ -333,7 +334,7 @@ class Assembly(Solution[N]):
         )  # fmt: skip
 
     def duality_gap(self) -> N:
-        """Return a certified bound [J] on the excess over the minimum energy."""
+        """Return a certified bound [J] on the difference from the minimum energy."""
         return self._gap
 
     @cached_property
@@ -343,7 +344,7 @@ class Assembly(Solution[N]):
     def relative_gap(self) -> N:
         """Return the duality gap divided by the elastic energy.
 
-        The divisor is at least 1e-4 times the energy without clearance.
+        The divisor is at least 1e-4 times the minimum energy without clearance.
         """
         # The minimum energy is zero in an assembly zone, so the divisor has a lower
         # bound.
@@ -352,9 +353,10 @@ class Assembly(Solution[N]):
 
     @property
     def certified(self) -> Any:
-        """True where gap <= 1e-8 energy + 1e-12 energy without clearance.
+        """True where the duality gap is within its tolerance.
 
-        Under loads, 1e-12 times the work of the loads is added to the limit.
+        The tolerance is 1e-8 times the energy, plus 1e-12 times the energy without
+        clearance.  Under loads, 1e-12 times their work is added.
         """
         largest_energy = self.energy_without_clearance + np.abs(self.work)
         allowed = GAP * self.energy + GAP_WITHOUT_CLEARANCE * largest_energy
@@ -372,7 +374,7 @@ def _by_frames(screws: NDArray) -> NDArray:
 
 
 def _times(matrices: NDArray, vectors: NDArray) -> NDArray:
-    """Return the matrices (..., a, b) times vectors (..., b)."""
+    """Return the products of matrices (..., a, b) and vectors (..., b)."""
     return (matrices @ vectors[..., None])[..., 0]
 
 
@@ -384,7 +386,7 @@ def without_rounding(wrenches: NDArray) -> NDArray:
 
     Returns:
         (..., n, 6) [N m, N] wrenches.  A component is set to 0 if its absolute value is
-        below 1e-9 times the robot's largest component, or below 1e-12 N m or N.
+        below 1e-9 times the robot's largest component, or below 1e-12 in SI units.
     """
     sizes = np.abs(wrenches)
     largest = sizes.max(axis=(-2, -1), keepdims=True, initial=0.0)

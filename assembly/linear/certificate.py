@@ -10,12 +10,13 @@ energy by at most g.  Let w_k be the wrench on cone k.  Then
 
     |y - y_least| <= sqrt(2 g),          |w_k| - w_k.u_k <= g for each cone,
 
-for the computed solution and every minimum-energy solution.  The gap thus bounds the
-errors in the springs and in the clearances whose constraint is active.  It does not
-bound unloaded clearances: the energy does not depend on them, and the minimiser is not
-unique.  The minimum-energy platform screws form a convex set, and so do the platform
-screws of all assemblies within the gap.  A cone program with a certified objective
-value bounds the extent of each set along each axis.
+for the computed solution and every minimum-energy solution.  The gap g thus bounds the
+errors of the spring deformations, and of the motions within clearances that transmit a
+force.  It does not bound the motions within unloaded clearances, because the energy
+does not depend on them.  The minimum-energy platform screws form a convex set, and so
+do the platform screws of all assemblies whose energy exceeds the minimum by at most g.
+A cone program with a certified objective value bounds the extent of each set along each
+axis.
 """
 
 from dataclasses import dataclass, replace
@@ -41,8 +42,8 @@ LARGEST_RESIDUAL = 1e-9
 LARGEST_EXCESS = 1e-9
 # largest accepted error of the platform screw: absolute [rad, m] and relative
 _SCREW, _SCREW_SHARE = 1e-5, 1e-3
-_AMPLIFIED = 10.0  # assumed largest ratio of frame motion to spring deformation
-# [-] required difference between upper and lower bound, relative to the distance
+_AMPLIFIED = 10.0  # assumed largest ratio of frame motions to spring deformations
+# [-] required relative difference between the upper and lower bound on a distance
 _WIDTH = 3e-5
 # [-] range, relative to its cone, below which a clearance is treated as fixed
 _HELD = 0.1
@@ -71,7 +72,7 @@ class ScrewBound:
 
 
 def unproved(assembly: Assembly) -> str:
-    """Return sentences about the properties that the certificate does not prove.
+    """Return sentences about properties of an assembly that are not proved.
 
     An assembly is proved if three conditions are met.  The closure residuals are at
     most 1e-9, in rad or reference lengths.  The clearances exceed their bounds by a
@@ -109,7 +110,7 @@ def unproved(assembly: Assembly) -> str:
 
 
 def unproved_screw(assembly: Assembly, bound: ScrewBound) -> list[str]:
-    """Return messages if the rotation or translation of the platform is inaccurate.
+    """Return a message for each inaccurate half of the platform screw.
 
     Non-uniqueness due to unloaded clearances is not an inaccuracy.
 
@@ -118,8 +119,8 @@ def unproved_screw(assembly: Assembly, bound: ScrewBound) -> list[str]:
         bound: error bound on the platform screw.
 
     Returns:
-        A message for each half of the screw whose error can exceed 1e-5 rad or m plus
-        1e-3 times its magnitude.
+        Messages, at most one for the rotation and one for the translation.  A half is
+        inaccurate if its error can exceed 1e-5 rad or m plus 1e-3 times its magnitude.
     """
     allowed = _allowed(assembly)
     spread = stiffness_spread(assembly.joints, assembly.linearisation.size)
@@ -140,13 +141,13 @@ def unproved_screw(assembly: Assembly, bound: ScrewBound) -> list[str]:
 
 
 def _allowed(assembly: Assembly) -> NDArray:
-    """Return the largest accepted rotation [rad] and translation [m] error."""
+    """Return the accepted errors of rotation [rad] and translation [m]."""
     halves = assembly.platform_screw.reshape(2, 3)
     return _SCREW + _SCREW_SHARE * np.linalg.norm(halves, axis=1)
 
 
 def _springs_determined(assembly: Assembly) -> bool:
-    """Return whether errors in the springs cause only negligible frame motions."""
+    """Return whether errors of the spring deformations hardly move the platform."""
     frames, springs = len(assembly.posture.robot.frames), assembly.elastic.size
     blocks = assembly.joints.elastic.reshape(frames, 6, springs)
     moved = np.linalg.norm(assembly.posture.paths @ blocks, axis=(0, 2))
@@ -170,7 +171,7 @@ def bound_screw(assembly: Assembly) -> ScrewBound:
     residual = float(np.linalg.norm(open_closures)) + assembly.rounding
 
     def unloaded(joints: VirtualJoints) -> MovingCones:
-        """Return the clearances on which the energy does not depend."""
+        """Return the cones of clearances on which the energy does not depend."""
         columns, start, group, room = _room(assembly, joints, gap)
         free = room >= 1.0
         columns = columns[:, free]
@@ -182,7 +183,7 @@ def bound_screw(assembly: Assembly) -> ScrewBound:
         )
 
     def uncertain(joints: VirtualJoints) -> MovingCones:
-        """Return the unknowns that the gap does not determine."""
+        """Return cones of all unknowns that can vary within the duality gap."""
         columns, start, group, room = _room(assembly, joints, gap)
         springs = joints.elastic * np.sqrt(2.0 * gap)
         columns = np.hstack([columns * room, springs])
@@ -216,13 +217,13 @@ def bound_screw(assembly: Assembly) -> ScrewBound:
 def _room(
     assembly: Assembly, joints: VirtualJoints, gap: float
 ) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-    """Return the range of each clearance among the minimum-energy assemblies.
+    """Return the range in which each clearance motion varies at minimum energy.
 
     Returns:
-        Columns of the clearances; their values in this assembly; the cone of each
-        column; and (nu,) [-] ranges relative to the sizes of the cones.  A range of 1
-        is the complete cone.  A smaller range bounds the distance between this assembly
-        and any minimum-energy assembly.
+        Columns of the clearance motions; their values in this assembly; the cone of
+        each column; and (nu,) [-] ranges relative to the sizes of the cones.  A range
+        of 1 is the complete cone.  A smaller range bounds the distance between this
+        assembly and any minimum-energy assembly.
     """
     group = joints.group
     load = cone_sizes(joints.cones.T @ assembly.joint_wrenches.ravel(), group)
@@ -235,7 +236,7 @@ def _room(
 
 
 def _farthest(reachable: ReachableSet, part: int, box: float) -> float:
-    """Bound the distance [rad or m] of the points of a set from its centre."""
+    """Return a bound [rad or m] on the distance of a set's screws from its centre."""
     if not 0.0 < box < np.inf:
         return box
     about_centre = replace(reachable, centre=np.zeros(6))
@@ -246,7 +247,7 @@ def _farthest(reachable: ReachableSet, part: int, box: float) -> float:
 
 
 def _extents(reachable: ReachableSet) -> NDArray:
-    """Return the largest extent along each axis in both senses, (6,) [rad, m]."""
+    """Return the half-width of a box that contains a set of screws, (6,) [rad, m]."""
     extents = []
     for d in np.concatenate([np.eye(6), -np.eye(6)]):
         try:

@@ -88,7 +88,7 @@ def virtual_joints(
             ``springs`` is False.
         bounded_motion: whether to impose the motion limits of passive joints; or the
             set of frames whose limits are imposed.  The limits are rarely active, so
-            callers first omit them and check the solution.
+            callers first omit them and then check whether the solution exceeds a limit.
 
     Returns:
         The columns.
@@ -101,14 +101,14 @@ def virtual_joints(
 
 @dataclass(frozen=True)
 class _JointsKey:
-    """Cache key; robots that differ only in errors and masses have equal keys."""
+    """Cache key of virtual joints; it does not depend on errors and masses."""
 
     parts: tuple
     robot: Robot = field(compare=False)
 
 
 def _parts(robot: Robot) -> tuple:
-    """Return the entries of the cache key; links are compared by identity."""
+    """Return the properties of a robot that determine its virtual joints."""
     return tuple(
         (
             f.parent, f.joint, f.pitch, f.actuated, f.clearance, id(f.link),
@@ -124,7 +124,7 @@ def _virtual_joints(
     key: _JointsKey, springs: bool, own_axes_free: bool,
     bounded_motion: frozenset[int],
 ) -> VirtualJoints:  # fmt: skip
-    """Return the basis columns, cached for all robots with equal keys."""
+    """Return the basis columns of virtual joints, cached by key."""
     robot = key.robot
     bounds = clearance_bounds(robot, own_axes_free)
     scaled = scales_with_margin(robot)
@@ -156,7 +156,7 @@ def _virtual_joints(
 def _elastic(
     links: NDArray, joints: NDArray, robot: Robot
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
-    """Return the spring columns, and whether each belongs to a link."""
+    """Return the columns of springs, and whether each column belongs to a link."""
     count = len(robot.frames)
     columns, is_link = [np.zeros((6 * count, 0))], []
     for compliances, link in ((links, True), (joints, False)):
@@ -172,7 +172,7 @@ def _elastic(
 
 
 def _cones(bounds: NDArray, scales: NDArray) -> tuple[NDArray, NDArray, NDArray]:
-    """Return the columns, cones and scaling by the margin of clearances."""
+    """Return columns of clearances, cones, and whether the margin scales each."""
     rows, sizes, group, scaled = [], [], [], []
     count = 0
     for i, cone in np.argwhere((bounds > 0) & np.isfinite(bounds)):
@@ -192,7 +192,7 @@ def _cones(bounds: NDArray, scales: NDArray) -> tuple[NDArray, NDArray, NDArray]
 
 
 def _free(bounds: NDArray, robot: Robot) -> NDArray:
-    """Return unit columns of unbounded motions; [0 0 1 0 0 h] for a helical joint."""
+    """Return unit columns of unbounded motions."""
     rows = [6 * i + r for i, cone in np.argwhere(np.isinf(bounds)) for r in CONES[cone]]
     columns = np.zeros((6 * len(bounds), len(rows)))
     columns[rows, np.arange(len(rows))] = 1.0
@@ -203,7 +203,7 @@ def _free(bounds: NDArray, robot: Robot) -> NDArray:
 
 
 def in_reference_lengths(size: float) -> NDArray:
-    """Return factors that make the translations of screws comparable with rotations.
+    """Return factors that divide translations by a reference length.
 
     Args:
         size: [m] reference length.
@@ -230,9 +230,10 @@ class Linearisation:
 
     @cached_property
     def rows(self) -> NDArray:
-        """Closure matrix, (6 closures, 6 n); rows @ screws = 0 for the total screws.
+        """Closure matrix, (6 closures, 6 n).
 
-        The blocks are sign_kj M_j; their translations are divided by :attr:`size`.
+        Its product with the screws of all frames is zero if all loops are closed.  Its
+        blocks are sign_kj M_j, with translations divided by :attr:`size`.
         """
         robot = self.posture.robot
         blocks = closure_signs(robot)[:, :, None, None] * self.posture.paths
@@ -241,7 +242,7 @@ class Linearisation:
 
     @cached_property
     def platform(self) -> NDArray:
-        """Unscaled map from frame screws to the platform screw, (6, 6 n), eq. (8)."""
+        """Map from frame screws to the platform screw, (6, 6 n), eq. (8)."""
         robot = self.posture.robot
         on_path = robot.on_path[robot.index(robot.platform)]
         platform = np.swapaxes(self.posture.paths * on_path[:, None, None], 0, 1)

@@ -49,8 +49,7 @@ from forcefit.assembly.solvers.method import Method, check_method, log_reference
 __all__ = ["Assembly", "CannotAssemble", "solve_assembly"]
 
 # Outcome codes of assembly/kernels/linear/energies.h. For codes >= _LEFT, the kernel
-# has no result. An omitted motion limit of a passive joint can cause the codes
-# _AT_BOUNDS.
+# has no result. The codes _AT_BOUNDS can be due to an omitted motion limit.
 _LEFT, _AT_BOUNDS = 2, (5, 6)
 _STATUS: dict[type[Exception], str] = {
     CannotAssemble: CANNOT_ASSEMBLE,
@@ -59,7 +58,7 @@ _STATUS: dict[type[Exception], str] = {
 }
 _NUMBERS = ("energy", "bound", "tight", "work", "residual", "excess")
 _VECTORS = ("clearances", "motions", "multipliers", "elastic")
-# arrays of k points; the key "tight" denotes the energy without clearance
+# result arrays of k points by name; "tight" is the energy without clearance
 _Rows = dict[str, NDArray]
 
 
@@ -219,7 +218,7 @@ def _solve_one(
     multipliers, residual = rows["multipliers"], rows["residual"] + rounding
     drop_zeros(rows["energy"], rows["bound"], multipliers, residual, acting is not None)
     if acting is None and not np.count_nonzero(multipliers):
-        rows["elastic"][:] = 0.0  # without wrenches, deformations are round-off
+        rows["elastic"][:] = 0.0  # Without wrenches, all deformations are round-off.
     assembly = Assembly(
         linearisation=linearise(posture), joints=joints, load=load, frame_loads=loads,
         method="compiled", energy_without_clearance=float(rows["tight"][0]),
@@ -231,7 +230,7 @@ def _solve_one(
 
 @lru_cache(maxsize=32)  # called for one robot at many postures
 def _rounding_of(robot: Robot) -> float:
-    """Return the largest closure error [rad, lengths] due to round-off."""
+    """Return the closure error that round-off can cause [rad, reference lengths]."""
     joints, _ = structure_of(robot)
     return float(closure_rounding(robot.errors, joints, checked_size(robot)))
 
@@ -274,7 +273,7 @@ def _solve_many(
 
 
 def _bounds_matter(structure: Structure, outcome: NDArray) -> NDArray:
-    """Return True for each point where an omitted motion limit can be active."""
+    """Return a mask of points where an omitted joint motion limit can be active."""
     return np.isin(outcome, _AT_BOUNDS) & bool(np.isfinite(structure.free_bound).any())
 
 
@@ -309,7 +308,7 @@ def _within_bounds(
 def _checked(
     posture: Posture, errors: NDArray | None
 ) -> tuple[NDArray, NDArray, NDArray]:
-    """Check and return the transforms, errors and closure errors."""
+    """Check and return transforms, geometric errors and nominal closure errors."""
     n = len(posture.robot.frames)
     given = posture.robot.errors if errors is None else errors
     T = posture.transforms.reshape(-1, *posture.transforms.shape[-3:])
@@ -339,7 +338,7 @@ def _compiled(
     joints: VirtualJoints, structure: Structure, T: NDArray, errors: NDArray,
     mismatch: NDArray, loads: NDArray | None, method: Method = "compiled",
 ) -> _Rows:  # fmt: skip
-    """Solve k points by the kernel, and mark points that need the reference method."""
+    """Solve k points by the compiled method, and mark points that it cannot certify."""
     count = len(errors) if len(T) == 1 else len(T)
     rows = _empty(joints, count)
     given = structure, T, errors, mismatch
@@ -347,7 +346,7 @@ def _compiled(
         rows["outcome"][:] = _LEFT
     elif loads is None:
         _fill(given, rows, None)
-    # Points without loads have the same results as in a call without loads.
+    # Some points may be unloaded although other points have loads.
     else:
         loaded = np.any(loads, axis=(1, 2, 3))
         for some, acting in ((loaded, loads), (~loaded, None)):
@@ -359,7 +358,7 @@ def _compiled(
 
 
 def _empty(joints: VirtualJoints, count: int) -> _Rows:
-    """Allocate the result arrays of k points, in the order required by the kernel."""
+    """Allocate the result arrays of k points that the compiled method fills."""
     return {
         "outcome": np.zeros(count, dtype=np.int64),
         "energy": np.zeros(count),
@@ -376,14 +375,14 @@ def _empty(joints: VirtualJoints, count: int) -> _Rows:
 
 
 def _unsaid(count: int) -> _Rows:
-    """Allocate result arrays that the kernel does not fill."""
+    """Allocate the result arrays that the compiled method does not fill."""
     texts = {"method": "compiled", "status": OK, "reason": ""}
     rows = {name: np.full(count, text, dtype=object) for name, text in texts.items()}
     return rows | {name: np.zeros(count) for name in ("gap", "potential", "least")}
 
 
 def _certify(rows: _Rows, points: Assembly) -> None:
-    """Compute the gap, potential and lower bound of each point."""
+    """Compute the duality gap, potential and lower energy bound of each point."""
     energy, bound, loads = rows["energy"], rows["bound"], points.frame_loads
     rows["gap"][:] = np.maximum(0.0, energy - bound)
     on_errors = loads.body @ points.posture.robot.errors.ravel()
@@ -416,7 +415,7 @@ def _of_rows(
     posture: Posture, joints: VirtualJoints, rows: _Rows, load: NDArray,
     loads: FrameLoads, errors: NDArray | None,
 ) -> Assembly:  # fmt: skip
-    """Return many assemblies that share the arrays of ``rows``."""
+    """Return an assembly of many points from the arrays in ``rows``."""
     known = {"_gap": "gap", "_residual": "residual", "_excess": "excess"}
     known |= {"bound": "least"}
     known |= {k: k for k in ("energy", "work", "platform_screw", "potential")}
@@ -442,7 +441,7 @@ def _record(
     rows: _Rows, apart: dict[int, Assembly | Exception], i: int,
     found: Assembly | Exception,
 ) -> None:  # fmt: skip
-    """Store a separately solved point in ``rows``, or in ``apart`` if necessary."""
+    """Store the result of one point in ``rows``, or in ``apart`` if shapes differ."""
     rows["method"][i] = "reference"
     if isinstance(found, Exception):
         for name in (*_NUMBERS, "platform_screw", *_VECTORS):
@@ -478,7 +477,7 @@ def _drop_rounding(rows: _Rows, residual: NDArray, loaded: NDArray) -> None:
 
 
 def _excess_of(clearances: NDArray, starts: NDArray) -> NDArray:
-    """Return each point's largest relative excess of a clearance over its cone."""
+    """Return the largest relative excess of a clearance over its bound."""
     if not clearances.shape[1]:
         return np.zeros(len(clearances))
     squares = np.add.reduceat(clearances.T**2, starts[:-1], axis=0)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from forcefit.assembly.kernels.choice import kernels
 from forcefit.assembly.linear.robot_structure import Structure
 
-# outcome codes: certified by the kernel, or to be solved by the reference method
+# outcome codes of a point: certified, or to be solved by the reference method
 COMPILED, REFERENCE = range(2)
 _KEPT = 64  # number of robots whose C++ objects are cached
 _known: dict[int, tuple[Structure, Any]] = {}
@@ -24,7 +24,7 @@ def assemble_side_by_side(
     structure: Structure, T: NDArray, errors: NDArray, mismatch: NDArray,
     loads: NDArray | None, out: Mapping[str, NDArray],
 ) -> None:  # fmt: skip
-    """Solve problem (22) at every point.
+    """Solve problem (22) at k points.
 
     Args:
         structure: the robot.
@@ -35,10 +35,11 @@ def assemble_side_by_side(
         loads: (k, 2, n, 6) [N m, N] wrenches on bodies and on joints, in the frames'
             axes.
         out: arrays to fill, in this order: (k,) outcomes, energies [J], certified lower
-            bounds on the energies, energies without clearance, work of the loads on all
-            small screws except the errors; (k, 6) [rad, m] platform screws, (k, nu)
-            clearances, (k, nq) free motions, (k, 6 closures) multipliers; (k,) closure
-            residuals; (k, ny) [sqrt(2 J)] deformations of the springs.
+            bounds on the energies [J], energies without clearance [J], and work [J] of
+            the loads on all small screws except the errors; (k, 6) [rad, m] platform
+            screws, (k, nu) clearances, (k, nq) free motions, (k, 6 closures)
+            multipliers; (k,) closure residuals; (k, ny) [sqrt(2 J)] deformations of the
+            springs.
 
     Raises:
         ValueError: the shape, type or memory order of an array is wrong.
@@ -50,7 +51,7 @@ def margins_side_by_side(
     structure: Structure, T: NDArray, errors: NDArray, mismatch: NDArray,
     out: tuple[NDArray, NDArray, NDArray, NDArray],
 ) -> None:  # fmt: skip
-    """Compute the assembly margin and its lower bound at every point.
+    """Compute the assembly margin (21) and its lower bound at k points.
 
     Args:
         structure: the robot without springs.
@@ -82,7 +83,8 @@ def bounds_side_by_side(
         centres: solution of (22): (k, 6) [rad, m] screws of the platform at its origin;
             (k, nu) clearances in the cones of ``structure``; and (k, nq) [rad, m]
             motions, of which only bounded motions are read.
-        held: structure for which (22) was solved to identify the loaded clearances.
+        held: structure of the robot for which (22) was solved to identify the loaded
+            clearances.
         loads: solution of (22) for ``held``: (k, 6 closures) multipliers of the scaled
             closures; (k, nu) clearances in the cones of ``held``; (k,) [J] energies;
             (k,) [J] energies with all clearances zero; and (cones,) indices of the
@@ -127,7 +129,7 @@ def compliances_side_by_side(
 
 
 def _robot(structure: Structure) -> Any:
-    """Return the cached C++ object of a structure."""
+    """Return the cached C++ object that describes a robot."""
     known = _known.get(id(structure))
     if known is None:
         if len(_known) >= _KEPT:

@@ -31,7 +31,7 @@ from forcefit.assembly.model.robot import BeamLink, MeshLink, Robot, beam_axis
 from forcefit.inputs.table import BadInput, quoted
 from forcefit.stiffness.beam.sections import declared_section
 
-_LARGEST_LOAD = 1e60  # [N m, N] larger than the largest mass times the largest gravity
+_LARGEST_LOAD = 1e60  # [N m, N] largest accepted component of a load
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,7 +139,7 @@ def loads_on_frames(
         # Express all wrenches at the platform's origin, then add up the wrenches on the
         # frames that each frame carries.
         arms = (T[..., :3, 3] - posture.platform[..., None, :3, 3])[..., None, :, :]
-        if acting.tolist() != [robot.index(robot.platform)]:  # not the platform alone
+        if acting.tolist() != [robot.index(robot.platform)]:  # other bodies are loaded
             given[..., acting, :] = _moved(given[..., acting, :], arms[..., acting, :])
         after += _beyond(robot)[:, acting] @ (own + after)[..., acting, :]
         own += after
@@ -173,7 +173,7 @@ def drive_loads(robot: Robot) -> NDArray:
 def _with_leading(
     lead: tuple[int, ...], whose: str, shape: tuple[int, ...], own: tuple[int, ...]
 ) -> tuple[int, ...]:
-    """Return the common leading dimensions; ``own`` are the last dimensions."""
+    """Return the common leading dimensions of arrays; ``own`` are the others."""
     if shape == own:  # no leading dimensions
         return lead
     try:
@@ -236,14 +236,14 @@ def weights(posture: Posture, gravity: ArrayLike) -> tuple[NDArray, NDArray]:
             bodies[..., i, :] += _at(np.zeros(3), W / 2) - clamp
             parent = robot.parents[i]
             if parent >= 0:  # The base carries frames without a parent.
-                # The beam may start outside the parent's origin.
+                # The start of a beam can differ from the parent's origin.
                 arm = T[..., i, :3, 3] - along - T[..., parent, :3, 3]
                 carried[..., parent, :] += _at(arm, W / 2) + clamp
     return bodies, carried
 
 
 def massless(robot: Robot, gravity: ArrayLike | None) -> list[str]:
-    """Return a remark if the robot has no mass or a mesh link has no density.
+    """Return a remark if gravity does not act on the robot or on a mesh link.
 
     Args:
         robot: any robot.
@@ -285,8 +285,8 @@ def weights_at_tips(posture: Posture, gravity: ArrayLike) -> NDArray:
         gravity: (..., 3) [m/s^2] gravity vector in base axes.
 
     Returns:
-        (..., n, 6) [N m, N] wrenches at each frame's origin, in its axes; each force is
-        half of the link's weight.
+        (..., n, 6) [N m, N] wrenches at each frame's origin, in its axes.  Each force
+        is half of the link's weight.
     """
     table, R = _masses(posture.robot), posture.transforms[..., :3, :3]
     g = np.asarray(gravity, dtype=float)[..., None, :]
@@ -316,7 +316,7 @@ def wrenches_at_starts(robot: Robot, tips: NDArray, distributed: NDArray) -> NDA
 
 @lru_cache(maxsize=16)
 def _masses(robot: Robot) -> NDArray:
-    """Return masses and centres of bodies, masses and vectors of beams, (n, 8)."""
+    """Return mass and centre of each body, and mass and vector of each beam, (n, 8)."""
     table = np.zeros((len(robot.frames), 8))
     for row, frame in zip(table, robot.frames, strict=True):
         row[0], row[1:4] = frame.mass, frame.centre_of_mass
@@ -363,7 +363,7 @@ def _loads_with_weight(content: Content) -> FrameLoads:
 def with_distributed(
     loads: FrameLoads, posture: Posture, gravity: ArrayLike
 ) -> FrameLoads:
-    """Return loads whose field ``distributed`` contains the links' weights.
+    """Return loads with the distributed weights of links in ``distributed``.
 
     Args:
         loads: loads that include the result of :func:`weights`.
@@ -391,5 +391,5 @@ def _check(whose: str, given: ArrayLike | None, largest: float, unit: str) -> No
 
 
 def _at(arm: NDArray, force: NDArray) -> NDArray:
-    """Return the wrench ``[arm x f, f]`` of a force f about the origin, (..., 6)."""
+    """Return the wrench ``[arm x f, f]`` of a force about the origin, (..., 6)."""
     return np.concatenate([np.cross(arm, force), force], axis=-1)

@@ -19,13 +19,15 @@ from forcefit.assembly.solvers.method import Method, check_method
 
 @dataclass(frozen=True)
 class Asked:
-    """Settings of the pose error bounds.
+    """Settings for the computation of pose error bounds.
 
     Attributes:
         assumption: name from the table in :mod:`forcefit.assembly.linear.pose_error`.
         energy_budget: eta of the assumption ``budget``.
-        tolerance_rotation: [rad] largest accepted gap between upper and lower bound.
-        tolerance_translation: [m] largest accepted gap between the bounds.
+        tolerance_rotation: [rad] largest accepted difference between the upper and
+            lower bound on the rotation.
+        tolerance_translation: [m] largest accepted difference between the bounds on the
+            translation.
         offset: (3,) [m] from the platform's origin to the point whose error is bounded.
         method: ``"compiled"`` or ``"reference"``.
     """
@@ -50,14 +52,14 @@ def compiled_bounds(assembly: Assembly, asked: Asked) -> tuple[dict[str, Any], N
 
     Args:
         assembly: assembly of k points.
-        asked: assumption, required gaps and reference point.
+        asked: assumption, accuracy of the bounds and reference point.
 
     Returns:
         Mapping with ``rotation_error`` (k, 2) [rad] and ``translation_error`` (k, 2)
         [m], lower and upper bounds; ``rotation_screw`` and ``translation_screw`` (k, 6)
         [rad, m] that attain the lower bounds; and ``supports`` (k,) number of support
-        functions evaluated.  Also an array (k,) that is True for points without bounds.
-        These points must be solved in numpy, or (22) has no solution.
+        functions evaluated.  Also an array (k,) that is True for points without bounds,
+        because (22) has no solution or because they must be solved in numpy.
     """
     count, robot = len(assembly), assembly.posture.robot
     rows = {
@@ -150,7 +152,7 @@ def _places_of(robot: Robot, assumption: str) -> _Places:
 
 
 def _columns(frames: NDArray, axes: NDArray) -> list[tuple[int, int]]:
-    """Return the pair of frame and axis of each column."""
+    """Return the frame and the axis of each column as pairs of indices."""
     return list(zip(frames.tolist(), axes.tolist(), strict=True))
 
 

@@ -149,7 +149,7 @@ def _with_clearances(assembly: Assembly, free: _FreeClearances, v: NDArray) -> A
 
 
 def _moves(free: _FreeClearances, method: Method) -> bool:
-    """Return whether the closures allow the platform to move."""
+    """Return whether unloaded clearances allow the platform to move."""
     projected = free.map - free.map @ free.rows.T @ free.rows
     U, S, _ = np.linalg.svd(projected, full_matrices=False)
     directions = U.T[S > _STILL]
@@ -159,7 +159,7 @@ def _moves(free: _FreeClearances, method: Method) -> bool:
 def _heights(
     free: _FreeClearances, direction: NDArray, method: Method
 ) -> Iterator[float]:
-    """Yield the ranges [rad, m] of the platform along both senses of each direction."""
+    """Yield how far the platform can move along a direction and against it [rad, m]."""
     gradient = free.map.T @ direction
     size = float(np.linalg.norm(gradient))
     none, right = np.zeros((0, len(gradient))), free.rows @ free.start

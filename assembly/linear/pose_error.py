@@ -1,14 +1,14 @@
 """Certified bounds on the largest pose error of the platform, problem (27).
 
-As printed in the paper, (27) is degenerate: if the deformations are fixed at their
-values in problem (22), complementary slackness fixes every loaded clearance.  The
+Problem (27) of the paper is degenerate.  It fixes the deformations at their values in
+problem (22), and complementary slackness then fixes every loaded clearance.  The
 argument ``assumption`` therefore selects which screws can still move:
 
-======== =================================================================
-frozen   all deformations are fixed; only unloaded clearances move (paper)
+======== =======================================================================
+frozen   all deformations are fixed; only joints with unloaded clearances move
 free     compliant joints also rotate freely about their own axis
 budget   all assemblies with at most (1 + eta) times the minimum energy
-======== =================================================================
+======== =======================================================================
 
 Motions of passive joints stay within their limits.  Rotation and translation are
 bounded separately, because a tool on a bearing rotates freely while the error of its
@@ -151,8 +151,10 @@ def bound_pose_error(
             ``budget``.
         assumption: name from the table at the head of this module.
         energy_budget: eta of ``budget``.
-        tolerance_rotation: [rad] largest accepted gap between upper and lower bound.
-        tolerance_translation: [m] largest accepted gap between the bounds.
+        tolerance_rotation: [rad] largest accepted difference between the upper and
+            lower bound on the rotation.
+        tolerance_translation: [m] largest accepted difference between the bounds on the
+            translation.
         offset: (3,) [m] from the platform's origin to the point whose error is bounded,
             base axes.
         method: ``"compiled"``; or ``"reference"``, which uses only numpy and Clarabel.
@@ -189,7 +191,7 @@ def bound_pose_error(
 
 
 def _bounds_of_many(assembly: Assembly, asked: Asked) -> PoseError:
-    """Bound the errors at many points, by the reference if the kernel fails."""
+    """Bound the errors at many points; use the reference method where needed."""
     rows, left = compiled_bounds(assembly, asked)
     status, reason = assembly.status.copy(), assembly.reason.copy()
     left &= status == OK

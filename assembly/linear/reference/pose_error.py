@@ -54,13 +54,13 @@ _EXCESS = 1e-8
 
 @dataclass(frozen=True, eq=False)
 class Support:
-    """Largest component of a set of screws along a direction.
+    """Largest component along a direction among the screws of a set.
 
     Attributes:
         height: certified upper bound on direction . screw over the set.
         screw: (6,) [rad, m] screw of the set that approximately attains the height.
-        gradient: (nv,) derivative of the component with respect to v, minus the
-            contribution of the closures' multipliers.
+        gradient: (nv,) derivative of the component with respect to the clearances v,
+            minus the contribution of the closures' multipliers.
     """
 
     height: float
@@ -69,12 +69,12 @@ class Support:
 
 
 class MovingCones(NamedTuple):
-    """Unit cones of the clearances that can change, with nv columns in total.
+    """Clearances that can change, as nv columns grouped into unit cones.
 
     Attributes:
-        closures: (6 closures, nv) columns in the scaled closures.
-        platform: (6, nv) [rad, m] columns at the platform.
-        start: (nv,) start values within the cones.
+        closures: (6 closures, nv) scaled closure error per unit of each column.
+        platform: (6, nv) [rad, m] platform screw per unit of each column.
+        start: (nv,) values at the solution of (22), within the cones.
         group: (nv,) cone of each column.
     """
 
@@ -95,7 +95,7 @@ class ReachableSet:
         centre: (6,) [rad, m] the screw at ``start``.
         map: (6, nv) [rad, m] derivative of the screw with respect to v.
         rows: (p, nv) orthonormal rows of the closures.
-        start: (nv,) v at the solution of (22), within its cones.
+        start: (nv,) values of v at the solution of (22).
         group: (nv,) cone of each column.
         free: (6, k) [rad, m] screws of the platform per unit of each motion that is
             neither resisted nor bounded.
@@ -164,7 +164,7 @@ class ReachableSet:
         return Support(max(height, float(direction @ screw)), screw, reduced)
 
     def _screw_near(self, v: NDArray) -> NDArray:
-        """Return the screw [rad, m] of a feasible point near v."""
+        """Return the platform screw [rad, m] at a point of the set near v."""
         # Rows are satisfied to machine precision, cones to 5e-9 of their size.
         start, group = self.start, self.group
         step = v - start
@@ -187,7 +187,7 @@ class ReachableSet:
 
         Args:
             part: 0 for the rotation, 3 for the translation.
-            tolerance: [rad or m] required gap between upper and lower bound.
+            tolerance: [rad or m] required difference between the upper and lower bound.
             method: ``"compiled"``; or ``"reference"``, which uses only numpy and
                 Clarabel.
 
@@ -216,7 +216,7 @@ class ReachableSet:
 
     @property
     def starts(self) -> NDArray:
-        """Index of the first column of each cone, then nv, (cones + 1,)."""
+        """Index of the first column of each cone, followed by nv, (cones + 1,)."""
         return cone_starts(self.group)
 
 
@@ -310,7 +310,7 @@ class _Motion:
 
     @cached_property
     def _follow(self) -> tuple[NDArray, NDArray]:
-        """Pseudoinverse of A_q, and screws of motions that no closure resists."""
+        """Pseudoinverse of A_q, and platform screws of unconstrained motions."""
         lin = self.assembly.linearisation
         A_q, P_q = lin.rows @ self.joints.free, lin.platform @ self.joints.free
         inverse = np.linalg.pinv(A_q, rcond=self._with_mismatch(RANK))
@@ -319,12 +319,12 @@ class _Motion:
         return inverse, np.where(large, free, 0.0)
 
     def _with_mismatch(self, threshold: float) -> float:
-        """Add the round-off of the nominal closures to a threshold."""
+        """Return a rank threshold that includes the nominal closure error."""
         return rank_tolerance(self.assembly.posture.mismatch, threshold)
 
     @cached_property
     def passed(self) -> frozenset[int]:
-        """Frames whose joint motion can exceed an omitted limit."""
+        """Frames whose passive joint can exceed a motion limit that is not imposed."""
         inverse, free = self._follow
         row = self.joints.free.argmax(axis=0)
         # The motion limit of a joint without a spring is always included.
@@ -339,7 +339,7 @@ class _Motion:
         most = np.abs(middle)
         for c in np.unique(group):
             most = most + np.linalg.norm(step[:, group == c], axis=1)
-        # A motion that no closure resists reaches its limit.
+        # A motion that no closure constrains reaches its limit.
         passing = limited & ((most > limit) | free.any(axis=0))
         return frozenset((row[passing] // 6).tolist())
 
@@ -361,7 +361,7 @@ class _Motion:
 
 
 def clearances_in(assembly: Assembly, joints: VirtualJoints) -> NDArray:
-    """Return the clearances of an assembly in the columns of other virtual joints."""
+    """Return the clearance motions of an assembly in other basis columns."""
     screws = clearance_components(joints.robot, assembly.clearance_screws).ravel()
     u = joints.cones.T @ screws / (joints.cones**2).sum(axis=0)
     return into_cones(u, joints.group)
@@ -374,7 +374,7 @@ def _rows(A: NDArray, noise: float) -> NDArray:
 
 
 def loaded_cones(assembly: Assembly, joints: VirtualJoints) -> NDArray:
-    """Find the clearances whose constraint is active.
+    """Find the clearances at their bound that transmit a contact force.
 
     Args:
         assembly: minimum-energy assembly.
@@ -388,7 +388,7 @@ def loaded_cones(assembly: Assembly, joints: VirtualJoints) -> NDArray:
     screws = clearance_components(joints.robot, assembly.clearance_screws).ravel()
     u = joints.cones.T @ screws / (joints.cones**2).sum(axis=0)
     slack = np.maximum(0.0, 1.0 - cone_sizes(u, joints.group))
-    # The product of contact force and distance from the bound is about the solver's
-    # gap. One of the two factors is therefore nearly zero.
+    # At a cone solver's solution, the contact force or the distance from the bound is
+    # nearly zero.
     scale = max(assembly.energy, 1e-9 * assembly.energy_without_clearance, 1e-300)
     return ((load > scale * slack) & (load > 1e-9 * scale))[joints.group]
