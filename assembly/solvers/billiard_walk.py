@@ -1,4 +1,4 @@
-"""Compiled billiard walk, which samples clearance positions at random.
+"""Compiled billiard walk: a random walk over joint positions within clearances.
 
 Sources:
     Gryazina, Polyak (2014), Random sampling: billiard walk algorithm.
@@ -15,10 +15,10 @@ from forcefit.assembly.kernels.choice import kernels
 
 @dataclass(frozen=True, eq=False)
 class Positions:
-    """Set of clearance positions for the billiard walk.
+    """Set of joint positions u within clearances, for the billiard walk.
 
     Attributes:
-        M: (nu, n) axes of Dikin's ellipsoid.
+        M: (nu, n) axes of the Dikin ellipsoid of the set, as columns.
         starts: (cones + 1,) index of the first clearance of each cone, then nu.
         to_screw: (6, nu) [rad, m] map from u to the platform's screw.
     """
@@ -29,7 +29,7 @@ class Positions:
 
     @cached_property
     def gram(self) -> NDArray:
-        """Product M M^T, (nu, nu)."""
+        """Product M M^T of the ellipsoid's axes, (nu, nu)."""
         return self.M @ self.M.T
 
     def start_chains(

@@ -1,11 +1,11 @@
-"""Operations on vectors of clearances, grouped by cones of radius 1."""
+"""Operations on vectors whose components are grouped into cones of radius 1."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 
 def cone_starts(group: NDArray) -> NDArray:
-    """Return the index of the first column of each cone, then nu, (cones + 1,)."""
+    """Return the index of each cone's first component, followed by nu, (cones + 1,)."""
     return np.append(0, np.cumsum(np.bincount(group)))
 
 
@@ -22,5 +22,5 @@ def cone_sizes(values: NDArray, group: NDArray) -> NDArray:
 
 
 def into_cones(u: NDArray, group: NDArray) -> NDArray:
-    """Project vectors onto the unit cones."""
+    """Scale the components of each cone to a norm of at most 1."""
     return u / np.maximum(1.0, cone_sizes(u, group))[group]

@@ -7,7 +7,7 @@ Problem (22) is solved by Clarabel (``"reference"``), or by a compiled interior-
 method (``"compiled"``) with Clarabel as fallback.  The solution is refined by
 :mod:`forcefit.assembly.solvers.pressed_cones` or by Newton's method on the dual
 (:mod:`forcefit.assembly.solvers.one_problem`).  The solution with the smallest
-certified gap is returned.  The gap is evaluated independently of the solvers.
+certified duality gap is returned.  The gap is evaluated independently of the solvers.
 
 Sources:
     Goulart, Chen (2024), Clarabel: an interior-point solver for conic programs with
@@ -29,19 +29,20 @@ from forcefit.assembly.solvers.method import Method
 from forcefit.assembly.solvers.pressed_cones import refine
 
 _TOLERANCE = 1e-13
-# Static regularisations of Clarabel. With its default, 1e-8, the relative gap is 1e-6
-# at some points of IRSBot-2, and without regularisation 1e-13.
+# Static regularisations of Clarabel, tried in this order. Its default, 1e-8, is less
+# accurate.
 _REGULARISATIONS = (0.0, 1e-10, 1e-8)
-# largest gap of a proved solution, relative to the energy and to the energy without
-# clearance
+# largest duality gap of a certified solution, relative to its energy and to the
+# energy without clearance
 GAP, GAP_WITHOUT_CLEARANCE = 1e-8, 1e-12
-_GAP_WITHIN = 1e-12  # required relative gap of the interior-point method
-# fraction of GAP that is required here, because the full problem has a larger gap
+_GAP_WITHIN = 1e-12  # required relative duality gap of the interior-point method
+# fraction of GAP that is required here, because the duality gap of the problem before
+# elimination of the springs is larger
 _SHARE = 0.1
-_STOP = 1e-2  # fraction of the required gap at which Newton's method stops
-# largest number of Newton steps, and first sigma
+_STOP = 1e-2  # fraction of GAP at which Newton's method stops
+# largest number of Newton steps, and initial sigma of Newton's method
 _STEPS, _FIRST_SIGMA = 150, 1e6
-_RESIDUAL = 1e-11  # largest residual of equations without springs
+_RESIDUAL = 1e-11  # largest residual of H u = k
 # largest factor on the clearances for which infeasibility is proved
 _LARGEST_FACTOR = 1e8
 _UNPROVED = "PrimalInfeasible, but its multipliers do not prove it"
@@ -71,7 +72,7 @@ class ConicSolution:
         rigid_multipliers: (p,) [J] multipliers of the equations H u = k.
         value: [J] value of the objective.
         bound: [J] certified lower bound on the objective.
-        feasible: whether H u = k has a solution within the cones.
+        feasible: whether H u = k has a solution with |u_k| <= 1 for each cone.
     """
 
     clearances: NDArray
@@ -83,7 +84,7 @@ class ConicSolution:
 
     @property
     def gap(self) -> float:
-        """Objective minus its lower bound [J]."""
+        """Duality gap: objective minus its lower bound [J]."""
         return self.value - self.bound
 
 
@@ -120,7 +121,7 @@ def minimise_energy(
     Raises:
         SolverFailed: Clarabel returned no usable solution.
     """
-    if not (h.any() or d.any() or k.any()):  # closed loops without loads
+    if not (h.any() or d.any() or k.any()):  # The solution is zero.
         zeros = np.zeros(len(h)), np.zeros(len(k))
         return ConicSolution(np.zeros(len(d)), *zeros, 0.0, 0.0)
     if G.shape[1] == 0:
@@ -166,7 +167,7 @@ def minimise_energy(
 
 
 def _proved(least: ConicSolution, h: NDArray) -> bool:
-    """Return whether the gap of a solution is within the tolerance."""
+    """Return whether the duality gap of a solution is within the tolerance."""
     allowed = GAP * abs(least.value) + GAP_WITHOUT_CLEARANCE * float(h @ h) / 2
     return least.gap <= _SHARE * allowed
 
@@ -216,9 +217,9 @@ _SOLVERS: dict[Method, tuple[_Solver, ...]] = {
 def _certified(
     problem: ConeProgramme, u: NDArray, rigid: NDArray, method: Method
 ) -> Iterator[ConicSolution]:
-    """Yield certified solutions before and after refinement by Newton's method."""
+    """Yield solutions with bounds, before and after refinement by Newton's method."""
     own = _certify(problem, u, problem.G @ u + problem.h, rigid)
-    if method == "reference":  # The multipliers of Clarabel rarely improve the bound.
+    if method == "reference":  # The compiled method omits this step.
         for refined in refine(problem, u, rigid):
             yield from _checked(problem, *refined)
     yield own
@@ -236,7 +237,7 @@ def _certified(
 def _checked(
     problem: ConeProgramme, u: NDArray, springs: NDArray, rigid: NDArray
 ) -> Iterator[ConicSolution]:
-    """Yield the last Newton iterate if it satisfies all constraints."""
+    """Yield a solution with its lower bound if it satisfies all constraints."""
     u = into_cones(u, problem.group)
     if all(np.isfinite(part).all() for part in (u, springs, rigid)):
         if np.abs(problem.H @ u - problem.k).max(initial=0.0) <= _RESIDUAL:
@@ -246,12 +247,12 @@ def _checked(
 def _certify(
     problem: ConeProgramme, u: NDArray, springs: NDArray, rigid: NDArray
 ) -> ConicSolution:
-    """Return a solution with its objective and its certified lower bound."""
+    """Return a solution with its objective and a certified lower bound."""
     strain = problem.G @ u + problem.h
     value = float(strain @ strain) / 2 - float(problem.d @ u)
     bound = _energy_bound(problem, springs, rigid)
     if not problem.d.any():
-        # Every multiple f of the multipliers proves the bound f gain - f^2 cost / 2.
+        # The multipliers times any factor f prove the bound f gain - f^2 cost / 2.
         cost = float(springs @ springs)
         factor = max(0.0, bound + cost / 2) / cost if cost > 0.0 else 0.0
         better = _energy_bound(problem, factor * springs, factor * rigid)
@@ -263,8 +264,9 @@ def _certify(
 def _energy_bound(problem: ConeProgramme, spring: NDArray, rigid: NDArray) -> float:
     """Compute a certified lower bound on problem (22) from estimated multipliers.
 
-    For every y and n, |Gu + h|^2/2 - d.u >= y.(Gu + h) - y.y/2 - d.u + n.(k - Hu).  The
-    minimum of the right-hand side over the unit cones has a closed form.
+    For every y and n, and for every u that satisfies H u = k, |Gu + h|^2/2 - d.u >=
+    y.(Gu + h) - y.y/2 - d.u + n.(k - Hu).  The bound is the minimum of the right-hand
+    side over the unit cones, which has a closed form.
 
     Args:
         problem: scaled problem.
@@ -283,13 +285,14 @@ def _energy_bound(problem: ConeProgramme, spring: NDArray, rigid: NDArray) -> fl
 def least_factor(
     B: NDArray, right: NDArray, group: NDArray, scaled: NDArray
 ) -> tuple[float | None, NDArray, NDArray]:
-    """Return the smallest t with B u = right and |u_k| <= t (<= 1 for fixed cones).
+    """Return the smallest t with B u = right, |u_k| <= t or |u_k| <= 1 for each cone.
 
     Args:
         B: (m, nu) matrix of full row rank, m >= 1.
         right: (m,) right-hand side.
         group: (nu,) cone of each column.
-        scaled: (nu,) bool, True if t scales the cone of the column.
+        scaled: (nu,) bool, True if the cone of the column has the radius t, False if it
+            has the radius 1.
 
     Returns:
         The factor t, or None if there is no solution; the clearances u (nu,); and the
@@ -300,7 +303,7 @@ def least_factor(
     """
     m, nu = B.shape
     rows = np.linalg.norm(B, axis=1)
-    # If all cones are scaled, t is proportional to ``right``, which is normalised.
+    # If t scales all cones, t is proportional to ``right``, which is then normalised.
     size = np.linalg.norm(right / rows) if scaled.all() else 1.0
     unit_cones, radii = _unit_cones(group, np.where(scaled, 0.0, 1.0))
     _, factors = _unit_cones(group, np.where(scaled, -1.0, 0.0))
@@ -330,9 +333,9 @@ def least_factor(
 
 
 def _unit_cones(group: NDArray, radius: NDArray) -> tuple[csc_matrix, NDArray]:
-    """Return A and b of the conic constraints s = b - A u = [radius; -u_k]."""
+    """Return A and b of the conic constraints |u_k| <= radius, in Clarabel's form."""
     nu, cones = len(group), int(group.max()) + 1
-    # rows of each cone: the radius, then its columns
+    # Each cone has one row for its radius, followed by a row for each component.
     at = np.arange(nu) + group + 1
     A = csc_matrix((np.ones(nu), (at, np.arange(nu))), shape=(nu + cones, nu))
     b = np.zeros(nu + cones)
@@ -378,7 +381,7 @@ def _clarabel(
 def _proves_no_point(
     n: NDArray, H: NDArray, k: NDArray, group: NDArray, radius: NDArray
 ) -> bool:
-    """Return whether n proves that H u = k with |u_k| <= radius_k is infeasible."""
+    """Return whether n proves that H u = k has no solution with |u_k| <= radius."""
     # Since n.H u is at most the sum of radius_k |(H^T n)_k|, the equation H u = k is
     # infeasible if n.k exceeds this sum by more than round-off.
     most = float(cone_sizes(H.T @ n, group) @ radius)

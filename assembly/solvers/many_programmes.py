@@ -19,10 +19,11 @@ from forcefit.assembly.solvers.conic import (
     minimise_energy,
 )
 
-# fraction of GAP that is required here, because the full problem has a larger gap
+# fraction of GAP that is required here, because the duality gap of the problem before
+# elimination of the springs is larger
 _SHARE = 0.1
-_RESIDUAL = 1e-11  # largest residual of an equation without springs
-# smallest force of a loaded cone, relative to the force without clearance
+_RESIDUAL = 1e-11  # largest residual of H u = k
+# smallest contact force that is not round-off, relative to the force without clearance
 _LOADED = 1e-9
 
 
@@ -54,7 +55,7 @@ def minimise_energies(
         group: (nu,) cone of each column, counted from 0.
 
     Returns:
-        The minimisers with certified gaps.
+        The minimisers, whose duality gaps are certified.
 
     Raises:
         SolverFailed: no usable solution was found for one of the programs.
@@ -80,7 +81,7 @@ def into_cones_of_each(u: NDArray, group: NDArray) -> NDArray:
 
 
 def _proved(problem: tuple[NDArray, ...], u: NDArray, n: NDArray) -> NDArray:
-    """Return a mask (n,) of solutions that satisfy H u = k and have a small gap.
+    """Return a mask (n,) of solutions with small residuals and small duality gaps.
 
     The lower bound is that of :func:`forcefit.assembly.solvers.conic.minimise_energy`
     for y = G u + h, or for the best multiple of y and n if no load acts.
@@ -102,7 +103,7 @@ def _proved(problem: tuple[NDArray, ...], u: NDArray, n: NDArray) -> NDArray:
 def closest_of_same_energy(
     minima: Minima, last: NDArray, rows: NDArray, problem: tuple[NDArray, ...]
 ) -> NDArray:
-    """Return the minimisers of equal energy that are closest to given points.
+    """Return the minimisers that are closest to given points.
 
     Args:
         minima: n solutions of :func:`minimise_energies`.
@@ -118,8 +119,8 @@ def closest_of_same_energy(
     forces = (u @ G.T + h) @ G - d - minima.rigid_multipliers @ H
     size, slack = cone_sizes(forces, group), 1.0 - cone_sizes(u, group)
     scale = (np.abs(h) @ np.abs(G) + np.abs(d)).max(axis=1, initial=0.0)[:, None]
-    # A loaded clearance is at its bound. The product of its force and its distance from
-    # the bound is about the gap, so one of the two factors is nearly zero.
+    # A clearance with a contact force is at its bound. In the computed solution, either
+    # the force or the distance from the bound is nearly zero.
     kept = (size > scale * slack) & (size > _LOADED * scale) & (scale > 0.0)
     closest, solved = np.array(u, order="C"), np.zeros(len(u), dtype=np.int64)
     starts = cone_starts(group)
@@ -131,7 +132,7 @@ def closest_of_same_energy(
 
 
 def _closest(u: NDArray, last: NDArray, rows: NDArray, group: NDArray) -> NDArray:
-    """Return the closest point by the solution of a cone program."""
+    """Return the closest point for one program."""
     eye, zero = np.eye(len(u)), np.zeros(len(u))
     try:
         found = minimise_energy(eye, -last, zero, rows, rows @ u, group)

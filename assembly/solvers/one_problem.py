@@ -18,8 +18,8 @@ class SolverLimits(NamedTuple):
     """Convergence criteria and largest number of steps of an iterative method.
 
     Attributes:
-        relative: required gap relative to |G u + h|^2 / 2.
-        absolute: required absolute gap, added to the relative one.
+        relative: required duality gap, relative to |G u + h|^2 / 2.
+        absolute: absolute duality gap that is added to the relative one.
         first_sigma: initial sigma of Newton's method, relative to the mean |G_k^T h|.
         steps: largest number of Newton steps.
     """
@@ -37,8 +37,8 @@ def interior_point(
 
     Args:
         problem: G (r, nu), h (r,), d (nu,), H (p, nu) of full row rank, k (p,).
-        starts: (cones + 1,) index of the first column of each cone, and nu.
-        tolerance: required gap.
+        starts: (cones + 1,) index of the first column of each cone, then nu.
+        tolerance: required duality gap.
 
     Returns:
         u (nu,) and the multipliers (p,) of H at the last iterate.
@@ -76,13 +76,13 @@ def farthest_points(
         starts: (cones + 1,) index of the first column of each cone, then nu.
         directions: (k, nu) directions d, of length 1.
         right: (k, p) right-hand sides.
-        tolerance: (k,) accepted gap of d.u.
+        tolerance: (k,) accepted difference between d.u and its upper bound.
 
     Returns:
         u (k, nu) and the multipliers n (k, p) of the rows at the last iterate.  They
-        satisfy d.u <= n.right + sum |(d - rows^T n)_c|. Also a mask (k,) of points
-        where the two sides differ by less than the tolerance and the equations are
-        satisfied to machine precision.
+        satisfy d.u <= n.right + sum |(d - rows^T n)_c|. Also a mask (k,) of directions
+        for which both sides of this inequality differ by less than the tolerance and
+        the equations are satisfied to machine precision.
     """
     count, (p, nu) = len(directions), rows.shape
     points, multipliers = np.zeros((count, nu)), np.zeros((count, p))
@@ -107,7 +107,7 @@ def farthest(
         start: (nv,) point within the unit cones.
         starts: (cones + 1,) index of the first column of each cone, then nv.
         half: 0 for the rotation, 3 for the translation.
-        tolerance: [rad or m] required gap between upper and lower bound.
+        tolerance: [rad or m] required difference between the upper and lower bound.
         support: support function of a direction (3,) of this half, called if the
             compiled method is inaccurate.  Its gradient is X^T d minus the contribution
             of the multipliers of H.

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from forcefit.assembly.solvers.one_problem import Support
 
 _MOST = 400  # largest number of support functions
-# Offset of every cut from the set, relative to the tolerance, but at least relative to
-# the size of the set. The polytope around a flat set then has corners.
+# Distance between each cut and the set, relative to the tolerance, and its minimum
+# relative to the size of the set. The polytope around a flat set then has corners.
 _SLACK, _LEAST_SLACK = 0.25, 1e-7
 
 
@@ -29,7 +29,7 @@ def farthest(
     Args:
         centre: (6,) [rad, m] screw of the set.
         half: 0 for the rotation, 3 for the translation.
-        tolerance: [rad or m] required gap between upper and lower bound.
+        tolerance: [rad or m] required difference between the upper and lower bound.
         support: support function of a direction (3,) of this half.
 
     Returns:
@@ -59,7 +59,7 @@ def farthest(
 
 
 def _farthest_corner(cuts: NDArray, room: NDArray, centre: NDArray) -> NDArray:
-    """Return the corner of {cuts (x - centre) <= room} with the largest norm, (3,)."""
+    """Return the corner of a polytope that is farthest from the origin, (3,)."""
     from scipy.spatial import HalfspaceIntersection
 
     unit = room.max()

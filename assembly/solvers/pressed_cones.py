@@ -1,8 +1,9 @@
 r"""Refine a minimum of :func:`.conic.minimise_energy` in numpy.
 
-A cone solver stops at a small duality gap.  If the cones in contact are known, the
-minimum satisfies equations that Newton's method solves to machine precision.  With the
-springs y, the multipliers n of H and the contact forces f, these are
+A cone solver stops at a small duality gap.  If the active cones are known (clearances
+with a contact force), the minimum satisfies equations that Newton's method solves to
+machine precision.  With the springs y, the multipliers n of H and the contact forces f,
+these are
 
     G u + h - y = 0,  G' y - d - H' n + f_c u_c = 0,  H u = k,  (|u_c|^2 - 1) / 2 = 0.
 
@@ -19,10 +20,10 @@ from forcefit.assembly.solvers.cones import cone_sizes
 
 _STEPS = 4  # largest number of Newton steps
 _SETTLED = 1e-12  # [-] size of the last step at convergence
-_GUESSES = 6  # largest number of guesses of the cones in contact
-# [-] distances from the bound below which a cone with a force is in contact
+_GUESSES = 6  # largest number of corrections of the active cones
+# [-] distances from the bound below which a cone with a force may be active
 _NEAR = 1e-2, 0.0
-_BEYOND = 1e-9  # [-] largest excess of a cone without contact over its bound
+_BEYOND = 1e-9  # [-] tolerance for the bound of a cone that is not active
 
 _Problem = tuple[NDArray, NDArray, NDArray, NDArray, NDArray, NDArray]
 _Point = tuple[NDArray, NDArray, NDArray]
@@ -38,13 +39,12 @@ def refine(problem: _Problem, u: NDArray, n: NDArray) -> Iterator[_Point]:
         n: (p,) multipliers of H at this solution.
 
     Yields:
-        u (nu,), y (r,) and n (p,) for each guess of the cones in contact.
+        u (nu,), y (r,) and n (p,) for each guess of the active cones.
     """
     G, h, d, H, _, group = problem
     y = G @ u + h
     force, slack = cone_sizes(G.T @ y - d - H.T @ n, group), 1.0 - cone_sizes(u, group)
-    # The product of force and distance from the bound is about the gap, so one of the
-    # two factors is nearly zero.
+    # Either the contact force or the distance from the bound is nearly zero.
     scale = max(float(y @ y) / 2, float(force.max()), 1e-300)
     for near in _NEAR:
         pressed = (slack < near) | (force > scale * slack)
@@ -54,7 +54,7 @@ def refine(problem: _Problem, u: NDArray, n: NDArray) -> Iterator[_Point]:
 def _settled(
     problem: _Problem, start: _Point, pressed: NDArray, force: NDArray
 ) -> _Point:
-    """Update the set of cones in contact until it agrees with the minimum."""
+    """Return the minimum, after correcting the set of active cones if necessary."""
     for _ in range(_GUESSES):
         settled, forces = _with_pressed(problem, start, pressed, force)
         beyond = ~pressed & (cone_sizes(settled[0], problem[-1]) > 1.0 + _BEYOND)
@@ -68,7 +68,7 @@ def _settled(
 def _with_pressed(
     problem: _Problem, start: _Point, pressed: NDArray, force: NDArray
 ) -> tuple[_Point, NDArray]:
-    """Return the Newton solution and contact forces for given cones in contact."""
+    """Return the Newton solution and the contact forces for given active cones."""
     G, h, d, H, k, group = problem
     u, y, n = start
     held = np.flatnonzero(pressed)

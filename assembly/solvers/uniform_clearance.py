@@ -1,4 +1,4 @@
-"""Sample uniformly distributed clearance positions by the billiard walk.
+"""Sample uniformly distributed joint positions within clearances by a billiard walk.
 
 The set of positions is {u : rows (u - start) = 0, |u_k| <= 1 for each cone k}.  Near
 the edge of an assembly zone, this set is thin in some directions.  Directions are
@@ -112,7 +112,7 @@ def _ellipsoid(
 
 
 def _largest(heads: NDArray, u: NDArray) -> float:
-    """Return the largest norm of u over all cones."""
+    """Return the largest norm of the components of u in one cone."""
     return float(np.sqrt(np.add.reduceat(u * u, heads).max()))
 
 
