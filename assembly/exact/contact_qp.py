@@ -115,14 +115,14 @@ def clearance_step(
 
 
 def _convex(p: ClearanceProblem, method: Method) -> tuple[NDArray, NDArray] | None:
-    """Return the step for a convexified S."""
+    """Return the step that a convex approximation of S gives."""
     least = float(np.linalg.eigvalsh(p.S).min(initial=0.0))
     force, _ = p.multipliers
     active = force[p.group]
     if least >= 0.0 or not active.any():
         return _conic(p, p.S, p.s, method)
-    # adding f (|u_k|^2 - 1) / 2, which is zero at the boundary, makes S convex and
-    # preserves the minimum
+    # adding f (|u_k|^2 - 1) / 2 makes S convex; it is zero at the boundary, so the
+    # minimum does not change
     normals = boundary_normals(p.start, force > 0.0, p.group)
     held = 0.99 * active
     convex = p.S + np.diag(held) - 10.0 * least * normals @ normals.T
@@ -174,7 +174,7 @@ def _newton(p: ClearanceProblem) -> tuple[NDArray, NDArray] | None:
 def _active_step(
     p: ClearanceProblem, S: NDArray, gradient: NDArray, u: NDArray, active: NDArray
 ) -> tuple[NDArray, NDArray, NDArray] | None:
-    """Return a step, cone multipliers and row multipliers, or None without minimum."""
+    """Return the step and the multipliers for given active cones, or None."""
     C = np.hstack([boundary_normals(u, active, p.group), p.rows.T])
     count, boundaries = C.shape[1], int(active.sum())
     if count > len(u):

@@ -58,7 +58,7 @@ class DeadLoads:
 
     @cached_property
     def beyond_platform(self) -> bool:
-        """Whether a load acts on a body or joint other than the platform."""
+        """Whether loads other than the platform wrench and drive forces act."""
         return bool(np.any(self.bodies) or np.any(self.carried))
 
 
@@ -205,7 +205,7 @@ def curvature_of(place: Placement, multipliers: NDArray, loads: DeadLoads) -> ND
         return H
     wrenches, M = _on_unknowns(place, loads)
     turn, shift = place.moves[:3].T, place.moves[3:].T
-    # the bracket term of exp(A) exp(B) moves a point x by a x (b x x + v_b)
+    # to second order, exp(A) exp(B) moves a point x by the product a x (b x x + v_b)
     spread = np.trace(M, axis1=1, axis2=2)[:, None, None] * np.eye(3)
     later = np.einsum("nij,nj->ni", M - spread, turn)
     later -= np.cross(wrenches[:, 3:], shift)
@@ -214,7 +214,7 @@ def curvature_of(place: Placement, multipliers: NDArray, loads: DeadLoads) -> ND
 
 
 def load_magnitudes(place: Placement, loads: DeadLoads) -> NDArray:
-    """Return the sum of the absolute loads on each unknown, (N,) [J]."""
+    """Return the absolute work of all loads per unit of each unknown, (N,) [J]."""
     sizes = np.abs(place.platform_rows).T @ np.abs(loads.load)
     if loads.beyond_platform:
         wrenches, _ = _on_unknowns(place, loads)
@@ -308,7 +308,7 @@ def drive_wrenches(posture: Posture, loads: DeadLoads, carried: NDArray) -> NDAr
 
 
 def _on_unknowns(place: Placement, loads: DeadLoads) -> tuple[NDArray, NDArray]:
-    """Return the loads (N, 6) on the bodies that each unknown moves, and matrices M."""
+    """Return the load on all bodies that each unknown moves, (N, 6), and matrices M."""
     model = place.model
     body, joint, M_body, M_joint = _on_frames(place, loads)
     link = (model.motion == LINK)[:, None]
@@ -357,7 +357,7 @@ def resultants(
 
 
 def _read(G: NDArray, T: NDArray, origin: NDArray) -> tuple[NDArray, NDArray, NDArray]:
-    """Return moments (..., n, 3), forces (..., n, 3) and matrices M (..., n, 9)."""
+    """Return the moments, forces and matrices M (..., n, 9) of dead loads G."""
     points = T[..., :3, :].copy()
     points[..., 3] -= origin
     moments = np.cross(points, G, axis=-2).sum(axis=-1)

@@ -120,8 +120,8 @@ class Step:
     Attributes:
         placement: placement after the step.
         gain: [J] predicted decrease of the potential.
-        decrement: [J] predicted decrease of the potential if the loops were already
-            closed.
+        decrement: [J] predicted decrease of the potential without the part that closes
+            the loops.
         length: [rad, reference lengths] length of the step.
         rigid: (6 K,) multipliers of the equations that contain only clearances.
         damping: [J/rad^2] damping of the next step.
@@ -156,7 +156,7 @@ def expand(at: Placement, loads: DeadLoads, rigid: NDArray) -> Expansion:
     U, S, Vt = svd(A[:, unbounded] * unit, full_matrices=True)
     tolerance = rank_tolerance(model.posture.mismatch)
     rank = int(np.sum(S > tolerance * S.max(initial=0.0)))
-    # V contains the right singular vectors in the units of the unknowns
+    # V contains the right singular vectors, scaled by the units of the unknowns
     range_, rigid_space, V = U[:, :rank] / S[:rank], U[:, rank:], unit[:, None] * Vt.T
     inverse = V[:, :rank] @ range_.T
     multipliers = inverse.T @ gradient[unbounded]
@@ -190,7 +190,7 @@ def _basis(unbounded: NDArray, closing: NDArray, null_space: NDArray) -> NDArray
 
 
 def _independent(rows: NDArray) -> tuple[NDArray, NDArray]:
-    """Return an orthogonal basis (p, nu) of the rows of a matrix, and its coefficients.
+    """Return an orthogonal basis (p, nu) of the rows of a matrix, and coefficients.
 
     The coefficients (m, p) form the basis from the m rows.
     """
@@ -238,7 +238,7 @@ def advance(
     least = max(least, pull)
     before = potential(start, local.loads) + penalised
     noise = 1e-13 * (abs(before) + abs(energy_of(start)))
-    # round-off in rotations and positions, multiplied by the forces
+    # add the round-off of rotations and positions, multiplied by the forces
     noise += 1e-14 * (penalty + pull)
     for attempt in range(_ATTEMPTS):
         # after a rejected Newton step, the conic solver is used once without damping
@@ -269,7 +269,7 @@ def problem_name(at: Placement, loads: DeadLoads) -> str:
 
 
 def _solve(local: Expansion, damping: float, near: bool, method: Method) -> Step | None:
-    """Return the step to the minimum of the expansion, or None if it has none."""
+    """Return the step to the minimum of the expansion, or None without a minimum."""
     at, model = local.placement, local.placement.model
     normal = np.zeros(len(at.x))
     normal[local.unbounded] = -local.inverse @ at.residual

@@ -76,7 +76,8 @@ def tangent_space(
 
     Args:
         local: expansion at the equilibrium.
-        hold_touching: whether contacts without a force also remain in contact.
+        hold_touching: whether joints that touch their bound without a force also remain
+            in contact.
 
     Returns:
         (N, k) basis of the admissible motions, and (k, k) [J] second derivative of the

@@ -82,7 +82,7 @@ if TYPE_CHECKING:
 _STEPS = 160  # maximum number of steps
 _NEAR = 1e-2  # [-] largest predicted decrease at which Newton's method is tried
 _DECREMENT = 1e-14  # [-] convergence tolerance on the predicted relative decrease
-# number of steps after which the length of the step is no longer required to converge
+# number of steps after which the step length is no longer a convergence criterion
 _RESTLESS = 100
 _STILL = 1e-9  # [rad, reference lengths] convergence tolerance on the step
 _STATIONARY = 1e-7  # [-] largest accepted relative force residual
@@ -242,7 +242,7 @@ class ExactAssembly:
 
     @cached_property
     def closure_wrenches(self) -> NDArray:
-        """Wrench of the second chain of each closure on the first chain.
+        """Wrench of each closure's second chain on its first chain.
 
         Shape (closures, 6) [N m, N], at the platform's nominal origin, base axes.
         """
@@ -393,7 +393,7 @@ def _refuse_compiled(*starts: Assembly | ExactAssembly | None) -> None:
 
 
 def _count(joints: VirtualJoints) -> int:
-    """Return the number of unknowns of the problem."""
+    """Return the number of springs, clearance motions and free motions."""
     return sum(part.shape[1] for part in (joints.elastic, joints.cones, joints.free))
 
 
@@ -442,7 +442,7 @@ def _first_guess(model: FiniteRobot, linear: Assembly) -> NDArray:
 
 
 def _energy_scale(at: Placement, linear: Assembly, loads: DeadLoads) -> float:
-    """Return a typical energy of the problem [J], for tolerances."""
+    """Return a typical energy [J], to which tolerances are relative."""
     return max(
         energy_of(at), abs(work_of(at, loads)), 1e-3 * linear.energy_without_clearance
     )

@@ -44,7 +44,7 @@ class FiniteRobot:
 
     @cached_property
     def _blocks(self) -> NDArray:
-        """Screw of each unknown at each frame, (n, 6, N)."""
+        """Screw of each frame per unit of each unknown, (n, 6, N)."""
         j = self.joints
         every = np.hstack([j.elastic, j.cones, j.free])
         return every.reshape(len(self.posture.robot.frames), 6, every.shape[1])
@@ -61,7 +61,7 @@ class FiniteRobot:
 
     @cached_property
     def motion(self) -> NDArray:
-        """Motion to which each unknown belongs, ``LINK`` to ``OWN``, (N,)."""
+        """Motion that each unknown changes, from ``LINK`` to ``OWN``, (N,)."""
         links, (nu, nq) = self.joints.links, (len(self.joints.group), self._free)
         kind = np.where(links, LINK, SPRING)
         kind = np.concatenate([kind, np.full(nu + nq, CLEARANCE)])
@@ -89,7 +89,7 @@ class FiniteRobot:
 
     @cached_property
     def units(self) -> NDArray:
-        """Scale of each unknown, (N,)."""
+        """Unit by which each unknown is scaled, (N,)."""
         units = np.ones(len(self.frame))
         units[self.bounded.stop :] /= np.linalg.norm(
             self.columns[self.bounded.stop :] * self.scale, axis=1
@@ -120,7 +120,7 @@ class FiniteRobot:
 
     @cached_property
     def _order(self) -> NDArray:
-        """Number that increases along each chain in the order of the motions, (N,)."""
+        """Position of each unknown in the order of motions along its chain, (N,)."""
         return 4 * self.frame + self.motion
 
     @cached_property
@@ -133,7 +133,7 @@ class FiniteRobot:
 
     @cached_property
     def chains(self) -> tuple[NDArray, NDArray]:
-        """Whether an unknown is on the first and the second chain, (K, N) bool."""
+        """Whether an unknown is in the first and in the second chain, (K, N) bool."""
         robot = self.posture.robot
         ends = self.closed_frames
         first, second = (robot.on_path[ends[:, k]][:, self.frame] for k in (0, 1))
@@ -174,7 +174,7 @@ class FiniteRobot:
 
     @cached_property
     def erring_bodies(self) -> NDArray:
-        """Bodies with geometric errors in the frame of the parent, (n, 4, 4)."""
+        """Bodies with geometric errors, as transforms from the parent, (n, 4, 4)."""
         robot = self.posture.robot
         errors = robot.errors
         off = transform(errors[:, 3:], rotation_matrix(errors[:, :3]))
@@ -184,7 +184,7 @@ class FiniteRobot:
     def nominal_closures(self) -> NDArray:
         """Nominal pose of the second frame of each closure in the first, (K, 4, 4)."""
         first, second = self.posture.transforms[self.closed_frames.T]
-        # differs from the identity because of round-off in robot files
+        # not exactly the identity, because numbers in robot files are rounded
         return inverse(first) @ second
 
 

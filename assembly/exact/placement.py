@@ -60,7 +60,7 @@ class Placement:
 
     @cached_property
     def own(self) -> NDArray:
-        """Displacement of passive joints from the nominal posture, (n,) [rad or m]."""
+        """Motion of each passive joint from its nominal posture, (n,) [rad or m]."""
         m = self.model
         rows = m.motion == OWN
         axes = np.array([frame.own_axis for frame in m.posture.robot.frames])
@@ -71,7 +71,7 @@ class Placement:
 
     @cached_property
     def _poses(self) -> NDArray:
-        """Poses before each motion at a frame and after the last one, (5, n, 4, 4)."""
+        """Poses of each frame before and after each of its motions, (5, n, 4, 4)."""
         robot = self.model.posture.robot
         link, clearance, spring = exponential(self.screws)
         local = [
@@ -245,7 +245,7 @@ class Placement:
         return np.concatenate([moment + np.cross(arm, load[3:]), load[3:]])
 
     def _load_curvature(self, load: NDArray) -> NDArray:
-        """Return the curvature of the load's work without its bracket terms."""
+        """Return the second derivative of the load's work without Lie brackets."""
         W, turn = self._at_origin, self.platform_screw[:3]
         order = self.model._order
         V = self.moves * self.model.on_platform
