@@ -1,8 +1,8 @@
-r"""Newton's method for an equilibrium with known contacts in the clearances.
+r"""Newton's method for an equilibrium with known contacts within clearances.
 
-A clearance is called closed if the joint touches its bound and the contact force is not
-zero.  A cone program is solved to a relative accuracy of about 1e-6.  Once the closed
-clearances are known, the equilibrium is the solution of the equations
+A clearance is called closed if the joint is at the bound of its clearance with a
+nonzero contact force.  A cone program is solved to a relative accuracy of about 1e-6.
+Once the closed clearances are known, the equilibrium is the solution of the equations
 
     [ H   A'  N ] [ dx       ]     [ g ]      g = H_y y - loads - A' lambda + N f
     [ A   0   0 ] [ -dlambda ] = - [ r ],     r = A x + misfit
@@ -28,7 +28,8 @@ from forcefit.assembly.linear.load import FrameLoads
 from forcefit.assembly.solvers.cones import cone_sizes
 
 AT_BOUND = 1e-6  # [-] tolerance of a contact, relative to the clearance
-# [-] largest gap, relative to the clearance, at which a contact force is possible
+# [-] largest distance from the bound, relative to the clearance, at which a contact
+# force is possible
 _NEAR_BOUND = 1e-3
 _PRESSED = 1e-8  # [-] tolerance for zero forces, relative to the largest force
 # [-] tolerance for zero forces, relative to the energy without clearance
@@ -43,8 +44,9 @@ _GUESSES = 3  # maximum number of trial sets of closed clearances
 def contacts(assembly: Assembly) -> tuple[NDArray, NDArray]:
     """Return the contacts with a force, and the contacts without a force.
 
-    A cone solver stops with small gaps in the contacts.  A gap of less than 1e-3 is
-    therefore a contact if the force, relative to the energy, exceeds the gap.
+    A joint is in contact if its distance from the bound is at most 1e-6 of the
+    clearance.  If there is a contact force, distances of up to 1e-3 are accepted,
+    because a cone solver is inexact.
 
     Args:
         assembly: minimum-energy assembly.
@@ -87,7 +89,7 @@ def settle(assembly: Assembly) -> Assembly:
         size = cone_sizes(settled.clearances, settled.joints.group)
         if np.array_equal(contacts(settled)[0], pressed) and np.all(size <= 1 + 1e-9):
             return settled
-        # the bound is exceeded where a small contact force was set to zero by mistake
+        # a joint beyond its bound must have a contact force
         beyond = size > 1.0 + 1e-9
         if not (beyond & ~pressed).any():
             break
@@ -149,7 +151,7 @@ def work_of_loads(loads: FrameLoads, joints: VirtualJoints) -> NDArray:
 def curvature(joints: VirtualJoints, force: NDArray) -> NDArray:
     """Return the second derivative of the Lagrangian, (N, N) [J].
 
-    Springs and contact forces on round bounds contribute to it.
+    Contributions are those of springs, and of contact forces on curved bounds.
     """
     diagonal = [np.ones(joints.elastic.shape[1]), force[joints.group]]
     return np.diag(np.concatenate([*diagonal, np.zeros(joints.free.shape[1])]))

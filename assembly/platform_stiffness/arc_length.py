@@ -96,7 +96,7 @@ class _Path:
         weight: factor w of the arc length s, ds^2 = w |dx|^2 + (dload / range)^2.
         range: [N or N m] difference between the first and the last load.
         parts: link or joint to which each spring belongs.
-        idle: number of motions without stiffness on which no load acts.
+        idle: number of free motions on which no load acts.
     """
 
     posture: Posture

@@ -336,12 +336,12 @@ def _event(point: _Point, kind: str, what: str, component: int) -> Event:
 def _bracket(
     low: _Point, high: _Point, at: _Solver, same: Callable[[_Point], bool]
 ) -> tuple[_Point, _Point]:
-    """Return two close loads between which a property changes."""
+    """Return equilibria at two close loads between which a property changes."""
     for _ in range(_HALVINGS):
         try:
             middle = at((low.load + high.load) / 2, low)
         except SolverFailed:
-            break  # for example, a load below the contact tolerance
+            break  # The change of contact is too small to locate.
         low, high = (middle, high) if same(middle) else (low, middle)
     return low, high
 
@@ -356,7 +356,7 @@ def _apart(one: _Point, other: _Point) -> float:
 
 
 def _jumps(before: _Point, after: _Point, component: int) -> bool:
-    """Return whether the platform moves much farther than both tangents predict."""
+    """Return whether the platform moves much farther than tangents predict."""
     scale = np.repeat([before.tangent.length, 1.0], 3)
     farthest = max(
         float(np.linalg.norm(scale * p.tangent.compliance[component]))

@@ -50,7 +50,7 @@ _UNTOUCHED = 1e-9  # [-] tolerance for zero components of a unit screw
 
 
 class Part(NamedTuple):
-    """Compliant component of a robot.
+    """Link, joint or clearance that makes a robot compliant.
 
     Attributes:
         frame: name of the frame, or of a joint that consists of several frames.
@@ -193,7 +193,7 @@ class PlatformStiffness:
 
     @property
     def free_text(self) -> str:
-        """Description of the free platform motions, or an empty string."""
+        """Description of the platform's free motions, or an empty string."""
         screws = ", ".join(numbers(screw) for screw in self.free.T)
         return f"the platform moves freely along {screws} [rad, m]" * bool(screws)
 
@@ -204,7 +204,7 @@ class PlatformStiffness:
 
     @property
     def stable(self) -> bool:
-        """Whether the potential has a minimum at the equilibrium."""
+        """Whether the potential energy has a minimum at the equilibrium."""
         return bool((self.signs > 0).all())
 
     @cached_property
@@ -214,7 +214,7 @@ class PlatformStiffness:
 
     @cached_property
     def _resisted(self) -> tuple[NDArray, NDArray, NDArray]:
-        """Basis of the elastic wrenches, stiffness in this basis, rigid wrenches."""
+        """Basis of elastic wrenches, stiffness in this basis, rigid wrenches."""
         scale = self._scale[:, None]
         basis = null_space((scale * self.free).T) if self.free.size else np.eye(6)
         whole = scale * self.root
@@ -236,7 +236,8 @@ class PlatformStiffness:
         way, core, rigid = self._resisted
         values, vectors = np.linalg.eigh(core)
         scale = self._scale[:, None]
-        # the screws are orthonormal if rotations are multiplied by the length
+        # the screws are orthonormal if rotations are multiplied by the characteristic
+        # length
         screws = np.hstack([
             np.linalg.qr(scale * self.free)[0],
             way @ vectors / scale,
@@ -269,7 +270,7 @@ class PlatformStiffness:
         return free, blocked
 
     def _compliance_along(self, d: NDArray) -> float:
-        """Return d . C d for a unit direction d, or inf along free motions."""
+        """Return the compliance d . C d along a unit direction d, or inf if free."""
         if _touches(self.free, d):
             return np.inf
         screws = self.root.T @ d
@@ -279,7 +280,7 @@ class PlatformStiffness:
         return float(self.signs @ screws**2)
 
     def _held(self, d: NDArray) -> float:
-        """Return d . K d for a unit direction d."""
+        """Return the stiffness d . K d along a unit direction d."""
         way, core, _ = self._resisted
         return float(d @ way @ core @ way.T @ d)
 
@@ -405,12 +406,12 @@ def _direction(direction: ArrayLike) -> NDArray:
 
 
 def _touches(vectors: NDArray, d: NDArray) -> bool:
-    """Return whether a direction has a component along a vector."""
+    """Return whether a direction has a component along any of the given vectors."""
     return bool(np.abs(vectors.T @ d).max(initial=0.0) > _UNTOUCHED)
 
 
 def _blank(matrix: NDArray, unbounded: NDArray) -> NDArray:
-    """Return a matrix with NaN in the rows and columns of unbounded directions."""
+    """Return a 6 x 6 matrix with NaN in rows and columns that are infinite."""
     touched = np.abs(unbounded).max(axis=1, initial=0.0) > _UNTOUCHED
     matrix = np.where(touched[:, None] | touched, np.nan, matrix)
     matrix.setflags(write=False)

@@ -165,7 +165,7 @@ def _linear(
 
 
 def _like(joints: VirtualJoints, there: Posture) -> VirtualJoints:
-    """Return the virtual joints of a robot that differs in one parameter."""
+    """Return the virtual joints of a robot with one changed parameter."""
     return virtual_joints(there.robot, bounded_motion=joints.bounded_motion)
 
 
@@ -220,11 +220,11 @@ def _difference(
     conditions: Callable[[Posture], tuple[NDArray, NDArray]],
     ahead: Posture, back: Posture, step: float,
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
-    """Return the partial derivatives of the equilibrium conditions."""
+    """Return the derivatives of both equilibrium conditions by central differences."""
     there, behind = conditions(ahead), conditions(back)
     return (there[0] - behind[0]) / (2 * step), (there[1] - behind[1]) / (2 * step)
 
 
 def _unknown(tangent: PlatformStiffness) -> PlatformStiffness:
-    """Return a stiffness of NaN, which marks a change of contact."""
+    """Return a stiffness whose entries are NaN."""
     return replace(tangent, root=np.full_like(tangent.root, np.nan))
