@@ -1,9 +1,9 @@
 """Operating conditions of past or planned measurements of a robot.
 
 An *effect* (:mod:`forcefit.assembly.effects`) is a property that the robot file does
-not contain, such as friction or thermal expansion.  An effect changes only the fields
-of :class:`Conditions`.  Effects can therefore be combined, and
-:func:`forcefit.assembly.measurement.predict.predict` is independent of them.
+not contain, such as friction or thermal expansion.  An effect changes only fields of
+:class:`Conditions`.  Effects can therefore be combined, and
+:func:`forcefit.assembly.measurement.predict.predict` does not depend on them.
 
 ======  ====================  =========  =============================================
 symbol  code                  shape      meaning
@@ -52,9 +52,10 @@ class Yield:
 
     Attributes:
         frame: name of the frame.
-        component: index of the screw component of the deflection, frame axes; 6 for the
-            motion along the thread of a helical joint.
-        through: frames and components of the wrenches on which the law depends.
+        component: index of the deflected screw component in frame axes, 0 to 5; 6 for
+            the motion along the thread of a helical joint.
+        through: frame and component index of each wrench component on which the law
+            depends.
         inputs: (R, k) additional inputs of the law, one row per measurement.
         law: smooth function [rad or m] of the inputs (R, k) and wrenches (R, s).
         linear: whether the law is a compliance times one wrench component at the same
@@ -92,20 +93,20 @@ class Conditions:
         covariates: (R,) values of additional covariates by name.
         session: (R,) names of the sessions; None if unknown.
         history: all measurements of the campaign in order of time, or None.
-        row: (R,) indices of these measurements in the history.
+        row: (R,) indices of these measurements in ``history``.
         target: (R, 3) [m] measured point, platform axes; None for the reference point.
         laws: contact springs in series with joints.
         yields: deflection laws.
         exact: whether to use the model with finite motions instead of the linear one.
         second_order: (R, 6) [rad, m] exact minus linear platform screw without load;
             see :func:`forcefit.assembly.measurement.predict.with_second_order`.
-        rest: (R, n, 6) rest positions of the joints within their clearances, relative
-            to the bounds; None if they follow from the minimum-energy assembly.
+        rest: (R, n, 6) fixed positions of the joints within their clearances, relative
+            to the bounds; None to compute the positions by minimum energy.
         base: (6,) or (R, 6) [rad, m] rotation and translation of the measuring frame.
             The measured pose is multiplied by this transform from the left.
         tool: (3,) or (R, 3) [m] vector from the reference point to the measured point,
             platform axes.
-        reading: (R, 6) [rad, m] offsets of the reading.
+        reading: (R, 6) [rad, m] offsets that the device adds to the measured pose.
     """
 
     robot: Robot
@@ -140,7 +141,7 @@ class Conditions:
 
     @property
     def reads_otherwise(self) -> bool:
-        """Whether readings differ from the pose error of the reference point."""
+        """Whether the registration or a device error changes the readings."""
         return bool(self.base.any() or self.tool.any() or np.any(self.reading))
 
     @property

@@ -11,14 +11,14 @@ from forcefit.assembly.linear.energy import Assembly
 from forcefit.assembly.measurement.conditions import Conditions, ContactLaw
 from forcefit.assembly.model.links import in_series, own_screw
 
-ITERATIONS = 100  # largest number of iterations
+ITERATIONS = 100  # largest number of Newton iterations
 CONVERGED = 1e-11  # largest relative change of a deflection at convergence
 
 
 def softened(
     posture: Posture, laws: tuple[ContactLaw, ...], compliances: NDArray
 ) -> Posture:
-    """Replace each contact by a spring of its secant stiffness."""
+    """Return a posture whose joints include the secant compliance of each contact."""
     if not compliances.any():
         return posture
     frames = list(posture.robot.frames)
@@ -54,7 +54,7 @@ def wrenches_through(assembly: Assembly | ExactAssembly) -> NDArray:
 
 
 def contact_columns(conditions: Conditions) -> NDArray:
-    """Return the unit screws of the motions at s contact springs, (6n, s)."""
+    """Return the unit screws of the deflections of s contact springs, (6n, s)."""
     columns = np.zeros((6 * len(conditions.robot.frames), len(conditions.laws)))
     for k, law in enumerate(conditions.laws):
         i = conditions.robot.index(law.frame)

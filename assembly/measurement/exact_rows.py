@@ -6,7 +6,7 @@ nominal posture (:mod:`forcefit.assembly.measurement.without_clearance`).  The f
 iterate is the linear solution.  Measurements that do not converge are solved by
 :func:`forcefit.assembly.exact.exact.solve_exact`.
 
-The iterate is defined in :mod:`forcefit.assembly.measurement.row_state`.
+The unknowns are defined in :mod:`forcefit.assembly.measurement.row_state`.
 
 Sources:
     Ortega, Rheinboldt, Iterative Solution of Nonlinear Equations in Several Variables,
@@ -33,7 +33,8 @@ _CLOSURE_TOLERANCE = 1e-11  # [rad, reference lengths] largest closure residual
 _FREE_FORCE = 1e-5
 # [rad, reference lengths] deformation below which a wrench is treated as zero
 _ZERO_LOAD = 1e-9
-# largest accepted ratio of two successive changes, after the initial iterations
+# largest accepted ratio of the changes in two successive iterations, after the initial
+# iterations
 _CONTRACTION = 0.8
 _TRANSIENT = 3  # number of initial iterations in which changes can increase
 _BATCH = 100  # number of measurements that are solved together
@@ -72,7 +73,7 @@ def solve_rows(
 
 
 def _of_passive_joints(free: NDArray, robot: Robot) -> bool:
-    """Return whether all free motions (6n, q) are motions of passive joints."""
+    """Return whether all free motions, (6n, q), are motions of passive joints."""
     passive = np.array([frame.passive for frame in robot.frames])
     own = own_screws(robot) * passive[:, None]
     for column in free.T.reshape(-1, len(robot.frames), 6):
@@ -127,7 +128,7 @@ def _solve(rows: Rows) -> tuple[NDArray, NDArray]:
 
 
 def _lever_arms(rows: Rows) -> NDArray:
-    """Return the factors that convert forces along free motions to moments, (q,)."""
+    """Return factors that convert forces along free motions to moments, (q,)."""
     free = rows.flexible.free
     return np.abs(free).T @ np.tile(1 / rows.scale, len(free) // 6)
 

@@ -20,10 +20,10 @@ STILL = 1e-9  # [rad, m] smaller changes of a command are ignored
 
 @dataclass(frozen=True, eq=False)
 class History:
-    """Variables of H measurements in order of time, one session after another.
+    """Variables of H measurements, sorted by session and by time.
 
     Attributes:
-        values: (H,) values of each variable by public name; NaN if unknown.
+        values: (H,) values of each variable by name; NaN if unknown.
         first: (H,) bool, True for the first reading of a session.
     """
 
@@ -37,9 +37,9 @@ class History:
             name: name of the variable.
 
         Returns:
-            (H,) signs, 0 if unknown.  A variable that does not change has its last
-            direction.  Before the first change, the column ``approach`` is used if
-            available.
+            (H,) signs, 0 if unknown.  While a variable does not change, its previous
+            direction remains valid.  Before the first change, the column ``approach``
+            is used if available.
         """
         given = np.nan_to_num(self.values["approach"])
         if name == "approach":
@@ -53,7 +53,7 @@ class History:
         return np.where(known, np.sign(step[last]), given)
 
     def slip(self, name: str, depth: float) -> NDArray:
-        """Return the position of a friction element that a variable drives.
+        """Return the position of a friction element that moves with a variable.
 
         Args:
             name: name of the variable.
@@ -62,9 +62,9 @@ class History:
 
         Returns:
             (H,) positions from -1 to 1.  The element moves with the variable until it
-            reaches an end, and stays there until the variable reverses.  At the
-            beginning of a session, it is at the end given by ``approach``, or at its
-            centre.
+            reaches an end, and stays there until the variable changes direction.  At
+            the beginning of a session, it is at the end given by ``approach``, or at
+            its centre.
 
         Sources:
             Krasnosel'skii, Pokrovskii, Systems with Hysteresis, section 2 (stop).
@@ -84,9 +84,8 @@ class History:
         Args:
             name: name of the variable.
             time_constant: [s] time constant, > 0.
-            held: whether the variable is constant between readings, for example a load.
-                If False, it varies linearly between readings, for example a
-                temperature.
+            held: whether the variable is constant between readings, as a load is.  If
+                False, it varies linearly between readings, as a temperature does.
 
         Returns:
             (H,) lagged values in the unit of the variable.
@@ -94,7 +93,8 @@ class History:
         u, state = self.values[name], 0.0
         past = self._elapsed / time_constant
         decay = np.exp(-past)
-        # The lagging fraction of the change is (1 - e^-r) / r, or 1 for r = 0.
+        # (1 - e^-r) / r, the fraction of a linear change by which the state lags; 1 for
+        # r = 0
         share = np.where(
             past > 0, -np.expm1(-past) / np.where(past > 0, past, 1.0), 1.0
         )
@@ -124,15 +124,15 @@ class History:
 def in_order(
     values: Mapping[str, NDArray], session: NDArray | None
 ) -> tuple[History, NDArray]:
-    """Sort the readings of a table by the time of measurement.
+    """Sort H readings by session and by the time of measurement.
 
     Args:
-        values: (H,) values by public name of the variable, including ``time``; the
-            order of readings without a time is preserved.
+        values: (H,) values of each variable in H readings, by name.  ``time`` must be
+            included.  Readings without a time remain in the given order.
         session: (H,) session name of each reading; None if there is a single session.
 
     Returns:
-        The history, and the indices of the given readings in it, (H,).
+        The sorted readings, and the index of each given reading among them, (H,).
     """
     time = np.nan_to_num(values["time"])
     names = np.zeros(len(time)) if session is None else session

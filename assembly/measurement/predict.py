@@ -48,9 +48,9 @@ from forcefit.assembly.measurement.yields import Yields, settle_yields, with_spr
 from forcefit.assembly.solvers.conic import SolverFailed
 from forcefit.stiffness.screws import rotation_matrix, rotation_vector
 
-# largest number of configurations with second-order corrections
+# largest number of configurations for which second-order corrections are computed
 _MOST_ONE_BY_ONE = 40
-# convergence criterion of contacts for iterations that start at the linear solution
+# largest relative change of contact deflections at convergence, for finite motions
 _CONVERGED_FINITE = 1e-5
 
 
@@ -61,9 +61,9 @@ class Prediction:
     Attributes:
         deviation: (R, 6) [rad, m] rx ry rz tx ty tz, base axes; NaN without a solution.
         reason: (R,) reason why there is no solution; otherwise empty.
-        undetermined: (R,) bool, True if clearances make the pose non-unique.  The
-            deviation is then that of the pose nearest to nominal (closed chains) or of
-            centred joints (open chains).
+        undetermined: (R,) bool, True if clearances make the pose non-unique.  For
+            closed chains, the deviation then belongs to the pose nearest to nominal.
+            For open chains, it belongs to joints at the centre of their clearances.
     """
 
     deviation: NDArray
@@ -136,9 +136,9 @@ def _platform_screws(
 def _nearest_assembly(
     conditions: Conditions, row: int
 ) -> tuple[Assembly | ExactAssembly, bool]:
-    """Return the assembly in one measurement with the pose closest to nominal.
+    """Return the assembly with the pose closest to nominal, for one measurement.
 
-    With finite motions, the pose of the linear solution is compared.
+    With finite motions, the solution starts from that pose of the linear model.
 
     Returns:
         The assembly, and whether clearances make its pose non-unique.
@@ -256,8 +256,7 @@ def read(conditions: Conditions, screws: NDArray) -> NDArray:
     lever = _turned(turn - np.eye(3), arm + tool)
     shift = screws[:, 3:] + lever + tool
     base = rotation_matrix(conditions.base[..., :3])
-    # The device rotation moves the measured position. Without rotation, this term is
-    # exactly zero.
+    # A rotation of the measuring frame moves the measured position.
     translation = _turned(base - np.eye(3), p + arm) + _turned(base, shift)
     translation += conditions.base[..., 3:]
     turns = conditions.base[..., :3].any()
@@ -300,7 +299,7 @@ def assemble_row(
     load = conditions.load_at_origin()[row]
     gravity = conditions.gravity[row] if conditions.gravity[row].any() else None
     compliances = np.zeros(len(conditions.laws))
-    # The contact deflections of the linear model are nearly exact.
+    # Start from the contact deflections of the linear model.
     if conditions.exact and conditions.laws:
         linear = assemble_row(replace(conditions, exact=False), row)
         compliances = secants(linear, conditions.laws)
@@ -339,7 +338,7 @@ def _assemble_yielding(
 
 
 def _without_clearance(conditions: Conditions) -> tuple[NDArray, NDArray]:
-    """Return platform screws without clearances, and a mask of valid rows."""
+    """Return the platform screws without clearances, and a mask of solved rows."""
     if not conditions.yields:
         screws, _, solved = _linear(conditions)
         return screws, solved
@@ -348,7 +347,7 @@ def _without_clearance(conditions: Conditions) -> tuple[NDArray, NDArray]:
         np.zeros(len(conditions), dtype=bool),
     )
     if conditions.exact:
-        # All measurements are then solved one by one.
+        # The caller then solves all measurements one by one.
         return unsolved
     distinct, which = conditions.postures.distinct
 

@@ -1,4 +1,4 @@
-r"""Exact equilibrium equations of many measurements, evaluated at an iterate.
+r"""Exact equilibrium equations of many measurements, at the current unknowns.
 
 ======  =============  ===========  ==================================================
 symbol  code           shape        meaning
@@ -47,7 +47,7 @@ _LINEAR_BELOW = 1e-9  # [rad or m] deflection below which a contact law is linea
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """Measurements with the quantities that are constant in the iteration.
+    """Measurements and all quantities that do not change in the iteration.
 
     Attributes:
         conditions: conditions of R measurements.
@@ -118,7 +118,7 @@ class Rows:
         )
 
     def tangent_deflection(self, w: NDArray) -> NDArray:
-        """Return the deflections of the contacts under loads w by linearised laws."""
+        """Return contact deflections under loads w by linearised laws, (R, s)."""
         c, n = self.law_constants
         load = (
             c
@@ -128,7 +128,7 @@ class Rows:
         return self.linear_deflections + self.contact_compliance * (w - load)
 
     def deflection(self, w: NDArray) -> NDArray:
-        """Return the deflections of the contacts under loads w, (R, s) [rad or m]."""
+        """Return contact deflections under loads w, (R, s) [rad or m]."""
         c, n = self.law_constants
         least = c * _LINEAR_BELOW**n
         large = np.maximum(np.abs(w), least)
@@ -140,14 +140,14 @@ class Rows:
         return at_postures(self.posture_of_row)
 
     def corrected(self, right_side: NDArray) -> NDArray:
-        """Solve the linear model for right-hand sides (R, m)."""
+        """Return the solutions of the linear model for right-hand sides (R, m)."""
         if not self.conditions.laws:
             return self.times(self.flexible.inverse, right_side)
         return np.einsum("rij,rj->ri", self._with_contacts, right_side)
 
     @cached_property
     def _with_contacts(self) -> NDArray:
-        """Inverse of the scaled system with contacts as tangent springs, (R, m, m)."""
+        """Inverse of the scaled system with linearised contacts, (R, m, m)."""
         flexible = self.flexible
         contact_rows = np.einsum("cki,is->cks", flexible.rows, self.contacts)[
             self.posture_of_row
@@ -162,7 +162,7 @@ class Rows:
 
     @cached_property
     def bodies(self) -> NDArray:
-        """Poses of bodies with their errors in the parent frame, (R, n, 4, 4)."""
+        """Pose of each body with its error, in the parent frame, (R, n, 4, 4)."""
         errors = self.conditions.errors
         error_motion = transform(errors[..., 3:], rotation_matrix(errors[..., :3]))
         return self.conditions.robot.fixed_transforms @ error_motion
@@ -186,7 +186,7 @@ class Rows:
 
     @cached_property
     def nominal_closures(self) -> NDArray:
-        """Nominal pose of each closure's second frame in its first, (R, K, 4, 4)."""
+        """Nominal pose of a closure's second frame in its first, (R, K, 4, 4)."""
         first, second = self.closure_frames
         T = self.conditions.transforms
         return inverse(T[:, first]) @ T[:, second]
@@ -194,7 +194,7 @@ class Rows:
 
 @dataclass(frozen=True, eq=False)
 class RowState:
-    """Current iterate of R measurements.
+    """Current values of the unknowns in R measurements.
 
     Attributes:
         rows: measurements with their constant quantities.
@@ -217,7 +217,7 @@ class RowState:
 
     @cached_property
     def poses(self) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-        """Poses before and after body deformation, after the joint, and final."""
+        """Poses before and after body deformation, then after joint motions."""
         rows = self.rows
         partial = [rows.bodies]
         for frames, screws in zip(rows.elastic_frames, self.screws, strict=True):
@@ -302,8 +302,8 @@ class RowState:
         """Return the residuals of the constitutive laws and of the equilibrium.
 
         Returns:
-            (2, R, n, 6) screws due to compliances minus screws of the iterate, (R, q)
-            forces along free motions, and (R, s) loads of contacts.
+            (2, R, n, 6) deformations due to the wrenches minus current deformations,
+            (R, q) forces along free motions, and (R, s) loads of contacts.
         """
         rows, flexible = self.rows, self.rows.flexible
         screw_residual = -self.screws

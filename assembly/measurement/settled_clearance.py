@@ -23,7 +23,7 @@ from forcefit.assembly.model.clearance import (
 from forcefit.assembly.model.contact_closures import loops
 from forcefit.assembly.model.robot import Clearance, Frame, Robot
 
-# moments and forces below this fraction of the largest are treated as zero
+# fraction of the largest moment or force below which a wrench component is zero
 _UNLOADED = 1e-9
 
 
@@ -36,7 +36,7 @@ def with_clearances_taken_up(conditions: Conditions) -> tuple[Conditions, NDArra
     Returns:
         The conditions of a robot without clearances, whose errors include these
         positions; and (R,) bool, True if a joint with clearance transmits no load.
-        This joint is centred.
+        Such a joint is at the centre of its clearance.
     """
     tight = replace(conditions, robot=without_joint_clearances(conditions.robot))
     distinct, posture_of_row = tight.postures.distinct
@@ -56,7 +56,8 @@ def with_clearances_taken_up(conditions: Conditions) -> tuple[Conditions, NDArra
         size = np.linalg.norm(parts, axis=2)
         rests = size > _UNLOADED * size.max(initial=0.0)
         unit = parts / np.where(rests, size, 1.0)[:, :, None]
-        # A joint has either the clearance ``ball``, or ``radial`` and ``axial``.
+        # A joint has either a clearance ``ball``, or clearances ``radial`` and
+        # ``axial``.
         bound = np.where(np.isnan(bounds[:, cone]), 0.0, bounds[:, cone])
         clearance_screws[:, :, list(rows)] += unit * (rests * bound)[:, :, None]
         undetermined |= np.any(~rests & (bound > 0.0), axis=1)
@@ -90,7 +91,7 @@ def with_clearances_at_rest(conditions: Conditions) -> Conditions:
 
 
 def _component_bounds(robot: Robot) -> NDArray:
-    """Return the bounds of clearance screw components, (n, 6); 0 without clearance."""
+    """Return the bounds of clearance screw components, (n, 6); 0 if rigid."""
     bounds = np.where(scales_with_margin(robot), clearance_bounds(robot), 0.0)
     bounds[np.isinf(bounds)] = 0.0
     return component_bounds(bounds)
@@ -113,7 +114,7 @@ def fractions(robot: Robot, clearance_screws: NDArray) -> NDArray:
 
 
 def without_joint_clearances(robot: Robot) -> Robot:
-    """Return a robot without clearances, but with motion limits of passive joints.
+    """Return a robot without clearances.  Motion limits of passive joints remain.
 
     Args:
         robot: robot with or without clearances.

@@ -45,7 +45,7 @@ def variable(conditions: Conditions, name: str) -> NDArray:
 
 
 def past(conditions: Conditions, names: Iterable[str]) -> tuple[History, NDArray]:
-    """Return the measurement history that contains the given operating conditions.
+    """Return the measurement history to which the given measurements belong.
 
     Args:
         conditions: conditions of R measurements.
@@ -65,7 +65,7 @@ def past(conditions: Conditions, names: Iterable[str]) -> tuple[History, NDArray
 
 
 def with_history(conditions: Conditions) -> Conditions:
-    """Add a history in which the measurements are in sequence.
+    """Add a history that consists of the given measurements in their order.
 
     Args:
         conditions: conditions of R measurements.

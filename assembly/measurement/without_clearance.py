@@ -43,9 +43,9 @@ from forcefit.assembly.model.links import (
 )
 
 # Relative size below which an eigenvalue is round-off. The rank is ambiguous if an
-# eigenvalue is between this size and RANK.
+# eigenvalue is above this size and below RANK.
 _ROUNDING = 1e-13
-# largest padding of a batch relative to its number of rows
+# largest ratio of padded rows to rows in a batch
 _PADDING = 4
 _CLOSED = 1e-9  # largest relative residual of a solved system
 _CLOSED_ABSOLUTE = 1e-12  # [rad, reference lengths] residual that is only round-off
@@ -57,15 +57,15 @@ class Flexibility:
 
     Attributes:
         rows: (c, 6K, 6n) scaled closure rows.
-        platform: (c, 6, 6n) map from small screws to the platform screw.
+        platform: (c, 6, 6n) map from the screws of all frames to the platform screw.
         body_compliances: (n, 6, 6) compliances of bodies in the frames' axes.
         joint_compliances: (n, 6, 6) compliances of joints in the frames' axes.
         free: (6n, q) unit columns of the free motions.
         limit: (q,) [rad, m] bounds of the free motions, inf without a bound.
         inverse: (c, m, m) inverse of the scaled system, m = 6K + q.
         system: (c, m, m) the scaled system.
-        softness: factor by which compliances are divided, so that the entries of the
-            scaled system are of order 1.
+        softness: factor that divides the compliances in the scaled system, so that its
+            entries are of order 1.
         ambiguous: (c,) bool, True if the numerical rank at the posture is ambiguous.
     """
 
@@ -174,7 +174,7 @@ def responses_to(
 
     Args:
         flexible: factorised model at c postures.
-        columns: bytes of the columns of (6n, s) screws.
+        columns: (6n, s) screws as bytes, so that results can be cached.
         shape: the shape (6n, s).
 
     Returns:
@@ -207,7 +207,7 @@ class FlexibleAssembly:
 @lru_cache(maxsize=4)
 def _under_load(flexible: Flexibility, loads: FrameLoads) -> NDArray | None:
     """Return the deformations of an open chain under the loads, (R, 6n)."""
-    # Cached for conditions that differ only in errors.
+    # The result is cached, because it does not depend on the errors.
     if not loads:
         return None
     screws = _each(flexible.body_compliances, loads.body)
@@ -313,12 +313,12 @@ def _factorise(content: Content) -> Flexibility:
 
 
 def pseudo_inverse(M: NDArray) -> tuple[NDArray, NDArray]:
-    """Return pseudoinverses (c, m, m), and a mask (c,) of ambiguous ranks."""
+    """Return pseudoinverses, (c, m, m), and a mask of ambiguous ranks, (c,)."""
     if not M.size:
         return M, np.zeros(len(M), dtype=bool)
     values, vectors = np.linalg.eigh(M)
     size = np.abs(values)
-    # The largest value is zero if there are only free motions.
+    # Without closures, the largest value is zero.
     largest = size.max(axis=1, keepdims=True)
     kept = size > RANK * largest
     ambiguous = np.any((size > _ROUNDING * largest) & ~kept, axis=1)
@@ -333,7 +333,7 @@ def _limits(postures: Posture, free: NDArray) -> NDArray:
 
 
 def _each(matrices: NDArray, screws: NDArray) -> NDArray:
-    """Multiply the matrix of each frame by its screw or wrench, (R, 6n)."""
+    """Return products of each frame's matrix and its screws or wrenches, (R, 6n)."""
     blocks = np.swapaxes(screws.reshape(len(screws), -1, 6), 0, 1)
     products = blocks @ matrices.mT
     return np.swapaxes(products, 0, 1).reshape(screws.shape)

@@ -1,4 +1,4 @@
-"""Solve for deflections that are functions (deflection laws) of wrenches.
+"""Solve for deflections that depend on wrenches by deflection laws.
 
 The deflections e are stress-free screws that depend on the wrenches w by a law e =
 g(w).  In a closed chain, the wrenches depend on the deflections, w = w0 + A e, with the
@@ -8,7 +8,7 @@ an open chain, A is zero and the first iterate is exact.
 ======  ===========  ===========  ====================================================
 symbol  code         shape        meaning
 ======  ===========  ===========  ====================================================
-e       ``give``     (R, m)       deflections of the m yields
+e       ``give``     (R, m)       deflections of the m laws
 w       ``through``  (R, t)       wrenches on which the laws depend
 G       ``slope``    (R, m, t)    derivative of the laws
 ======  ===========  ===========  ====================================================
@@ -27,8 +27,8 @@ from forcefit.assembly.model.links import in_series, own_screw
 from forcefit.assembly.solvers.conic import SolverFailed
 
 T = TypeVar("T")
-_STEP = 1e-6  # finite-difference step relative to the wrench
-_SETTLED = 1e-10  # largest residual relative to the largest deflection
+_STEP = 1e-6  # finite-difference step, relative to the wrench
+_SETTLED = 1e-10  # largest residual at convergence, relative to the deflection
 _STEPS = 40
 
 
@@ -139,8 +139,8 @@ def settle_yields(
 
     Args:
         conditions: conditions of R measurements.
-        solve: function that returns solutions and (R, 6n) joint wrenches for fixed
-            deflections.
+        solve: function that returns solutions and joint wrenches (R, 6n) for conditions
+            with fixed deflections.
         A: (R, t, m) derivative of the wrenches with respect to the deflections.
 
     Returns:
@@ -169,8 +169,8 @@ def with_springs(conditions: Conditions, row: int) -> Conditions:
         row: index of the measurement.
 
     Returns:
-        Conditions of one measurement.  Deflection laws that are nonlinear or have no
-        positive compliance do not change.
+        Conditions of one measurement.  Nonlinear laws, and laws without a positive
+        compliance, are not replaced.
     """
     one, left = conditions.take([row]), []
     frames = list(conditions.robot.frames)
