@@ -93,7 +93,7 @@ def _linear_adjustment(machine: Machine, state: State, step: Adjust) -> NDArray:
 
 
 def _best_local_adjustment(machine: Machine, state: State, step: Adjust) -> NDArray:
-    """Return the better of two adjustments at local minima."""
+    """Return the better of two local minima, found from different initial guesses."""
     none = np.zeros((len(state.errors), len(step.components)))
     amount, size = _local_adjustment(machine, state, step, none)
     pressed = _linear_adjustment(*_with_pressed_clearances(machine, state), step)
@@ -103,7 +103,7 @@ def _best_local_adjustment(machine: Machine, state: State, step: Adjust) -> NDAr
 
 
 def _with_pressed_clearances(machine: Machine, state: State) -> tuple[Machine, State]:
-    """Return a machine whose motions within clearances are fixed geometric errors."""
+    """Return a machine whose joints are fixed at their positions within clearances."""
     moved, joints = state.found.clearances @ machine.cones.T, machine.joints
     fixed = replace(joints, cones=joints.cones[:, :0], group=joints.group[:0])
     found = replace(state.found, clearances=state.found.clearances[:, :0])
@@ -114,7 +114,7 @@ def _with_pressed_clearances(machine: Machine, state: State) -> tuple[Machine, S
 def _local_adjustment(
     machine: Machine, state: State, step: Adjust, start: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Return the adjustment at a local minimum, and the minimum (k,)."""
+    """Return the adjustment at a local minimum, and the minimum value, (k,)."""
     unit = 1 / machine.scale[rows_of(step.components)]
     amount = start
     value, slopes = _value_and_slopes(machine, state, step, amount)
@@ -122,7 +122,7 @@ def _local_adjustment(
         inverse = np.linalg.pinv(slopes * unit, rcond=_FLAT)
         change = -np.einsum("kcp,kp->kc", inverse, value) * unit
         size, going = np.linalg.norm(value, axis=1), np.ones(len(value), dtype=bool)
-        for _ in range(_HALVINGS):  # a full step may change the contacts
+        for _ in range(_HALVINGS):  # halve the step if the value does not decrease
             trial = amount + change * going[:, None]
             found = _value_at(machine, state, step, trial)
             less = np.linalg.norm(found, axis=1) < size * (1 - _SETTLED)
@@ -140,7 +140,7 @@ def _local_adjustment(
 def _value_and_slopes(
     machine: Machine, state: State, step: Adjust, amount: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Return the quantities to minimise (k, p), and their derivatives."""
+    """Return the quantities to minimise, (k, p), and their derivatives."""
     value = _value_at(machine, state, step, amount)
     slopes = np.empty((*value.shape, len(step.components)))
     for i, scale in enumerate(machine.scale[rows_of(step.components)]):
@@ -188,7 +188,7 @@ def _closing_adjustment(machine: Machine, state: State, step: Adjust) -> NDArray
 
 
 def _least_change(machine: Machine, state: State, count: int) -> NDArray:
-    """Return the smallest values of the last a motions with equal openings, (k, a)."""
+    """Return the smallest last a motions for which openings do not change, (k, a)."""
     motions = machine.movable((), tuple(state.bolted.values()), 1)[2][:-count]
     rows = np.vstack([hold.rows for hold in state.holds.values()])
     changing, free = rows @ machine.free[:, -count:], rows @ machine.free[:, :-count]

@@ -35,10 +35,11 @@ def with_best_amounts(
     Args:
         plan: a feasible plan.
         machine: the robot in array form.
-        start: function that returns the state of a given number of equal machines
-            before the plan.
+        start: function that returns the state before the first step, for a given number
+            of equal machines.
         objective: ``"force"``, ``"energy"`` or ``"error"``.
-        given: objective if each adjustment minimises its own measured value.
+        given: value of the objective if each adjustment minimises its own measured
+            value.
 
     Returns:
         The plan with the optimal ``amount`` of each adjustment, and the objective.
@@ -86,7 +87,7 @@ def _rounded(steps: list[Adjust], amounts: NDArray) -> NDArray:
 
 
 def _with_amounts(plan: Plan, amounts: NDArray) -> Plan:
-    """Return a plan with given amounts of its adjustments, (.., total)."""
+    """Return a plan whose adjustments have given amounts, (.., total)."""
     steps, first = [], 0
     for step in plan.steps:
         if isinstance(step, Adjust):

@@ -42,7 +42,7 @@ _RULES = {
 
 
 class CannotBolt(BadInput):
-    """A machine cannot be assembled at the pose where its joint is bolted."""
+    """Raised if a machine cannot be assembled at the pose where a joint is bolted."""
 
 
 def bolt_joints(robot: Robot, rng: np.random.Generator | None = None) -> Robot:
@@ -156,7 +156,7 @@ def _with_locked(
 
 
 def last_bolt(robot: Robot) -> tuple[list[int], Machine, State]:
-    """Return the joints that are bolted last, and the state before they are bolted.
+    """Return the joints that are bolted last, and the state before bolting them.
 
     Args:
         robot: robot with a joint that has ``left = "worst"``.
@@ -185,7 +185,7 @@ def last_bolt(robot: Robot) -> tuple[list[int], Machine, State]:
 
 @lru_cache(maxsize=16)
 def _bolts(robot: Robot) -> list[tuple[list[int], Machine]]:
-    """Return the indices of the frames bolted at each pose, and the machine."""
+    """Return the frames that are bolted at each pose, and the machine there."""
     rows = [i for i, frame in enumerate(robot.frames) if frame.locked_at is not None]
     bolts, open_ = [], set(rows)
     for _, group in groupby(rows, lambda i: _pose(robot.frames[i])):
@@ -203,7 +203,7 @@ def _pose(frame: Frame) -> tuple:
 
 
 def _posture(robot: Robot, row: int, open_: set[int]) -> Posture:
-    """Return the posture at which a joint is bolted, while ``open_`` are not bolted."""
+    """Return the posture for bolting a joint, while ``open_`` are still loose."""
     frames = tuple(
         _loose(frame) if i in open_ else frame for i, frame in enumerate(robot.frames)
     )
@@ -218,7 +218,7 @@ def _posture(robot: Robot, row: int, open_: set[int]) -> Posture:
 
 
 def _loose(frame: Frame) -> Frame:
-    """Return a frame with the clearance that its joint has before it is bolted."""
+    """Return a frame with the clearance that its joint has before bolting."""
     bolt = frame.locked_at
     assert bolt is not None
     return replace(frame, clearance=bolt.clearance, locked_at=None)
@@ -244,7 +244,7 @@ def refuse_bolted(robot: Robot, what: str) -> None:
 
 
 def loose_over_poses(robot: Robot) -> list[str]:
-    """Return a remark on fixed joints with a clearance that are not bolted.
+    """Return a remark on fixed joints that have a clearance but are not bolted.
 
     Args:
         robot: robot that is solved at several poses.

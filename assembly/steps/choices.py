@@ -31,7 +31,7 @@ def choices(left: tuple[Step, ...]) -> Iterator[tuple[Step, tuple[Step, ...]]]:
 
 
 def _keep_order(one: Step, other: Step) -> bool:
-    """Return whether one of two steps adjusts the closure that the other joins."""
+    """Return whether one of two steps adjusts the closure that the other step joins."""
     steps = {type(one): one, type(other): other}
     join, adjust = steps.get(Join), steps.get(Adjust)
     if not isinstance(join, Join) or not isinstance(adjust, Adjust):
@@ -40,7 +40,7 @@ def _keep_order(one: Step, other: Step) -> bool:
 
 
 def movable_runs(steps: tuple[Step, ...]) -> list[list[Step]]:
-    """Return the sequences of consecutive joins and adjustments.
+    """Return all sequences of consecutive joins and adjustments in a plan.
 
     Args:
         steps: steps of a plan.
@@ -59,7 +59,8 @@ def order_matters(run: list[Step]) -> bool:
         run: sequence of steps, see :func:`movable_runs`.
 
     Returns:
-        True if a step is a join, and the result of a step depends on the state before.
+        True if the sequence contains a join, and a step whose result depends on the
+        state before it.
     """
     joins = [step for step in run if isinstance(step, Join)]
     return any(map(depends_on_state, run if joins else joins))

@@ -101,7 +101,7 @@ class Equilibrium:
 
 
 class _Split(NamedTuple):
-    """Singular value decomposition of constraint rows, with and without springs."""
+    """Constraint equations, separated into combinations with and without springs."""
 
     basis: NDArray
     values: NDArray
@@ -125,7 +125,7 @@ def equilibrium(
         The equilibrium.
 
     Raises:
-        CannotAssemble: rows without springs contradict each other.
+        CannotAssemble: constraints without springs contradict each other.
         FreeMotion: a load acts along a motion that nothing resists.
         SolverFailed: the solver for the clearances did not converge.
     """
@@ -151,7 +151,7 @@ def equilibrium(
 
 
 def without_idle_weight(movable: Movable, weight: NDArray, rows: NDArray) -> Movable:
-    """Return the motions and loads without the weight on unconstrained motions.
+    """Return the motions and loads without weights that act on unconstrained motions.
 
     It is assumed that the weight of a body that can still move freely is supported.
 
@@ -186,7 +186,7 @@ def _balancing(B_q: NDArray, drive: NDArray) -> NDArray:
 
 
 def _split(A: NDArray, tolerance: float, noise: float) -> _Split:
-    """Return the constraint rows as combinations with and without springs."""
+    """Separate the constraint equations into combinations with and without springs."""
     if not A.size:
         count = A.shape[0]
         none = np.zeros((count, 0)), np.eye(count), np.zeros((A.shape[1], 0))
@@ -200,7 +200,7 @@ def _least(
     split: _Split, A_u: NDArray, right: NDArray, movable: Movable, by_motions: NDArray,
     last: NDArray, noise: float,
 ) -> tuple[NDArray, NDArray, NDArray]:  # fmt: skip
-    """Return the motions within clearances, the springs and the multipliers."""
+    """Return motions within clearances, spring deformations and multipliers."""
     S = split.values
     h, rigid = right @ split.elastic / S, right @ split.rigid
     if not A_u.shape[1]:

@@ -1,7 +1,7 @@
-"""Influence of the order of joins on the assembled machine.
+"""Influence of the order of joining steps (joins) on the assembled machine.
 
-A join can lock its present opening G_k x.  The set S of earlier joins has changed this
-opening by A_kS lambda_S + B_k q, where
+Join k can lock the present opening G_k x of its closure.  The set S of earlier joins
+has changed this opening by A_kS lambda_S + B_k q, where
 
 ======  ======================  =====================================================
 symbol  code                    meaning
@@ -34,7 +34,7 @@ _FREE = 1e-11  # [-] tolerance for zero stiffnesses, relative to the largest
 
 @dataclass(frozen=True, eq=False)
 class Influence:
-    """Influence of one join on the opening that another join locks.
+    """Influence of a join on the opening that another join locks.
 
     Attributes:
         locked: step that locks its present opening.
@@ -42,7 +42,8 @@ class Influence:
         coefficients: (p, r) [rad, m per N m, N] change of p locked components per unit
             of r components of the closing wrench.
         free: whether a free motion changes both openings.
-        zero: whether the join does not change the opening for any errors.
+        zero: whether ``joined`` never changes the opening, whatever the geometric
+            errors.
     """
 
     locked: str
@@ -117,7 +118,7 @@ def influences(machine: Machine, state: State, run: Sequence[Join]) -> list[Infl
 
 
 def _moving_alone(moved: list[NDArray], j: int) -> NDArray:
-    """Return the free motions that change only the opening at join j, as columns."""
+    """Return the free motions that change no opening except at join j, as columns."""
     others = np.vstack([np.zeros((1, moved[j].shape[1])), *moved[:j], *moved[j + 1 :]])
     return null_space(others, rcond=_ZERO) if others.size else np.zeros((0, 0))
 
@@ -138,7 +139,7 @@ def _size(A: NDArray) -> float:
 
 
 def _unit(machine: Machine, join: Join) -> NDArray:
-    """Return factors that convert reference lengths to m, for the opening at a join."""
+    """Return factors that convert the opening at a join from reference lengths to m."""
     if isinstance(join.part, str):
         frames = np.abs(machine.free).reshape(-1, 6, machine.free.shape[1]).any(axis=1)
         return machine.free_size[frames[machine.posture.robot.index(join.part)]]
@@ -146,7 +147,7 @@ def _unit(machine: Machine, join: Join) -> NDArray:
 
 
 def _rows(machine: Machine, join: Join) -> NDArray:
-    """Return the derivative of the opening at a join by springs and free motions."""
+    """Return the derivative of an opening with respect to springs and free motions."""
     ny = machine.springs.shape[1]
     if isinstance(join.part, str):
         row = machine.posture.robot.index(join.part)

@@ -40,7 +40,7 @@ def positions_left_anywhere(
     loaded = _loaded(machine, state, of_cones[1:])
     for i, rng in enumerate(rngs):
         # first assume that there are no contact forces, because small forces are
-        # uncertain; this is correct if the random walk can move
+        # uncertain; the assumption is correct if the random walk can move
         for free in (np.ones_like(loaded[i]), ~loaded[i]):
             Z = _directions(of_cones[:, free], of_motions)
             own, starts = u[i, free].copy(), _starts(machine.joints.group[free])
@@ -76,7 +76,7 @@ def free_positions(
 
 
 def _of_rows(machine: Machine, state: State) -> tuple[NDArray, NDArray]:
-    """Return the constraint rows for clearances and free motions, after a zero row."""
+    """Return the constraint equations in clearance motions and free motions."""
     rows = np.vstack([
         np.zeros((1, len(machine.cones))),
         *(h.rows for h in state.holds.values()),
@@ -97,13 +97,13 @@ def _loaded(machine: Machine, state: State, of_cones: NDArray) -> NDArray:
     cones = (group[:, None] == np.unique(group)).astype(float)
     forces = np.sqrt((state.found.multipliers @ of_cones) ** 2 @ cones)
     slack = np.maximum(0.0, 1.0 - np.sqrt(state.found.clearances**2 @ cones))
-    # the duality gap is about force times slack, so force or slack is nearly zero
+    # either the contact force or the distance from the bound is nearly zero
     scale = np.maximum(energy, 1e-18)[:, None]
     loaded = (forces > scale * slack) & (forces > _LOADED * scale)
     return loaded @ cones.T > 0
 
 
 def _starts(group: NDArray) -> NDArray:
-    """Return the first index of each cone, followed by the number of indices."""
+    """Return the index of the first motion of each cone, followed by their number."""
     first = np.unique(group, return_index=True)[1]
     return np.append(first, len(group)).astype(np.int64)

@@ -71,7 +71,7 @@ class Machine:
         return rank_tolerance(float(self.posture.mismatch))
 
     def rows(self, part: Part) -> NDArray:
-        """Return the matrix that converts screws of all frames to one screw or opening.
+        """Return the matrix that converts all frame screws to one screw or opening.
 
         Args:
             part: name of a frame, or names of the two frames of a closure.

@@ -116,8 +116,8 @@ class Adjust:
         name: name of the step.
         frame: frame whose geometric error is changed.
         components: components of the error that are changed.
-        reading: quantity to minimise, which is the screw of a frame, or the energy
-            required to close a loop.
+        reading: quantity to minimise: the screw of a frame, or the energy required to
+            close a loop.
         increment: [rad or m] increment of the adjustment; 0 if it is continuous.
         amount: (a,) or (k, a) [rad or m] given adjustment; None to compute it.
     """
@@ -237,7 +237,7 @@ def _check_join(where: str, step: Join, robot: Robot, held: Mapping) -> None:
 
 
 def _held(held: Mapping) -> str:
-    """Return the names of the steps that may be released, for error messages."""
+    """Return the names of the steps that a release can refer to, for error messages."""
     names = ", ".join(map(quoted, held))
     return f"one of {names}" if names else "an earlier step to release"
 

@@ -181,7 +181,7 @@ def _row(machine: Machine, step: Join) -> int:
 def _join(
     machine: Machine, state: State, step: Join, blank: StepResult
 ) -> tuple[State, StepResult]:
-    """Return the state and the result after a closure is joined."""
+    """Return the state after a closure is joined, and the result of this step."""
     assert not isinstance(step.part, str)
     hold = closed_rows(machine, state, step.part)
     opening = machine.opening(state.errors, state.found, state.holds, hold)
@@ -213,7 +213,7 @@ def _join(
 
 
 def _share(linear: bool, limit: float, needed: NDArray, force: Callable) -> NDArray:
-    """Return the fraction of each opening that a limited force can close, (k,)."""
+    """Return the fraction of an opening that a limited closing force closes, (k,)."""
     share = np.minimum(1.0, limit / np.maximum(needed, 1e-300))
     if linear:
         return share  # the closing force is proportional to the fraction
@@ -226,7 +226,7 @@ def _share(linear: bool, limit: float, needed: NDArray, force: Callable) -> NDAr
 
 
 def _blank(machine: Machine, state: State, step: Step) -> StepResult:
-    """Return the result of a step that changes nothing."""
+    """Return a result in which the step has not changed the state."""
     k = len(state.errors)
     zero, six, empty = np.zeros(k), np.zeros((k, 6)), np.zeros((k, 0))
     return StepResult(
@@ -253,7 +253,7 @@ def _wrenches(machine: Machine, state: State) -> dict[str, NDArray]:
 def _told(
     machine: Machine, before: State, after: State, result: StepResult
 ) -> tuple[State, StepResult]:
-    """Return the state after a step, and the result of the step including energies."""
+    """Return the state after a step, and its result with energies and wrenches."""
     step = result.step
     kept = [after.loads[name] for name in after.loads if name in before.loads]
     load_work = machine.work(kept, after) - machine.work(kept, before)
