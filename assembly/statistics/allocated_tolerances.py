@@ -39,17 +39,17 @@ class Allocation:
         plan: costs and limits.
         tolerances: (G,) [rad or m] tolerance of each class.
         price: cost of the tolerances.
-        uniformly_scaled: (G,) [rad or m] solution of the convex programme, multiplied
-            by one common factor so that all limits are satisfied.
+        uniformly_scaled: (G,) [rad or m] tolerances that are proportional to the
+            solution of the convex programme and satisfy all limits.
         price_uniformly_scaled: cost of ``uniformly_scaled``, at least ``price``.
         price_bound: lower bound on the minimum cost. NaN if the yield is below 1 or a
             limit is not convex.
         cuts: number of cutting planes in the convex programme.
-        worst: for each limit, the value at the worst corner found and the proven upper
-            bound over all postures (NaN without a proof). Empty if the yield is below
-            1.
-        proven_scale: factor <= 1 on all tolerances at which the proven upper bounds
-            satisfy the limits. NaN without a proof.
+        worst: for each limit, the largest value found at corners of the tolerance box,
+            and a proven upper bound over all postures (NaN without a proof). Empty if
+            the yield is below 1.
+        proven_scale: common factor <= 1 on all tolerances for which the proven upper
+            bounds satisfy the limits. NaN without a proof.
         verification: yields estimated from new random draws, with confidence intervals.
         perfect_parts: for each limit on a pose error, the pose error [rad or m] of a
             robot without geometric errors, and its posture.
@@ -124,7 +124,7 @@ def allocation_of(allocation: Allocation) -> dict[str, Any]:
 
 
 def price_shares(allocation: Allocation) -> NDArray:
-    """Return the contribution of each class to the cost saved by larger tolerances.
+    """Return the share of each class in the cost that larger tolerances would save.
 
     The saving is the derivative of the cost with respect to the logarithm of the
     tolerance, with a minus sign. For the reciprocal cost law it is cost / tolerance.
@@ -147,10 +147,10 @@ def price_shares(allocation: Allocation) -> NDArray:
 def _taken(
     allocation: Allocation, key: str, reached: float, at: str
 ) -> dict[str, float | str]:
-    """Return the pose error due to clearances and the cost without clearances."""
+    """Return a limited pose error without geometric errors, and its effect on cost."""
     plan, limit = allocation.plan, allocation.plan.limits[key]
-    # The pose error is about the sum of a term due to clearances and a term that is
-    # proportional to the tolerances.
+    # The pose error is approximately the pose error due to clearances plus a term that
+    # is proportional to the tolerances.
     looser = limit / (limit - reached) if reached < limit else np.inf
     without = allocation.price / looser
     if plan.cost == "logarithm":
@@ -162,7 +162,7 @@ def _taken(
 
 
 def _distribution(plan: Plan) -> dict[str, Any]:
-    """Return the name and the cut-off of the error distribution."""
+    """Return the name and the truncation of the error distribution."""
     sources = plan.sources
     own = sources.independent if isinstance(sources, CalloutSources) else sources
     kind = "as in the robot file" if own is None else KINDS[int(own.kind[0])]
@@ -251,7 +251,7 @@ def _taken_text(key: str, one: dict[str, Any]) -> str:
 
 
 def _looks_text(check: dict[str, Any]) -> str:
-    """Format the number of verification tests and their confidence levels as text."""
+    """Format the number of verifications and their joint confidence level as text."""
     left = check["yield"]["undecided"]
     undecided = f", {left} draws undecided" if left else ""
     return (

@@ -9,9 +9,9 @@ neither is a yield below 1. For limits on them,
 :mod:`forcefit.assembly.statistics.least_cost` starts from that solution and finds a
 local minimum of the cost.
 
-Finally, all tolerances are multiplied by the largest common factor with which random
-draws, or the worst corners of the tolerance box, satisfy every limit. The result is
-verified with new random draws.
+Finally, all tolerances are multiplied by a common factor. It is the largest factor
+with which random draws (or, for a yield of 1, the worst corners of the tolerance box)
+satisfy every limit. The result is verified with new random draws.
 """
 
 from collections.abc import Callable, Sequence
@@ -112,7 +112,7 @@ def _scaled_tolerances(
     proportions: NDArray,
     progress: Callable[[str, int, int], None],
 ) -> tuple[NDArray, NDArray]:
-    """Return the minimum-cost tolerances and the uniformly scaled ones."""
+    """Return the minimum-cost tolerances and the uniformly scaled tolerances."""
     samples = draw_samples(requirement, TRAINING)
     if requirement.is_convex:
         uniformly_scaled = scale_uniformly(

@@ -1,4 +1,4 @@
-"""Clearance positions if a passive joint may reach its motion limit.
+"""Joint positions within clearances if a passive joint may reach its motion limit.
 
 The linear response omits the motion limits of passive joints, because clearances rarely
 move a joint so far. If a joint may reach a limit in a draw, that draw is solved
@@ -24,7 +24,7 @@ ASSUMPTION = "frozen"
 
 
 def draws_at_bounds(prepared: LinearResponse, draws: Assembly) -> NDArray:
-    """Return in which draws a passive joint may reach its motion limit.
+    """Return a mask of draws in which a passive joint may reach its motion limit.
 
     Args:
         prepared: linear response of the posture.
@@ -52,7 +52,7 @@ def draws_at_bounds(prepared: LinearResponse, draws: Assembly) -> NDArray:
 
 
 def _moves_platform(prepared: LinearResponse) -> NDArray:
-    """Return which free motions move the platform with all loops closed, (nq,) bool."""
+    """Return a mask (nq,) of free motions that move the platform."""
     mismatch = prepared.posture.mismatch
     A_q = prepared.closures @ prepared.joints.free
     P_q = prepared.platform @ prepared.joints.free
@@ -69,8 +69,9 @@ def bounded_position(
     Args:
         draws: solutions for random draws at one posture.
         i: index of the draw.
-        wrench: (6,) [N m, N] wrench that moves the platform into contact; None to
-            sample the platform screw uniformly from its feasible set.
+        wrench: (6,) [N m, N] wrench that pushes the platform until joints are in
+            contact (contact model); None for uniformly distributed positions (uniform
+            model).
         rng: random number generator for the uniform model.
 
     Returns:

@@ -29,7 +29,7 @@ from forcefit.assembly.statistics.joint_fits import (
 from forcefit.assembly.statistics.ranking import group_of, kind_of
 from forcefit.inputs.table import BadInput
 
-_SAMPLE = 1 << 14  # number of draws from which the variance of a fit is estimated
+_SAMPLE = 1 << 14  # number of draws for estimating the variance of a fit
 _WORDS = 4  # number of random numbers per step of the Philox generator
 
 
@@ -63,7 +63,7 @@ class CalloutSources:
 
     @cached_property
     def columns(self) -> list[NDArray]:
-        """Column indices of the random numbers of each callout."""
+        """Column indices of each callout's random numbers."""
         widths = [sum(placed.zone.dimensions) for placed in self.placed]
         ends = self._independent_count + np.cumsum(widths)
         return [np.arange(e - w, e) for e, w in zip(ends, widths, strict=True)]
@@ -158,7 +158,7 @@ class CalloutSources:
         return np.hstack(parts)
 
     def _share_sizes(self, parts: list[NDArray]) -> None:
-        """Use one random number wherever the size of the same hole is needed."""
+        """Use the same random number for all callouts and fits of a hole."""
         sizes: dict[str, NDArray] = {}
         for part, placed in zip(parts[1:], self.placed, strict=False):
             if placed.hole:
@@ -214,7 +214,7 @@ class CalloutSources:
 
     @property
     def identity(self) -> list[NDArray]:
-        """Arrays that are equal if and only if two objects produce the same draws."""
+        """Arrays that are equal for two objects if and only if their draws are."""
         own = [] if self.independent is None else self.independent.identity
         for p in self.placed:
             law = [DISTRIBUTIONS.index(p.callout.distribution), p.callout.cp]
@@ -232,19 +232,19 @@ Sources = ErrorSources | CalloutSources
 
 
 def _length(end: FittedEnd | None) -> list[float]:
-    """Return the length of a fitted end, or nothing for a radial clearance."""
+    """Return a list with the length of a fitted end, or an empty list."""
     return [] if end is None else [end.length]
 
 
 def _nth(uniforms: Callable[[int], list[NDArray]], i: int) -> Callable[[int], NDArray]:
-    """Return a function that returns the random numbers of callout i for an attempt."""
+    """Return the function for the random numbers of callout i."""
     return lambda attempt: uniforms(attempt)[i]
 
 
 def _uniforms(
     first: int, count: int, seed: int, stream: int, words: int, attempt: int
 ) -> NDArray:
-    """Return uniform random numbers, (count, words), which differ between attempts."""
+    """Return uniform random numbers of draws from ``first``, (count, words)."""
     steps = -(-max(1, words) // _WORDS)
     philox = np.random.Philox(
         key=np.array([seed, stream], dtype=np.uint64),

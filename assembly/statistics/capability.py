@@ -1,7 +1,7 @@
 """Process capability indices Cp and Cpk, and parts per million outside the limits.
 
-Normal data may have one or two limits. Draws from other distributions have an upper
-limit.
+Functions for normal data accept one or two limits. Functions for draws from other
+distributions require an upper limit.
 
 Sources:
     Rodriguez (1992), Recent developments in process capability analysis, J. Quality
@@ -29,7 +29,7 @@ class Capability:
     Attributes:
         cp: value and confidence bounds (lower, upper); NaN unless there are two limits.
         cpk: value and confidence bounds (lower, upper).
-        share_outside: estimated probability of a value outside the limits.
+        share_outside: estimated probability that a value is outside the limits.
     """
 
     cp: tuple[float, float, float]
@@ -74,7 +74,7 @@ def capability(
 
 
 def share_outside(cpk_upper: float, cpk_lower: float) -> float:
-    """Return the probability of a normal variable outside its limits."""
+    """Return the probability that a normal variable is outside its limits."""
     return float(norm.sf(3 * cpk_upper) + norm.sf(3 * cpk_lower))
 
 
@@ -146,7 +146,7 @@ def quantile_cp(
 ) -> tuple[float, float, float]:
     """Compute Cp of magnitudes, which lie between zero and an upper limit.
 
-    Cp is limit / (99.865 % quantile - 0.135 % quantile).  For a normal distribution
+    Cp is limit / (99.865 % quantile - 0.135 % quantile). For a normal distribution
     between the limits zero and ``limit`` this equals the usual index.
 
     Args:
@@ -171,12 +171,12 @@ def quantile_cp(
 def draws_capability(
     values: ArrayLike, exceeds: Mapping[str, Any], level: float = 0.95
 ) -> dict[str, Any]:
-    """Compute Cp, Cpk and the parts per million of draws above a limit.
+    """Compute Cp, Cpk and the number of draws above a limit in parts per million.
 
     Args:
-        values: (k,) draws; a NaN (draw without a solution) counts as above the limit.
-        exceeds: ``limit``, its ``unit``, and the ``probability`` of a value above the
-            limit with the bounds ``lower`` and ``upper``.
+        values: (k,) draws; NaN for a draw without a solution, which exceeds the limit.
+        exceeds: dictionary with ``limit``, its ``unit``, the ``probability`` that the
+            limit is exceeded, and its confidence bounds ``lower`` and ``upper``.
         level: confidence level of the intervals.
 
     Returns:

@@ -12,9 +12,8 @@ contact  in contact under a platform wrench of random direction
 least    the position in the computed minimum-energy solution, which is not unique
 ======== =====================================================================
 
-The contact model requires a contact length: the ratio of random moments to random
-forces. The positions depend on it, so every result contains it. No contact length is
-needed if the service load is given.
+The contact model uses random moments and random forces, whose ratio is the contact
+length. The positions depend on this length, so every result contains it.
 """
 
 from collections.abc import Sequence
@@ -32,7 +31,7 @@ from forcefit.assembly.statistics.bounded_motion import (
 )
 from forcefit.assembly.statistics.linear_response import LinearResponse
 
-# valid values of the option --clearance, and descriptions for output
+# valid values of the option --clearance, with descriptions for reports
 CLEARANCE_MODELS = {
     "worst": "largest pose errors over all positions within the clearances, eq. (27)",
     "uniform": "uniformly distributed positions within the clearances",
@@ -94,7 +93,7 @@ def _moved_clearances(
     prepared: LinearResponse, draws: Assembly, left: NDArray, wrenches: NDArray | None,
     generators: Sequence[np.random.Generator],
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
-    """Return the displacements of selected draws, and whether their walks mixed."""
+    """Return new platform screws of some draws, and whether random walks mixed."""
     clearances, mixed = draws.clearances.copy(), np.ones(len(left), dtype=bool)
     loaded = loaded_clearances(prepared, draws)
     patterns, pattern_of_draw = np.unique(loaded, axis=0, return_inverse=True)
@@ -128,7 +127,7 @@ def clearance_means(clearance: str, contact_length: float | None = None) -> str:
 def _random_wrenches(
     generators: Sequence[np.random.Generator], length: float
 ) -> NDArray:
-    """Return random platform wrenches, (k, 6), with moments scaled by the length."""
+    """Return random platform wrenches, (k, 6); the contact length scales moments."""
     scale = np.repeat([1.0, 1.0 / length], 3)
     wrenches = np.array([rng.normal(size=6) for rng in generators])
     return wrenches.reshape(-1, 6) * scale
@@ -138,7 +137,7 @@ def _at_random(
     prepared: LinearResponse, loaded: NDArray, clearances: NDArray,
     generators: Sequence[np.random.Generator],
 ) -> tuple[NDArray, NDArray]:  # fmt: skip
-    """Return uniformly distributed clearances, and whether each random walk mixed."""
+    """Return uniformly distributed positions, and whether each random walk mixed."""
     from forcefit.assembly.solvers.uniform_clearance import sample_uniform_position
 
     free = ~loaded
@@ -158,7 +157,7 @@ def _at_random(
 def _at_contact(
     prepared: LinearResponse, loaded: NDArray, clearances: NDArray, wrenches: NDArray
 ) -> NDArray:
-    """Return the clearances at contact under platform wrenches, (k, 6)."""
+    """Return the joint positions in contact under platform wrenches (k, 6)."""
     from forcefit.assembly.statistics.contact_positions import move_to_contact
 
     rows, free = clearance_constraints(prepared, loaded), ~loaded
@@ -170,7 +169,7 @@ def _at_contact(
 
 
 def free_starts(prepared: LinearResponse, free: NDArray) -> NDArray:
-    """Return the index of the first free clearance of each cone, (cones + 1,)."""
+    """Return the index of each cone's first free clearance, (cones + 1,)."""
     sizes = np.diff(prepared.starts)[free[prepared.starts[:-1]]]
     return np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
 
@@ -182,7 +181,7 @@ def _at_contact_alone(
     clearances: NDArray,
     direction: NDArray,
 ) -> NDArray:
-    """Return the farthest clearance position, (nu,), by conic optimisation."""
+    """Return the positions, (nu,), farthest along a direction by a cone program."""
     group = np.unique(prepared.joints.group[free], return_inverse=True)[1]
     none, size = np.zeros((0, int(free.sum()))), np.linalg.norm(direction[free])
     solution = minimise_energy(
@@ -199,20 +198,20 @@ def _at_contact_alone(
 
 
 def loaded_clearances(prepared: LinearResponse, draws: Assembly) -> NDArray:
-    """Return which clearances transmit a force at their bound, (k, nu) bool."""
+    """Return a mask (k, nu) of clearances that transmit a contact force."""
     forces = draws.multipliers @ (_cone_columns(prepared))
     if prepared.loads is not None:
         forces += prepared.loads.joint @ prepared.joints.cones
     force_sizes = _sizes(forces, prepared.starts)
     slack = np.maximum(0.0, 1.0 - _sizes(draws.clearances, prepared.starts))
-    # By complementary slackness, either the contact force or the slack is nearly zero.
+    # Either the contact force or the distance from the bound is nearly zero.
     scale = np.maximum(draws.energy, 1e-18)[:, None]
     loaded = (force_sizes > scale * slack) & (force_sizes > 1e-9 * scale)
     return np.repeat(loaded, np.diff(prepared.starts), axis=1)
 
 
 def clearance_constraints(prepared: LinearResponse, loaded: NDArray) -> NDArray:
-    """Return the equations for the free clearances as orthonormal rows, (p, nu)."""
+    """Return orthonormal closure equations of the free clearances, (p, nu)."""
     rows = np.vstack([prepared.G, prepared.H]) * ~loaded
     _, S, Vt = np.linalg.svd(rows, full_matrices=False)
     return np.ascontiguousarray(Vt[S > 1e-10 * S.max(initial=0.0)])

@@ -1,4 +1,4 @@
-"""Positions of joints in contact, for given directions in clearance space."""
+"""Joint positions within clearances that are farthest along given directions."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,11 +12,11 @@ def move_to_contact(
     rows: NDArray, starts: NDArray, free: NDArray, positions: NDArray,
     directions: NDArray,
 ) -> NDArray:  # fmt: skip
-    """Find the farthest point of the set of clearance positions in each direction.
+    """Find the joint positions that are farthest along each direction.
 
     Args:
-        rows: (p, nu) orthonormal rows of the closure equations, zero for clearances
-            that are not ``free``.
+        rows: (p, nu) orthonormal rows of the closure equations; entries are zero for
+            clearances that are not ``free``.
         starts: (cones + 1,) index of the first clearance of each cone, and finally nu.
         free: (nu,) bool, True for clearances in which the joint may move; equal for all
             components of a cone.

@@ -5,8 +5,8 @@ Two types of requirements are convex in the tolerances t:
 - *yield 1*: a limit on the margin or the energy at every corner of the tolerance box.
   For every vector s of signs, the quantity ``m(t s)`` is convex in t.
 - *yield below 1*: a limit on the mean of the worst fraction (1 - yield) of many fixed
-  draws s. This mean is the conditional value at risk. The limit on it is stricter than
-  the required yield.
+  draws s. This mean is the conditional value at risk. A limit on this mean is
+  stricter than the required yield.
 
 Each iteration minimises the cost subject to linear inequalities (cutting planes). If
 the result violates the requirement, the linearisation of the violated quantity is added
@@ -67,11 +67,11 @@ def cut_planes(
 def cheapest_within(
     plan: Plan, planes: Sequence[NDArray], least: NDArray, most: NDArray
 ) -> NDArray:
-    """Find the minimum-cost tolerances t with ``a.t <= 1`` for every plane a.
+    """Find the minimum-cost tolerances t that satisfy ``a.t <= 1`` for all a.
 
     Args:
         plan: plan with the cost coefficients.
-        planes: (G,) [1/rad or 1/m] coefficients a of each plane.
+        planes: (G,) [1/rad or 1/m] coefficients a of each cutting plane.
         least: (G,) [rad or m] smallest tolerances.
         most: (G,) [rad or m] largest tolerances.
 
@@ -137,7 +137,7 @@ def _violated(requirement: Requirement, t: NDArray) -> Iterator[NDArray]:
 
 
 def _plane(slopes: NDArray, value: float, t: NDArray, limit: float) -> NDArray:
-    """Return the coefficients a of a limit that is linearised at t, ``a.t' <= 1``."""
+    """Return the coefficients a of a limit linearised at t, ``a.t' <= 1``."""
     right = limit - value + float(slopes @ t)
     if right <= 0:
         raise BadInput(

@@ -32,7 +32,8 @@ class ErrorSets:
         screws: (6, total) [rad, m] derivative of the platform screw with respect to z.
         rigid_rows: (p, total) matrix whose product with z must be zero if the bodies
             are rigid.
-        spring_rows: (r, total) matrix whose product with z is compensated by springs.
+        spring_rows: (r, total) matrix whose product with z is the deformation of
+            springs.
         clearances: number of coordinates of z that are clearances.
         contact_rows: (q, total) matrix whose product with z must be zero because a
             joint has several contacts.
@@ -48,7 +49,7 @@ class ErrorSets:
     contact_rows: NDArray
 
     def weights_on_zones(self, along: NDArray) -> NDArray:
-        """Return weights that account for several contacts of the same joint.
+        """Return weights that account for joints with several contacts.
 
         Args:
             along: (total,) weights of the coordinates.
@@ -111,7 +112,7 @@ def error_sets(prepared: LinearResponse, sources: Sources) -> ErrorSets:
 
 
 def parts_of(sets: ErrorSets, along: NDArray) -> list[float]:
-    """Return each zone's contribution to ``max along.z`` if loops need not close.
+    """Return each zone's contribution to the maximum of ``along.z`` with open loops.
 
     Args:
         sets: zones of errors and clearances.
@@ -126,7 +127,7 @@ def parts_of(sets: ErrorSets, along: NDArray) -> list[float]:
 
 
 def rigid_parts(sets: ErrorSets, along: NDArray) -> list[float]:
-    """Return each zone's contribution to ``max along.z`` if rigid loops must close.
+    """Return each zone's contribution to the maximum of ``along.z`` with closed loops.
 
     Args:
         sets: zones of errors and clearances.
@@ -156,8 +157,8 @@ def bounds_where_closed(
         rows: (k, total) matrix whose product with z must be zero.
 
     Returns:
-        Orthonormal basis of the null space, (total, m), and one matrix (., m) for each
-        ball and for each double cone.
+        Orthonormal basis of the null space, (total, m), and the bounds as one matrix
+        (., m) for each ball and each double cone.
     """
     N = np.linalg.svd(rows)[2][len(rows) :].T
     own = list(zip(sets.zones, sets.columns, strict=True))
@@ -177,7 +178,7 @@ def _contact_rows(prepared: LinearResponse, columns: NDArray) -> NDArray:
 
 
 def _real_rows(rows: NDArray, columns: NDArray) -> NDArray:
-    """Return an orthonormal basis of the row space of ``rows @ columns``."""
+    """Return an orthonormal basis of the row space of a matrix product."""
     product = rows @ columns
     scale = np.abs(rows).max(initial=0.0) * np.linalg.norm(columns)
     _, sizes, vt = np.linalg.svd(product, full_matrices=False)
@@ -185,7 +186,7 @@ def _real_rows(rows: NDArray, columns: NDArray) -> NDArray:
 
 
 def _maps(sources: Sources) -> NDArray:
-    """Return the frame errors per unit of each random number, (n, 6, m)."""
+    """Return the geometric errors of all frames per unit of each source, (n, 6, m)."""
     if isinstance(sources, CalloutSources):
         return sources.maps
     return np.moveaxis(sources.errors(np.eye(len(sources))), 0, -1)

@@ -20,7 +20,8 @@ def proportion(successes: int, count: int, level: float = 0.95) -> dict[str, flo
     Args:
         successes: number of successes in ``count`` independent trials.
         count: number of trials, > 0.
-        level: confidence level, a lower bound on the coverage.
+        level: confidence level; the probability that the interval contains the true
+            value is at least as large.
 
     Returns:
         ``probability``, ``lower``, ``upper``.
@@ -41,7 +42,7 @@ def bracketed(
         holds: number of certain successes in ``count`` independent trials.
         fails: number of certain failures.
         count: number of trials, > 0.
-        level: confidence level, valid for all outcomes of the undecided trials.
+        level: confidence level, which is valid for every outcome of undecided trials.
 
     Returns:
         ``probability`` of a certain success, ``lower`` and ``upper`` bound on the
@@ -69,8 +70,7 @@ def quantile(values: ArrayLike, share: float, level: float = 0.95) -> dict[str, 
     # Interpolation between infinite values is not possible.
     way: Literal["linear", "higher"] = "linear" if np.isfinite(x).all() else "higher"
     low, high = stats.binom.ppf([(1 - level) / 2, (1 + level) / 2], count, share)
-    # The probability that the quantile lies below the lower bound is < (1 - level)/2,
-    # and the same applies to the upper bound.
+    # The quantile is outside each bound with a probability below (1 - level) / 2.
     below, above = int(low) - 1, int(high)
     return {
         "value": float(np.quantile(x, share, method=way)),
@@ -103,7 +103,7 @@ def most_probable(
 ) -> dict[str, float]:
     """Estimate the mode of a sample's density, with a bootstrap interval.
 
-    The density is estimated on 1024 bins by a Gaussian kernel with Silverman's width.
+    The density is estimated by a Gaussian kernel with Silverman's width on 1024 bins.
 
     Args:
         values: (k,) a sample.
@@ -139,7 +139,7 @@ def most_probable(
 
 def _modes(counts: NDArray, width: float) -> NDArray:
     """Return the mode of each smoothed histogram, refined by a parabola."""
-    # The cosine transform implies reflection of the density at both ends.
+    # The cosine transform reflects the density at both ends.
     bins = counts.shape[1]
     decay = np.exp(-0.5 * (np.pi * np.arange(bins) / bins * width) ** 2)
     density = fft.idct(fft.dct(counts.astype(float), axis=1) * decay, axis=1)

@@ -31,7 +31,7 @@ from forcefit.inputs.renamed import renamed_fields, warn_renamed
 from forcefit.inputs.table import BadInput
 from forcefit.results.display import html_table, short_repr
 
-# required difference between upper and lower bound, relative to a limit
+# required precision of pose error bounds, relative to a limit
 _PRECISION = 1e-3
 
 
@@ -114,7 +114,7 @@ class Experiment:
 
     @cached_property
     def zones(self) -> dict[str, PostureMargins]:
-        """Problem (21) of the posture for each margin, by name."""
+        """Problem (21) at the posture for each margin, by name of the margin."""
         if not self.margins:
             return {}
         return {k: prepare_margins(self.posture, r) for k, r in MARGINS.items()}
@@ -135,7 +135,7 @@ class Experiment:
 
     @cached_property
     def record_type(self) -> np.dtype:
-        """Data type of a record with the quantities of one draw."""
+        """Data type of a record, which contains the results of one draw."""
         shapes: dict[str, tuple[int, ...]] = {
             "energy": (), "duality_gap": (), "platform_screw": (6,), "rotation": (),
             "translation": (), "force": (), "moment": (), "stress": (len(self.links),),
@@ -150,7 +150,7 @@ class Experiment:
         return np.dtype([*fields, *((name, "u1") for name in [*flags, "status"])])
 
     def check_limits(self, limits: Iterable[str]) -> None:
-        """Reject limits on quantities that are not computed.
+        """Raise an error for limits on quantities that are not computed.
 
         Raises:
             BadInput: there is a limit on a margin or a stress that is not computed.
@@ -165,12 +165,12 @@ class Experiment:
                 )
 
     def solve(self, first: int, count: int) -> NDArray:
-        """Return the records of draws ``first`` to ``first + count - 1``."""
+        """Return the results of draws ``first`` to ``first + count - 1`` as records."""
         values = self.sources.draw(first, count, self.seed)
         return self.evaluate(values, range(first, first + count))
 
     def evaluate(self, values: NDArray, draws: Sequence[int] | NDArray) -> NDArray:
-        """Return the records for given errors.
+        """Return the results for given errors as records.
 
         Args:
             values: (k, m) [rad or m] errors.
@@ -188,7 +188,7 @@ class Experiment:
         else:
             parts = []
             for own, draw in zip(values, np.asarray(draws).tolist(), strict=True):
-                # Each draw has different clearances of fits.
+                # The clearances of fits differ between draws.
                 robot = self.sources.with_clearances(own)
                 one = replace(self, posture=replace(self.posture, robot=robot))
                 parts += one._bolted(own[None], np.array([draw]))
@@ -202,7 +202,7 @@ class Experiment:
     def _bolted(
         self, values: NDArray, draws: NDArray
     ) -> list[tuple[NDArray, NDArray, NDArray]]:
-        """Return records of all draws; NaN if a joint cannot be bolted."""
+        """Return the results of draws in blocks; NaN if a joint cannot be bolted."""
         try:
             return [self._without_stress(values, draws)]
         except CannotBolt:
@@ -221,7 +221,7 @@ class Experiment:
     def _without_stress(
         self, values: NDArray, draws: Sequence[int] | NDArray
     ) -> tuple[NDArray, NDArray, NDArray]:
-        """Return records without stress, the wrenches, and the loads at the tips."""
+        """Return results without stress, link wrenches, and weights at link tips."""
         robot = self.posture.robot
         bolts = bolt_generators(robot, self.seed, draws)
         errors = bolted_errors(robot, self.sources.errors(values), bolts)
@@ -269,7 +269,7 @@ def precision_for(
 
     Args:
         limits: limits by quantity.
-        share: precision relative to a limit.
+        share: required precision, relative to a limit.
 
     Returns:
         [rad, m] precision for an :class:`Experiment`.

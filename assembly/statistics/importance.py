@@ -6,9 +6,9 @@ Saltelli's design estimates both indices from (groups + 2) x draws evaluations. 
 result ``sum_j a_j e_j`` of independent errors e_j, both indices of e_i equal ``a_i^2
 var_i / sum_j a_j^2 var_j``.
 
-A draw without a solution is discarded, together with the draws that are compared with
-it. Because the errors of the remaining draws are not independent, no indices are
-reported if too many draws are discarded.
+A base draw is discarded if it, or a mixed draw compared with it, has no solution. The
+errors of the remaining draws are not independent, so no indices are reported if too
+many draws are discarded.
 
 Sources:
     Saltelli et al. (2010), Variance based sensitivity analysis of model output, table 2
@@ -41,7 +41,7 @@ class Importance:
         first: (s, d, 3) first-order indices, each with value, lower and upper bound.
         total: (s, d, 3) total indices, in the same format.
         variance: (s,) variances of the results.
-        failed: (s, d) fraction of discarded base draws. If it exceeds
+        failed: (s, d) fraction of base draws that are discarded. If it exceeds
             :data:`MOST_FAILED`, the indices are NaN.
     """
 
@@ -112,8 +112,8 @@ def sobol_indices(
 
     Args:
         design: design of k base draws and d groups.
-        results: (k (d + 2), s) results for the rows of the design; not finite for a
-            draw without a solution.
+        results: (k (d + 2), s) results for the rows of the design; NaN or infinite for
+            a draw without a solution.
         level: confidence level of the bootstrap intervals.
 
     Returns:
@@ -145,7 +145,7 @@ def sobol_indices(
 
 
 def _shares(f: NDArray, weights: NDArray, level: float) -> tuple[NDArray, NDArray]:
-    """Estimate both indices, each (3,), from results for A, B and mixed draws."""
+    """Estimate both indices of a group from results of A, B and mixed draws."""
     alone, left = f[1] * (f[2] - f[0]), 0.5 * (f[2] - f[0]) ** 2
     mean = weights @ (f[0] + f[1]) / 2
     variance = weights @ (f[0] ** 2 + f[1] ** 2) / 2 - mean**2
@@ -168,7 +168,7 @@ def linear_importance(
         groups: name and column indices of each group.
 
     Returns:
-        Fractions of the variance, (s, d), which are both the first-order and the total
+        Fractions of the variance, (s, d). They equal the first-order and the total
         indices.
     """
     parts = slopes**2 * sources.variance

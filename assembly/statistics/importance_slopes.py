@@ -1,8 +1,8 @@
 """Exact derivatives of the platform screw with respect to groups of errors.
 
-The gain of a group of errors is the root mean square of the derivatives over several
-draws and over the errors of the group, weighted by variance. The derivatives are those
-of the minimum-energy solution (22), see
+The gain of a group of errors is a root mean square of derivatives of the platform
+screw. The mean is over draws and over the errors of the group, which are weighted by
+their variances. For the derivatives of the minimum-energy solution (22), see
 :mod:`forcefit.assembly.statistics.sensitivity`.
 """
 
@@ -27,9 +27,9 @@ def platform_gains(experiment: Experiment, design: SaltelliDesign) -> NDArray:
         design: design with the groups and the draws.
 
     Returns:
-        Gains of rotation and translation, (2, d) [rad or m per rad or m]. The gain is
-        NaN for a group with angles and lengths, without a solution, and for robots with
-        bolted joints.
+        Gains of rotation and translation, (2, d) [rad or m per rad or m]. A gain is
+        NaN if the group contains both angles and lengths, if there is no solution, or
+        if the robot has bolted joints.
     """
     sources = experiment.sources
     values = design.A[:DRAWS]

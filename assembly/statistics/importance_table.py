@@ -1,12 +1,13 @@
 """Importance of errors as a data set, as a dictionary and as a text table.
 
 For each group of errors, the Sobol indices and two further values are reported. The
-*part* of a group is the standard deviation of the platform screw that is due to the
-group. The *gain* is the platform motion per unit of error, see
-:mod:`forcefit.assembly.statistics.importance_slopes`. Both values are norms.
+*part* of a group is the standard deviation of the platform screw due to this group.
+The *gain* is the platform motion per unit of error, see
+:mod:`forcefit.assembly.statistics.importance_slopes`. Both are norms over the
+components of the rotation or of the translation.
 
-Because the indices are estimates, groups with overlapping confidence intervals have a
-range of possible ranks, see :mod:`forcefit.assembly.statistics.ranking`.
+Indices are estimates, so the rank of a group is a range if its confidence interval
+overlaps others, see :mod:`forcefit.assembly.statistics.ranking`.
 """
 
 from collections.abc import Mapping
@@ -159,7 +160,7 @@ def importance_dataset(
 
 
 def _parts(variances: NDArray) -> NDArray:
-    """Compute the parts, (2, d), from the variances of the screw, (6, d)."""
+    """Compute the parts of d groups, (2, d), from screw variances, (6, d)."""
     lost = np.isnan(variances).all(axis=0)
     # The index of a constant component is NaN.
     variances = np.maximum(np.nan_to_num(variances), 0.0)
@@ -175,9 +176,9 @@ def importance_report(data: "xarray.Dataset") -> dict[str, Any]:
         data: result of :func:`importance_dataset`, possibly merged with the draws.
 
     Returns:
-        Indices, possible ranks and fraction of discarded draws of each quantity, with a
-        reason if there are no indices. Part and gain of each group. Number of base
-        draws.
+        For each quantity, the indices, possible ranks and fraction of discarded draws,
+        and a reason if there are no indices. For each group, part and gain. The
+        number of base draws.
     """
     groups = [str(g) for g in data["group"].values]
     quantities: dict[str, Any] = {}

@@ -6,7 +6,7 @@ from forcefit.assembly.callouts.fits import Fit, FittedEnd, parse_fit
 from forcefit.assembly.model.robot import Clearance, Frame, Robot
 from forcefit.assembly.statistics.ranking import kind_of
 
-# last words in frame names of universal, cylindrical and planar joints
+# endings of frame names in universal, cylindrical and planar joints
 _PARTS_OF_JOINTS = ("first", "second", "turn", "slide")
 
 
@@ -18,7 +18,7 @@ class JointFit:
         frame: name of the frame of the joint, or names of the two fitted features.
         fit: the fit.
         bounds: index of each frame whose clearance the fit determines, with the fitted
-            end; None if the fit determines the key ``radial``.
+            end; the end is None if the fit determines the key ``radial``.
     """
 
     frame: str

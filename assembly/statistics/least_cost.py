@@ -7,10 +7,10 @@ current ones. The trial tolerances are multiplied by the largest common factor w
 which the samples satisfy the limits. They are accepted if their cost is smaller.
 Otherwise, the trust region is reduced.
 
-For a yield below 1, the derivatives are averaged over the samples closest to the limit,
-which estimates the derivative of the quantile. For a yield of 1, each of the worst
-samples is linearised separately, and the worst corners of the tolerance box are
-searched in each iteration.
+For a yield below 1, the derivatives are averaged over the samples closest to the limit.
+This mean estimates the derivative of the quantile that the yield limits. For a yield
+of 1, each of the worst samples is linearised separately, and the worst corners of the
+tolerance box are searched in each iteration.
 
 Sources:
     Hong (2009), Estimating quantile sensitivities; Fletcher, Leyffer (2002), Nonlinear
@@ -33,7 +33,8 @@ from forcefit.assembly.statistics.scaling import (
 _COARSE = 1e-3  # relative precision of the scaling in intermediate iterations
 # smallest relative reduction of the cost for which a trial point is accepted
 _GAIN = 1e-4
-# initial and smallest radius of the trust region, as a factor on each tolerance
+# initial and smallest radius of the trust region, as a factor by which a tolerance can
+# change
 _LARGEST_RADIUS, _SMALLEST_RADIUS = 2.0, 1.01
 _MOST_STEPS = 60
 _PLANES = 200  # largest number of samples that are linearised for a yield of 1
@@ -49,7 +50,7 @@ def least_cost(
     Args:
         requirement: requirement at all postures.
         samples: samples of the errors that must satisfy the limits.
-        t: (G,) [rad or m] initial tolerances, up to a common factor.
+        t: (G,) [rad or m] initial tolerances, which are scaled by a common factor.
         progress: function called with the name of a computation, the number of
             finished steps and the number of all steps.
 
@@ -80,7 +81,7 @@ def least_cost(
         if _saving(plan, t, trial) > _GAIN:
             t = trial
             continue
-        # Halve the rejected step on a logarithmic scale.
+        # The new radius is half of the rejected step on a logarithmic scale.
         radius = np.exp(np.abs(np.log(trial / t)).max() / 2)
         if radius < _SMALLEST_RADIUS:
             break
@@ -89,7 +90,7 @@ def least_cost(
 
 
 def _saving(plan: Plan, before: NDArray, after: NDArray) -> float:
-    """Return the relative reduction of the cost."""
+    """Return the relative reduction of the cost by new tolerances."""
     size = plan.price(before) if plan.cost == "reciprocal" else plan.costs.sum()
     return (plan.price(before) - plan.price(after)) / size
 

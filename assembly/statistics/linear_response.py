@@ -52,15 +52,17 @@ class LinearResponse:
         misfit: (r, 6n) derivative of the scaled strains with respect to the errors.
         closing: (m, r) derivative of the closure multipliers with respect to the scaled
             strains.
-        redundant: (m, p) orthonormal combinations of closure equations to which neither
-            free motions nor springs contribute.
-        infeasible: (p, 6n) matrix redundant.T @ closures.
-        screws: (6, nu + 6n) derivative of the platform screw.
+        redundant: (m, p) orthonormal combinations of closure equations that contain
+            neither free motions nor springs.
+        infeasible: (p, 6n) product of ``redundant``, transposed, and ``closures``.
+        screws: (6, nu + 6n) derivative of the platform screw with respect to clearances
+            and errors.
         platform: (6, 6n) derivative of the platform screw with respect to the screws of
             all frames.
-        motions: (nq, nu + 6n) derivative of the free motions.
+        motions: (nq, nu + 6n) derivative of the free motions with respect to clearances
+            and errors.
         ranges: (nq,) [rad or m] limits of the free motions, which the response omits.
-        wrench: (n, 6, m) [N m, N] link wrenches for unit closure multipliers.
+        wrench: (n, 6, m) [N m, N] link wrenches due to unit closure multipliers.
         load: (6,) [N m, N] load on the platform at its origin in base axes, or None.
         gravity: (3,) [m/s^2] gravity in base axes, or None.
         loads: generalised forces of load and weight on all frames, or None.
@@ -160,7 +162,7 @@ def linear_response(
         reduced = reduce_problem(lin, joints, loads)
     A, free = lin.rows, joints.free
     closing = reduced.basis @ reduced.elastic_inverse.T @ reduced.spread
-    # equations to which neither free motions nor springs contribute
+    # closure equations that contain neither free motions nor springs
     held = np.linalg.qr(closing)[0] if closing.shape[1] else closing
     redundant = reduced.basis @ complement(reduced.basis.T @ held, RANK)
     # The pseudoinverse returns the smallest free motions that close the loops.
@@ -197,7 +199,7 @@ def linear_response(
 
 
 def _bent(reduced: Reduction, closing: NDArray) -> NDArray:
-    """Compute the deformations under load without clearances, (6n,) [rad, m]."""
+    """Compute the frame screws under load without clearances, (6n,) [rad, m]."""
     # The multipliers balance the load on the free motions at minimum energy.
     bent = reduced.spread.T @ reduced.load_springs
     springs = spring_deformations(

@@ -2,8 +2,8 @@
 
 Problems (21), (22) and (27) are solved for each draw. A draw depends only on its index
 and the seed, so the result does not depend on the number of threads. If an output file
-is given, finished blocks of draws are stored in a journal next to it, from which an
-interrupted run resumes.
+is given, finished blocks of draws are stored in a journal next to this file. An
+interrupted run resumes from the journal.
 """
 
 from collections.abc import Callable, Iterator
@@ -64,7 +64,7 @@ def run_draws(
             all draws.
         importance: options for the importance of errors, or its number of base draws;
             None to omit the importance.
-        held: exit stack whose closing removes the journal, as in
+        held: exit stack that removes the journal when it is closed, as in
             :func:`forcefit.assembly.sweeps.sweep.run_sweep`.
 
     Returns:
@@ -92,7 +92,7 @@ def _run_draws(
     """Return the data set of draws; ``held`` removes the journal when closed."""
     design = None if importance is None else importance_design(experiment, importance)
     more = 0 if design is None else len(design)
-    # First row and number of rows of each block of draws, then of each design block.
+    # First row and number of rows of each block: blocks of draws, then of the design.
     spans = [(i, min(BLOCK, count - i)) for i in range(0, count, BLOCK)]
     drawn = len(spans)
     spans += [(i, min(BLOCK, more - i)) for i in range(0, more, BLOCK)]

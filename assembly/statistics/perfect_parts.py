@@ -1,4 +1,4 @@
-"""Results for perfect parts: effect of clearances and loads without errors.
+"""Results for perfect parts, which have clearances and loads but no geometric errors.
 
 If a robot without geometric errors exceeds a limit, no tolerances can satisfy this
 limit. In the worst clearance model, the largest pose error of such a robot is a
@@ -28,8 +28,8 @@ from forcefit.assembly.statistics.worst_clearance import (
 # number of random clearance positions for the median
 _DRAWS = 200
 _PRECISION = (1e-9, 1e-9)  # [rad, m] precision of the largest pose errors
-_SHARE = 1e-3  # smallest listed contribution, relative to the sum
-_OWN = 0.02  # smallest contribution of motion limits, relative to the pose error
+_SHARE = 1e-3  # smallest reported contribution, relative to the sum
+_OWN = 0.02  # smallest reported contribution of motion limits, relative to the error
 OWN_MOTION = "own motion of passive joints"
 _EXCEEDED = 1e-9  # relative tolerance for the comparison with a limit
 
@@ -106,7 +106,7 @@ def _clearance_kinds(prepared: LinearResponse) -> list[str]:
 
 
 def stored_perfect_parts(experiment: Experiment) -> str:
-    """Return the results without errors as JSON text."""
+    """Return the results for perfect parts as JSON text."""
     return json.dumps(perfect_parts(experiment))
 
 
@@ -130,7 +130,7 @@ def limits_broken(
 
 
 def perfect_text(summary: Mapping[str, Any]) -> list[str]:
-    """Format the results without errors as lines of text."""
+    """Format the results for perfect parts as lines of text."""
     parts, lines = summary.get("perfect_parts", {}), []
     alone = {k: parts[k] for k in POSE_ERRORS if parts.get(k, {}).get("reached")}
     why = "clearances and loads alone" if summary.get("load") else "clearances alone"

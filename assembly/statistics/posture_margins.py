@@ -19,20 +19,22 @@ from forcefit.assembly.linear.zone import Compliant, Zone, zone_margin
 from forcefit.assembly.solvers.cones import cone_starts
 from forcefit.assembly.statistics.linear_response import checked_errors
 
-# [rad, reference lengths] largest infeasible error component that is treated as zero
+# [rad, reference lengths] largest error that clearances cannot compensate and that is
+# treated as zero
 _CLEARLY_INFEASIBLE = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
 class PostureMargins:
-    """Problem (21) of a posture for any errors, from :func:`prepare_margins`.
+    """Problem (21) at a posture, prepared for many sets of errors.
 
     Attributes:
         posture: posture of the robot, whose errors are not used.
         starts: (cones + 1,) index of the first clearance of each cone, and finally nu.
         B: (p, nu) orthonormal rows of the equations B u = K e for the clearances u.
         K: (p, 6n) matrix of the right-hand sides for the errors e.
-        infeasible: (.., 6n) matrix whose product with feasible errors is zero.
+        infeasible: (.., 6n) matrix whose product is zero with errors that clearances
+            can compensate.
         compliant: whether compliant joints are ``"rigid"`` or ``"free"``, see
             :mod:`forcefit.assembly.linear.zone`.
     """
@@ -51,9 +53,9 @@ class PostureMargins:
             errors: (k, n, 6) [rad, m] geometric errors delta l.
 
         Returns:
-            Margins with their certificates. If no clearances can compensate the errors,
-            the margin is inf, and the forces are those for the feasible component of
-            the errors.
+            Margins with their certificates. If no clearances can compensate the
+            errors, the margin is inf, and the forces belong to the component of the
+            errors that clearances can compensate.
 
         Raises:
             ValueError: the errors have the wrong shape, or a value is not finite.
@@ -85,7 +87,7 @@ class PostureMargins:
 
 
 def prepare_margins(posture: Posture, compliant: Compliant = "free") -> PostureMargins:
-    """Prepare problem (21) for a posture by eliminating free motions.
+    """Prepare problem (21) at a posture by eliminating free motions.
 
     Args:
         posture: the robot's configuration.

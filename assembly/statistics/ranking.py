@@ -1,4 +1,4 @@
-"""Ranks of the contributions of errors to a variance, and their names."""
+"""Ranks of error contributions to a variance, and names of errors in reports."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
@@ -17,14 +17,15 @@ NOT_DISTINGUISHED = (
 
 
 def possible_ranks(shares: Mapping[str, NDArray]) -> dict[str, tuple[int, int]]:
-    """Return the best and the worst possible rank of each share.
+    """Return the best and the worst possible rank of each contribution.
 
     Args:
-        shares: estimate and confidence bounds (lower, upper) of each share, by name.
+        shares: estimate and confidence bounds (lower, upper) of each contribution, by
+            name.
 
     Returns:
-        Best and worst rank by name. Two shares have a definite order only if their
-        confidence intervals do not overlap. Shares of NaN are omitted.
+        Best and worst rank by name. Two contributions have a definite order only if
+        their confidence intervals do not overlap. Contributions of NaN are omitted.
     """
     known = {name: v for name, v in shares.items() if np.isfinite(v).all()}
     lower, upper = np.array([v[1:] for v in known.values()]).reshape(-1, 2).T
@@ -86,7 +87,7 @@ def shares_sentence(
 
 
 def leaders(ranks: Mapping[str, Sequence[int]]) -> list[str]:
-    """Return the names of all errors that could have rank 1."""
+    """Return the names of all errors whose contribution may be the largest."""
     return [name for name, (first, _) in ranks.items() if first == 1]
 
 

@@ -29,7 +29,7 @@ class Replay:
 
     Attributes:
         journal: journal with records of type :data:`RECORD`; None to store nothing.
-        asked: number of requested results.
+        asked: number of results requested so far.
     """
 
     journal: Journal | None = None
@@ -42,7 +42,7 @@ class Replay:
 
         Args:
             compute: function that computes the result.
-            given: arguments on which the result depends.
+            given: all arguments on which the result depends.
 
         Returns:
             The return values of ``compute``, as arrays.

@@ -1,4 +1,4 @@
-"""HTML report on random errors: yields, distributions and main errors."""
+"""HTML report on random errors: yields, distributions and most important errors."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     import xarray
 
 _BINS = 60
-_GOOD = 0.95  # yield that is marked as good
+_GOOD = 0.95  # smallest yield that is marked as good
 _LISTED = 20  # largest number of rows in the table of errors
 _ASSUMED = (
     "The closure equations are linearised (small screws).",
@@ -87,14 +87,14 @@ def draws_sections(
 
 
 def _share(summary: Mapping[str, Any]) -> Mapping[str, float]:
-    """Return the yield; without limits, it is the probability of assembly."""
+    """Return the yield, or the probability of assembly if there are no limits."""
     limits: Mapping[str, float] | None = summary.get("within_limits")
     forced: Mapping[str, float] = summary["assembles"]["forced"]
     return limits or forced
 
 
 def _good(share: Mapping[str, float]) -> bool | None:
-    """Return whether the yield is at least 95 %; None if this is uncertain."""
+    """Return whether the yield is at least 95 %, or None if this is uncertain."""
     if share["lower"] >= _GOOD:
         return True
     return None if share["upper"] >= _GOOD else False
@@ -107,7 +107,7 @@ def _share_text(interval: Mapping[str, float]) -> str:
 
 
 def _draws_tiles(summary: Mapping[str, Any]) -> list[Tile]:
-    """Return tiles on the yield, the pose error and the main errors."""
+    """Return tiles on the yield, the pose error and the most important errors."""
     share = _share(summary)
     low, high = (100 * share[end] for end in ("lower", "upper"))
     words = "all limits satisfied" if "within_limits" in summary else WORDS["forced"]
@@ -126,7 +126,7 @@ def _draws_tiles(summary: Mapping[str, Any]) -> list[Tile]:
 
 
 def _yields(summary: Mapping[str, Any]) -> str:
-    """Format the probabilities as an HTML table."""
+    """Format the probabilities of assembly and of exceeded limits as an HTML table."""
     named = {WORDS[key]: one for key, one in summary["assembles"].items()}
     for key, one in summary["exceeds"].items():
         limit = f"{one['limit']:g} {one['unit']}".removesuffix(" 1")

@@ -22,7 +22,7 @@ from forcefit.results.display import html_table, short_repr
 
 CONVEX = ("margin", "margin_free", "energy")
 COSTS = ("reciprocal", "logarithm")
-# required difference between upper and lower bound, relative to a limit
+# required precision of pose error bounds, relative to a limit
 _PRECISION = 1e-4
 _BATCH = 512  # number of draws per stored result
 # random number streams; repeated verifications use the streams after FRESH
@@ -34,9 +34,9 @@ class Plan:
     """Costs of tolerances, and limits on the results.
 
     Attributes:
-        sources: m errors for tolerances of 1 rad or 1 m and for callout zones with a
-            width of 1 m.
-        group: (m,) index of each error's class.
+        sources: m random errors, scaled to tolerances of 1 rad or 1 m and to callout
+            zones with a width of 1 m.
+        group: (m,) index of the class to which each error belongs.
         names: names of the G classes.
         costs: (G,) cost coefficients, > 0.
         least: (G,) [rad or m] smallest tolerances.
@@ -45,7 +45,7 @@ class Plan:
         limits: limits by quantity: margin, margin_free, energy [J], force [N], moment
             [N m], stress [Pa], rotation [rad], translation [m].
         asked_yield: required fraction of robots that satisfy every limit at every
-            posture; 1 for all robots.
+            posture.
         draws: number of training draws per posture.
         seed: seed of all draws.
         clearance: clearance model for limits on pose errors, one of
@@ -76,11 +76,11 @@ class Plan:
     __repr__, _repr_html_ = short_repr, html_table
 
     def spread(self, tolerances: NDArray) -> NDArray:
-        """Return the tolerance of each error, (m,)."""
+        """Return the tolerance of each error, (m,), from the tolerances of classes."""
         return tolerances[self.group]
 
     def gather(self, slopes: NDArray) -> NDArray:
-        """Return the sums of the derivatives over each class, (G,)."""
+        """Return the sum of derivatives over the errors of each class, (G,)."""
         return np.bincount(self.group, weights=slopes, minlength=len(self.names))
 
     def price(self, tolerances: NDArray) -> float:
@@ -141,7 +141,7 @@ class Requirement:
 
     @cached_property
     def convex(self) -> dict[str, list]:
-        """The same as ``prepared`` for quantities that are convex in the errors.
+        """Values of ``prepared`` for the quantities that are convex in the errors.
 
         If a joint is bolted, no quantity is convex, because the clearance that the bolt
         fixes is not linear in the errors.
@@ -157,19 +157,19 @@ class Requirement:
 
     @property
     def cases(self) -> list[tuple[str, int]]:
-        """Quantity and posture index of each row of :meth:`utilisations`."""
+        """Quantity and posture index for each row of :meth:`utilisations`."""
         return [(key, i) for key in self.plan.limits for i in range(len(self.postures))]
 
     def utilisations(self, values: NDArray) -> tuple[NDArray, NDArray]:
-        """Return the quotient of each quantity and its limit.
+        """Return each limited quantity divided by its limit.
 
         Args:
             values: (k, m) [rad or m] errors.
 
         Returns:
-            Lower and upper bounds on the quotients, (limits x postures, k); for the
-            rows see :attr:`cases`. The bounds differ only for pose errors in the worst
-            clearance model. The quotients are inf without a solution.
+            Lower and upper bounds on the quotients, (limits x postures, k); inf without
+            a solution. For the rows see :attr:`cases`. Both bounds are equal except
+            for pose errors in the worst clearance model.
         """
         chunks = [
             self._batch_utilisations(values, i) for i in range(0, len(values), _BATCH)
@@ -180,7 +180,7 @@ class Requirement:
     def _batch_utilisations(
         self, values: NDArray, first: int
     ) -> tuple[NDArray, NDArray]:
-        """Return the quotients for one batch of draws."""
+        """Return the quotients of quantities and limits for one batch of draws."""
         some = values[first : first + _BATCH]
         rows = np.arange(first, first + len(some))
         keys = list(self.plan.limits)
@@ -198,7 +198,7 @@ class Requirement:
     def _quantities(
         self, i: int, values: NDArray, rows: NDArray
     ) -> tuple[NDArray, NDArray]:
-        """Return lower and upper bounds on the quantities, each (limits, k)."""
+        """Return lower and upper bounds on the limited quantities, each (limits, k)."""
         keys = list(self.plan.limits)
         rows_of_draws = None
         if any(not key.startswith("margin") for key in keys):
@@ -229,7 +229,7 @@ class Requirement:
         return self.respond(key, i, values)[1] / self.plan.limits[key]
 
     def respond(self, key: str, i: int, values: NDArray) -> tuple[NDArray, NDArray]:
-        """Return a quantity at posture i, (k,), and its derivatives, (k, m)."""
+        """Return a quantity at posture i, (k,), and derivatives by error, (k, m)."""
         size, slopes = self.replay.recall(
             lambda: respond(
                 self.prepared[key][i],

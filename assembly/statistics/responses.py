@@ -26,8 +26,8 @@ from forcefit.assembly.steps.bolted import bolted_errors
 
 _STEP = 1e-6  # finite-difference step for the stress, relative to the wrench
 _PRECISION = 1e-9  # [rad or m] precision of the largest pose errors
-# finite-difference step for robots with bolted joints, relative to the largest value of
-# an error, and smallest reference value
+# finite-difference step for robots with bolted joints, relative to the largest absolute
+# error, and smallest error to which the step is relative
 _BOLT_STEP, _LEAST_VALUE = 1e-4, 1e-6
 _PARTS = {"moment": slice(0, 3), "force": slice(3, 6)}
 
@@ -72,7 +72,7 @@ def respond(
         return draws.energy, -by_number(draws.wrenches)
     size = np.full(len(values), np.nan)
     slopes = np.full(errors.shape, np.nan)
-    # The derivatives require known clearances.
+    # Derivatives are computed only for draws with known clearances.
     known = np.isfinite(draws.energy) & np.isfinite(draws.clearances).all(axis=1)
     solved = np.flatnonzero(known)
     if len(solved):
@@ -113,7 +113,7 @@ def _pose_error(
     prepared: LinearResponse, draws: Assembly, key: str,
     model: tuple[str, float | None], numbers: NDArray,
 ) -> tuple[NDArray, NDArray, NDArray | None]:  # fmt: skip
-    """Return a pose error, and its derivatives for platform screw and clearances."""
+    """Return a pose error, and its derivatives by platform screw and by clearance."""
     part, (clearance, contact_length) = 3 * POSE_ERRORS.index(key), model
     if clearance == "worst":
         precision = (_PRECISION, np.inf) if key == "rotation" else (np.inf, _PRECISION)

@@ -10,7 +10,7 @@ from forcefit.assembly.statistics.requirement import Requirement
 from forcefit.assembly.statistics.worst_case import CORNERS, random_corners
 from forcefit.inputs.table import BadInput
 
-_FINE = 1e-4  # relative precision of the largest quotient of value and limit
+_FINE = 1e-4  # relative precision of the largest value divided by its limit
 _MOST_TRIALS = 80
 
 
@@ -33,11 +33,11 @@ def draw_samples(requirement: Requirement, stream: int, times: int = 1) -> Sampl
     Args:
         requirement: requirement at all postures.
         stream: random number stream.
-        times: factor on the plan's number of draws.
+        times: factor on the number of draws in the plan.
 
     Returns:
-        The samples. The allowed number of violations demonstrates the required yield
-        with 95 % confidence.
+        The samples. If no more than the allowed number violates a limit, the required
+        yield is demonstrated with 95 % confidence.
 
     Raises:
         BadInput: there are too few draws to demonstrate the yield.
@@ -54,7 +54,7 @@ def draw_samples(requirement: Requirement, stream: int, times: int = 1) -> Sampl
 def with_worst_corners(
     requirement: Requirement, samples: Samples, t: NDArray
 ) -> Samples:
-    """Add the worst corner for each limit and posture to samples.
+    """Add the worst corner of the tolerance box for each limit and posture to samples.
 
     Args:
         requirement: requirement at all postures, with a yield of 1.
@@ -88,7 +88,7 @@ def scale_uniformly(
         requirement: requirement at all postures.
         samples: samples of the errors.
         t: (G,) [rad or m] tolerances.
-        precision: relative precision of the largest quotient of value and limit, or of
+        precision: relative precision of the largest value divided by its limit, or of
             the factor.
 
     Returns:
@@ -137,7 +137,7 @@ def _next_factor(
     low: float, high: float, factor: float, utilisation: float, power: float,
     precision: float,
 ) -> float:  # fmt: skip
-    """Return the next trial value of the factor on all tolerances."""
+    """Return the next trial value of a common factor on all tolerances."""
     if 0 < utilisation < np.inf:
         guess = factor * ((1 - precision / 2) / utilisation) ** (1 / power)
         if low * (1 + precision / 4) < guess < high * (1 - precision / 4):
@@ -149,7 +149,7 @@ def _next_factor(
 
 def _allowed_failures(draws: int, asked: float) -> int:
     """Return the largest number of violations that demonstrates a yield."""
-    # The lower bound decreases with the number of failures, so bisection applies.
+    # The lower bound on the yield decreases with the number of failures.
     low, high = -1, draws
     while high - low > 1:
         middle = (low + high) // 2

@@ -1,4 +1,4 @@
-"""3D scenes of robots with geometric errors, and maps of assembly margins."""
+"""3D scenes of robots with geometric errors, and maps of margins over postures."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -28,7 +28,7 @@ _CAPTION = (
 
 
 def drawn_robot(experiment: Experiment, data: "xarray.Dataset") -> str:
-    """Show the random draw whose pose error is closest to the 95 % quantile.
+    """Show the robot in the draw whose pose error is closest to the 95 % quantile.
 
     Args:
         experiment: experiment that produced the draws.
@@ -81,7 +81,7 @@ def _forced_robot(
     *,
     why: str,
 ) -> str:
-    """Return a scene of an assembled robot; empty if there is no solution."""
+    """Return the scene of an assembled robot, or an empty text without a solution."""
     try:
         forced = solve_assembly(posture, load, gravity=gravity)
     except (CannotAssemble, SolverFailed):

@@ -1,7 +1,7 @@
 """Derivatives of a minimum-energy solution with respect to geometric errors.
 
 By duality, the derivative of the minimum energy (22) with respect to the error delta l
-of a frame is minus the wrench w that the body transmits.
+of a frame is -w, where w is the wrench through its body.
 
 The derivatives of wrenches and platform screw are obtained by differentiating the
 optimality conditions for constant active clearances:
@@ -12,8 +12,9 @@ so du is orthogonal to u_c in every active cone, and
 
     P (G^T G + nu) P du + P H^T deta = -P G^T dh,   H P du = dk
 
-where P is the projector on these directions. By the adjoint method, a single solution
-of the transposed equations gives the derivatives with respect to all errors.
+where P is the projector on the directions orthogonal to these u_c. By the adjoint
+method, the transposed equations are solved once for the derivatives with respect to all
+errors.
 """
 
 import numpy as np
@@ -23,7 +24,7 @@ from forcefit.assembly.linear.energy import Assembly
 from forcefit.assembly.solvers.conic import GAP_WITHOUT_CLEARANCE
 from forcefit.assembly.statistics.linear_response import LinearResponse
 
-# forces below this fraction of the largest clearance force are treated as zero
+# contact forces below this fraction of the largest contact force are treated as zero
 _ACTIVE = 1e-7
 # singular values below this fraction of the largest one are treated as zero
 _RANK = 1e-10
@@ -38,7 +39,8 @@ def energy_slopes(assembly: Assembly) -> NDArray:
 
     Returns:
         Derivatives with respect to delta l, (n, 6) [J/rad, J/m], in frame axes. For
-        overconstrained rigid bodies, they are those of the smallest wrenches.
+        overconstrained rigid bodies, wrenches are not unique, and the smallest ones are
+        used.
     """
     return -assembly.wrenches
 
@@ -54,12 +56,12 @@ def solution_slopes(
         draws: solutions for k draws, from :meth:`LinearResponse.solve`.
         by_wrench: (k, n, 6) derivatives of the function with respect to the wrenches.
         by_screw: (k, 6) derivatives with respect to the platform screw.
-        by_clearance: (k, nu) derivatives with respect to the clearances, relative to
-            their bounds.
+        by_clearance: (k, nu) derivatives with respect to the clearance motions, which
+            are relative to their bounds.
 
     Returns:
-        Derivatives with respect to delta l, (k, n, 6), in frame axes. For a weakly
-        active clearance, the derivative is one-sided. Clearances that the minimum
+        Derivatives with respect to delta l, (k, n, 6), in frame axes. At a contact
+        with zero force, the derivative is one-sided. Joint positions that minimum
         energy does not determine are assumed to be constant. Motion limits of passive
         joints are ignored.
     """
@@ -96,8 +98,7 @@ def _active_clearances(
     """Return the projectors P and the multipliers nu, each (k, nu, nu)."""
     k, nu = forces.shape
     P, N = np.tile(np.eye(nu), (k, 1, 1)), np.zeros((k, nu, nu))
-    # Inside an assembly zone, the forces are round-off errors, and no clearance is
-    # active.
+    # Inside an assembly zone, contact forces are round-off, so no clearance is active.
     pressed = draws.energy > GAP_WITHOUT_CLEARANCE * np.abs(forces).sum(
         axis=1, initial=0.0
     )

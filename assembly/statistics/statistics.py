@@ -98,8 +98,8 @@ def statistics(
         errors: path of a TOML file with error distributions (see docs/statistics.md),
             or error sources, such as those from
             :func:`forcefit.assembly.statistics.callout_sources.sources_of`. They are
-            added to the tolerances and fits in the robot file. None to use only the
-            robot file.
+            added to the errors from tolerances and fits in the robot file. None to use
+            only the robot file.
         draws: number of draws, at least 2.
         seed: seed of the random numbers.
         clearance: model of the positions within the clearances: ``"worst"``,
@@ -111,9 +111,10 @@ def statistics(
             dictionary such as ``{"fz": -50}``.
         gravity: (3,) [m/s^2] gravity in base axes; None for no gravity.
         limits: limits on results in SI units, such as ``{"translation": 2e-4}``.
-        yield_strength: [Pa] yield strength of the links, which limits their stress.
-        capability: whether Cp, Cpk and the number of parts per million above each limit
-            are computed.
+        yield_strength: [Pa] yield strength of the links, used as a limit on their
+            stress.
+        capability: whether Cp, Cpk and the parts per million above each limit are
+            computed.
         importance: number of base draws for Sobol indices; None to omit the indices.
         by: grouping of errors for the Sobol indices: ``"source"``, ``"frame"`` or
             ``"kind"``.
@@ -176,7 +177,7 @@ def statistics(
 
 
 def _check_words(**words: str | None) -> None:
-    """Raise an error if an argument is not one of its valid words."""
+    """Raise an error if a text argument has no valid value."""
     for name, word in words.items():
         if word not in _WORDS[name]:
             valid = [one for one in _WORDS[name] if one is not None]

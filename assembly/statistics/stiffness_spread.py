@@ -25,7 +25,7 @@ from forcefit.results.display import numbers
 from forcefit.stiffness.screws import WRENCH
 
 _NAMED = 5  # largest number of reported free motions
-_ALIKE = 2  # number of decimals for the comparison of motions
+_ALIKE = 2  # number of decimals to which equal motions agree
 
 
 def draw_stiffnesses(
@@ -76,9 +76,9 @@ def stiffness_report(
         level: confidence level.
 
     Returns:
-        For each axis: number of draws with a result, fractions of draws with zero and
-        with infinite stiffness, and mean and quantiles of the other draws. Also the
-        most frequent free motions.
+        For each axis, the number of draws with a result, the fractions of draws with
+        zero and with infinite stiffness, and mean and quantiles of the other draws.
+        Also the most frequent free motions.
     """
     axes: dict[str, Any] = {}
     for name, values in zip(WRENCH, stiffnesses.T, strict=True):

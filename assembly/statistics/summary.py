@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     import xarray
 
 QUANTILES = (0.05, 0.5, 0.95, 0.99)
-_ROUNDING = 1e-18  # values below this fraction of the maximum are treated as zero
+_ROUNDING = 1e-18  # energies below this fraction of the maximum are treated as zero
 _MARGINS = {"margin": "rigid", "margin_free": "rigid_compliant_free"}
 WORDS = {
     "forced": "assembles, by force if necessary",
@@ -64,11 +64,11 @@ def summarise(
         capable: whether Cp, Cpk and parts per million are computed for every limit.
 
     Returns:
-        Number of ``draws`` and number of ``assembled`` draws. Clearance model and
-        ``contact_length`` [m]. Probabilities that a draw ``assembles``, ``exceeds``
-        each limit, and is ``within_limits``. Results for ``perfect_parts``. Mean,
-        quantiles and most probable value of every quantity over the assembled draws.
-        Mean, covariance and most probable value of the platform screw.
+        Dictionary with the number of ``draws`` and of ``assembled`` draws; the
+        clearance model and ``contact_length`` [m]; the probabilities that a draw
+        ``assembles``, ``exceeds`` each limit, and is ``within_limits``; results for
+        ``perfect_parts``; mean, quantiles and most probable value of each quantity over
+        assembled draws; mean, covariance and most probable value of the platform screw.
 
     Raises:
         BadInput: a limited quantity was not computed.
@@ -149,7 +149,7 @@ def _yields(
             )
         values, lower = _worst(data, key), f"{key}_lower"
         over = ~(values <= limit)
-        # Largest pose errors have a lower and an upper bound.
+        # The largest pose errors are known by a lower and an upper bound.
         least = data[lower].values if lower in data else values
         surely = ~solved | (least > limit)
         met &= ~over
@@ -170,7 +170,7 @@ def _yields(
 
 
 def _worst(data: "xarray.Dataset", key: str) -> NDArray:
-    """Return the values of a quantity, (k,), or the maximum over all links."""
+    """Return the values of a quantity, or their maxima over all links, (k,)."""
     values = np.asarray(data[key].values, dtype=float)
     return values.max(axis=1) if values.ndim == 2 else values
 
@@ -266,7 +266,7 @@ def summary_text(summary: Mapping[str, Any]) -> str:
 
 
 def _titled(name: str, results: Mapping[str, Any]) -> str:
-    """Return the name of a quantity with the clearance model, if any."""
+    """Return the name of a quantity, followed by any clearance model."""
     return (
         f"{name} [clearance {results['clearance']}]" if "clearance" in results else name
     )

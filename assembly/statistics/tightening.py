@@ -1,4 +1,4 @@
-"""Report tiles on the errors and clearances with the largest effect."""
+"""Tiles of a report on the errors and clearances with the largest effect."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -12,7 +12,7 @@ _NAMED = 3  # largest number of names in a tile
 
 
 def tightening_tiles(summary: Mapping[str, Any]) -> list[Tile]:
-    """Return tiles on clearances, main errors and tolerances to tighten.
+    """Return tiles on clearances, most important errors and tolerances to tighten.
 
     Args:
         summary: result of :func:`forcefit.assembly.statistics.summary.summarise`.
@@ -82,7 +82,7 @@ def _clearance_tiles(summary: Mapping[str, Any]) -> list[Tile]:
 
 
 def _broken_tile(broken: Mapping[str, Any]) -> Tile:
-    """Return the tile that recommends tightening clearances."""
+    """Return a tile for a limit that is exceeded without geometric errors."""
     key, one = next(iter(broken.items()))
     largest = next(iter(one.get("clearances", {})), "")
     note: list[str | Value] = [
@@ -99,6 +99,6 @@ def _broken_tile(broken: Mapping[str, Any]) -> Tile:
 
 
 def _listed(names: list[str]) -> str:
-    """Return the first names and the number of the others as text."""
+    """Return the first names, and the number of remaining names, as text."""
     more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
     return ", ".join(names[:_NAMED]) + more

@@ -33,7 +33,7 @@ def read_plan(path: Path | str, robot: Robot) -> Plan:
 
     Args:
         path: path of the TOML file.
-        robot: robot whose errors have the tolerances.
+        robot: robot to whose errors the tolerances apply.
 
     Returns:
         The plan.
@@ -88,7 +88,7 @@ def read_plan(path: Path | str, robot: Robot) -> Plan:
 def _independent(
     robot: Robot, groups: "_Groups", distribution: str, deviations: float
 ) -> ErrorSources:
-    """Return the independent errors for tolerances of 1 rad or 1 m."""
+    """Return independent errors with tolerances of 1 rad or 1 m."""
     frame, component = np.array(list(groups.of), dtype=int).reshape(-1, 2).T
     count = len(groups.of)
     return ErrorSources(
@@ -107,7 +107,7 @@ def _independent(
 def _with_callouts(
     robot: Robot, groups: "_Groups", independent: ErrorSources | None
 ) -> tuple[CalloutSources, list[int]]:
-    """Return all errors for zone widths of 1 m, and the classes of the callouts."""
+    """Return errors for zones of width 1 m, and the class of each callout."""
     placed = place_callouts(home_posture(robot))
     unit = [
         replace(placed[k], errors=placed[k].errors / placed[k].callout.first_width)
@@ -122,7 +122,7 @@ def _with_callouts(
 
 
 class _Groups(NamedTuple):
-    """Classes of errors with the same tolerance, from ``[[tolerance]]`` tables."""
+    """Classes of errors; all errors of a class have the same tolerance."""
 
     of: dict[tuple[int, int], int]  # index of the class, by frame and component
     callouts: dict[int, int]  # index of the class, by callout
@@ -165,7 +165,7 @@ def _groups(root: Table, tables: Sequence[Table], robot: Robot) -> _Groups:
 
 
 def _callouts(table: Table, robot: Robot, callouts: dict[int, int], number: int) -> str:
-    """Add the callouts of a class, and return its default name."""
+    """Add the callouts of a class to a mapping, and return the default class name."""
     value = table.content["callouts"]
     if not isinstance(value, list) or not all(isinstance(v, str) for v in value):
         raise table.bad("callouts", "expected a list of names of [[tolerance]] entries")
@@ -192,7 +192,7 @@ def _callouts(table: Table, robot: Robot, callouts: dict[int, int], number: int)
 
 
 def _choice(table: Table, key: str, valid: tuple[str, ...]) -> str:
-    """Return the value of a key, by default the first valid word."""
+    """Return the value of a key, or the first valid value if the key is missing."""
     word = table.text(key, valid[0])
     if word not in valid:
         raise table.bad(key, f"found {quoted(word)}{nearest(word, valid)}")
@@ -211,7 +211,7 @@ def _limits(table: Table) -> dict[str, float]:
 
 
 def _places(table: Table, robot: Robot) -> tuple[list[tuple[int, int]], int]:
-    """Return frames and components of a class; and 0 for angles, 1 for lengths."""
+    """Return frames and components of a class, and 0 for angles or 1 for lengths."""
     names = table.require("frames", "a list of frame names")
     parts = table.require("components", 'a list such as ["TX"]')
     for key, value in (("frames", names), ("components", parts)):

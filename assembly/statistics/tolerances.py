@@ -33,8 +33,8 @@ def grid_postures(robot: Robot, grid: str) -> tuple[list[Posture], dict[str, int
         grid: grid such as ``"tx=-0.2:0.2:0.1,tz=-0.5"``.
 
     Returns:
-        The postures, and the number of omitted postures by status: out of reach, or a
-        status of :func:`forcefit.assembly.kinematics.verdict.verdicts`.
+        The postures, and the number of omitted postures by status. The status is "out
+        of reach" or that of :func:`forcefit.assembly.kinematics.verdict.verdicts`.
 
     Raises:
         BadInput: the grid is invalid, or the robot reaches none of its postures.
@@ -70,7 +70,7 @@ def left_out_text(left_out: dict[str, int]) -> str:
 
 
 def identity_of(postures: Sequence[Posture], plan: Plan, fresh: int) -> dict[str, Any]:
-    """Return values that identify an allocation."""
+    """Return values that identify an allocation in a journal."""
     arrays = [p.transforms for p in postures]
     arrays += [v for v in vars(plan).values() if isinstance(v, np.ndarray)]
     arrays += plan.sources.identity
@@ -106,9 +106,10 @@ def present_errors(
             all postures.
 
     Returns:
-        Margins, largest margin and its posture, and factor on all errors for a largest
-        margin of 1. Derivatives of margin and energy with respect to each error at this
-        posture, in order of decreasing effect on the margin.
+        Margins of all postures, the largest margin and its posture, and the factor on
+        all errors for which the largest margin is 1. Also, at this posture,
+        derivatives of margin and energy with respect to each error, by decreasing
+        effect on the margin.
     """
     prepared, zones = [], []
     for i, posture in enumerate(postures):

@@ -13,7 +13,7 @@ from forcefit.page.page import Page, Provenance, Tile, page, paragraph, section
 from forcefit.page.tables import Cell, Column, Value, table
 
 _LISTED = 20  # largest number of rows in the table of errors
-# relative difference below which two shares are equal
+# relative difference below which two shares of the cost are treated as equal
 _ALIKE = 0.01
 _ASSUMED = (
     "Limits are checked only at the postures of the grid, not between them.",
@@ -90,9 +90,9 @@ def _sentence(parts: Sequence[str]) -> str:
 def _good(
     present: Mapping[str, Any] | None, allocation: Mapping[str, Any] | None
 ) -> bool | None:
-    """Return whether all postures assemble and the yield is demonstrated.
+    """Return whether all postures can be assembled and the yield is demonstrated.
 
-    Return None if some postures assemble only by force, or if the yield is uncertain.
+    Return None if a posture requires an assembly force, or the yield is uncertain.
     """
     verdict = "shown"
     if allocation is not None:
@@ -104,7 +104,7 @@ def _good(
 
 
 def _present_tiles(present: Mapping[str, Any]) -> list[Tile]:
-    """Return tiles on the largest margin and on the main error."""
+    """Return tiles on the largest margin and on the error that affects it most."""
     at = ", ".join(f"{k} = {v:.4g}" for k, v in present["at"].items() if abs(v) > 1e-9)
     note = f"at {at or 'the origin'} [m, rad]; it assembles up to 1."
     tiles = [Tile("Largest margin", [Value(present["largest_margin"])], [note])]
@@ -157,7 +157,7 @@ def _allocation_sentence(allocation: Mapping[str, Any]) -> str:
 
 
 def _allocation_tiles(allocation: Mapping[str, Any]) -> list[Tile]:
-    """Return tiles on yield, pose error due to clearances and largest costs."""
+    """Return tiles on the yield, clearances and the most expensive tolerances."""
     tiles = []
     check = allocation["verification"]
     if check:
@@ -194,7 +194,7 @@ def _tighten_tile(allocation: Mapping[str, Any]) -> Tile:
 
 
 def _asked_section(results: Mapping[str, Any], allocation: Mapping[str, Any]) -> str:
-    """Return the section on limits, yield, distribution and postures."""
+    """Return the section on required limits, yield, error distribution and postures."""
     rows: list[list[Cell]] = [
         [f"{NAMES[key]}, at most", Value(limit, UNITS[key].removesuffix("1"), 6)]
         for key, limit in allocation["limits"].items()

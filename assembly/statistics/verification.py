@@ -26,7 +26,7 @@ LOOKS, CONFIDENCE = 4, 0.95
 def prove_worst(
     requirement: Requirement, t: NDArray, progress: Callable[[str, int, int], None]
 ) -> tuple[dict[str, tuple[float, float]], float]:
-    """Bound the limited quantities over all errors within tolerance and all postures.
+    """Bound the limited quantities over all errors within tolerances and all postures.
 
     Args:
         requirement: requirement at all postures.
@@ -35,9 +35,10 @@ def prove_worst(
             finished steps and the number of all steps.
 
     Returns:
-        For each limit, the value at the worst corner found and the proven upper bound
-        (NaN if the limit is not convex). The factor <= 1 on all tolerances at which the
-        upper bounds satisfy all limits (NaN if a limit is not convex).
+        For each limit, the largest value found at corners of the tolerance box, and a
+        proven upper bound (NaN if the quantity is not convex). Also the common factor
+        <= 1 on all tolerances for which the upper bounds satisfy all limits (NaN if a
+        quantity is not convex).
     """
     plan = requirement.plan
     spread, worst, scale = plan.spread(t), {}, np.inf
@@ -59,8 +60,8 @@ def prove_worst(
         if key not in requirement.convex:
             scale = np.nan
             continue
-        # If the tolerances decrease by a factor, the margin decreases by this factor
-        # and the bound on the energy at least by its square.
+        # If the tolerances decrease by a factor, the margin decreases by this factor.
+        # The bound on the energy decreases at least by its square.
         power = 0.5 if key == "energy" else 1.0
         scale = np.minimum(scale, (plan.limits[key] / max(upper, 1e-300)) ** power)
     return worst, float(np.minimum(1.0, scale))
@@ -77,7 +78,7 @@ def verify(
     fresh: int,
     progress: Callable[[str, int, int], None],
 ) -> tuple[NDArray, dict[str, Any]]:
-    """Verify tolerances with new random draws, and tighten them if they fail.
+    """Verify tolerances with new random draws, and reduce them if the yield is too low.
 
     Each verification uses independent draws. The error probability is divided equally
     among all verifications (Bonferroni correction).
@@ -127,8 +128,8 @@ def verify_yield(
 
     Returns:
         A dictionary with the yield and its confidence interval, the yield at each
-        posture, and the verdict. If the bounds on a pose error include its limit, the
-        draw is a failure in the yield, and the interval includes both outcomes.
+        posture, and the verdict. If a limit is between the bounds on a pose error, the
+        draw counts as a failure in the yield, and the interval includes both outcomes.
     """
     plan = requirement.plan
     values = plan.draws_of(stream, fresh) * plan.spread(t)
@@ -152,7 +153,7 @@ def verify_yield(
 
 
 def _verdict(interval: Mapping[str, float], asked: float) -> str:
-    """Return how the confidence interval compares with the required yield."""
+    """Return whether the draws show, contradict or do not contradict the yield."""
     if asked == 1.0:
         return "no draw failed" if interval["probability"] == 1.0 else "contradicted"
     if interval["lower"] >= asked:

@@ -1,9 +1,9 @@
 """Lower and upper bounds on a quantity over all errors within tolerances.
 
 Margin and energy are convex in the errors, so their maximum is at a corner of the
-tolerance box. The search moves repeatedly to the corner given by the signs of the
-derivatives. The largest value found is a lower bound on the maximum, also for
-quantities that are not convex. For the upper bound, the clearances are restricted to
+tolerance box. Each step of the search moves to the corner that the signs of the
+derivatives select. The largest value found is a lower bound on the maximum, even if
+the quantity is not convex. For the upper bound, the clearances are restricted to
 linear functions of the errors, ``u = sum_i V_i s_i`` for errors ``t_i s_i`` with
 abs(s_i) <= 1. A cone programme computes the optimal V.
 
@@ -23,7 +23,7 @@ from forcefit.assembly.statistics.posture_margins import PostureMargins
 from forcefit.assembly.statistics.responses import respond
 
 CORNERS = 24  # number of random starting corners of the search
-# largest number of steps of a search; three are usually sufficient
+# largest number of steps of a search
 _ITERATIONS = 12
 
 
@@ -66,8 +66,8 @@ def worst_corner(
     """
     signs = corners.copy()
     if isinstance(prepared, LinearResponse):
-        # The derivative of the energy is zero if clearances compensate all errors, so
-        # the solution without clearances is an additional start.
+        # The derivative of the energy is zero if clearances compensate all errors.
+        # Corners of large energy without clearances are therefore additional starts.
         signs = np.vstack([
             signs,
             _worst_without_clearance(prepared, sources, tolerances, signs),
@@ -92,7 +92,7 @@ def _worst_without_clearance(
     prepared: LinearResponse, sources: ErrorSources, tolerances: NDArray,
     corners: NDArray,
 ) -> NDArray:  # fmt: skip
-    """Return corners of large energy (h s)^2 / 2 without clearances, (k, m)."""
+    """Return signs (k, m) with a large energy (h s)^2 / 2 without clearances."""
     h = prepared.misfit[:, 6 * sources.frame + sources.component] * tolerances
     signs = corners
     for _ in range(_ITERATIONS):
@@ -109,7 +109,7 @@ def random_corners(count: int, sources: int, seed: int = 1) -> NDArray:
 def bound_margin(
     zone: PostureMargins, sources: ErrorSources, tolerances: NDArray
 ) -> float:
-    """Return an upper bound on the margin over all errors within tolerances.
+    """Return an upper bound on the margin for all errors within tolerances.
 
     Args:
         zone: prepared problem (21) of a posture.
@@ -141,9 +141,9 @@ def bound_energy(
         tolerances: (m,) [rad or m] half widths of the tolerances.
 
     Returns:
-        Bound [J]; inf if no clearance or spring can compensate one of the errors. It is
-        a sum of norms over all errors and may exceed the maximum by a factor of
-        several.
+        Bound [J]; inf if no clearance or spring can compensate one of the errors. It
+        is a sum of norms over all errors, which can be several times as large as the
+        maximum.
     """
     columns = 6 * sources.frame + sources.component
     if np.abs(prepared.infeasible[:, columns] * tolerances).max(initial=0.0) > 1e-12:
@@ -158,14 +158,14 @@ def bound_energy(
 
 
 def _reach(V: NDArray, starts: NDArray) -> NDArray:
-    """Return the largest norm of each clearance over all errors, (cones,)."""
+    """Return the largest norm of each affine clearance over all errors, (cones,)."""
     return np.sqrt(np.add.reduceat(V**2, starts[:-1], axis=0)).sum(axis=1)
 
 
 def _affine_clearances(
     B: NDArray, asked: NDArray, starts: NDArray, G: NDArray | None, h: NDArray | None
 ) -> NDArray:
-    """Return V, (nu, m), with B V = asked or, for given G, with minimum energy."""
+    """Return V, (nu, m), with B V = asked; for given G, with minimum energy bound."""
     import cvxpy as cp
 
     nu, m = starts[-1], asked.shape[1]

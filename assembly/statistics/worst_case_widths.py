@@ -2,10 +2,10 @@
 
 The worst pose error is the maximum of ``sum_g t_g s_g(n) + c(n)`` over all directions
 n, where s_g are support functions of the zones and c that of the clearances. This
-applies if no loop is over-constrained, or if bodies are elastic and joints have no
-clearance. Tolerances t are therefore feasible if and only if ``sum_g t_g s_g(n) <=
-limit - c(n)`` for all n. These inequalities are used as cutting planes, see
-:mod:`forcefit.assembly.statistics.cutting_planes`.
+equation requires that no loop is over-constrained, or that bodies are elastic and
+joints have no clearance. Tolerances t are therefore feasible if and only if ``sum_g
+t_g s_g(n) <= limit - c(n)`` for all n. These inequalities are used as cutting planes,
+see :mod:`forcefit.assembly.statistics.cutting_planes`.
 """
 
 from collections.abc import Callable, Sequence
@@ -32,7 +32,7 @@ from forcefit.assembly.statistics.verification import verify
 from forcefit.assembly.statistics.worst_pose import farthest_screw
 from forcefit.inputs.table import BadInput
 
-_TOLERANCE = 1e-3  # accepted violation before the final scaling, relative to a limit
+_TOLERANCE = 1e-3  # accepted relative violation of limits before the final scaling
 _MOST_STEPS = 200
 
 Progress = Callable[[str, int, int], None]
@@ -48,14 +48,14 @@ class _Case:
     where: str
 
     def scaled(self, shares: NDArray) -> ErrorSets:
-        """Return the error sets for tolerances relative to the largest ones, (G,)."""
+        """Return the error sets for given tolerances."""
         factors = np.ones(self.sets.screws.shape[1])
         for columns, g in zip(self.sets.columns, self.classes, strict=True):
             factors[columns] = shares[g] if g >= 0 else 1.0
         return replace(self.sets, screws=self.sets.screws * factors)
 
     def worst(self, shares: NDArray) -> tuple[float, float, NDArray]:
-        """Return the worst pose error found, an upper bound, and the direction."""
+        """Return the worst pose error found, an upper bound, and its direction."""
         half = 3 * POSE_ERRORS.index(self.key)
         (low, high), screw = farthest_screw(self.scaled(shares), half)
         direction = screw[half : half + 3]
@@ -130,7 +130,7 @@ def allot_worst_case(
 
 
 def _case(posture: Posture, plan: Plan, key: str) -> _Case:
-    """Return a limit at a posture, with the zones for the largest widths."""
+    """Return a limit at a posture, with error zones for the largest widths."""
     sources = plan.sources
     assert isinstance(sources, CalloutSources)
     sets = error_sets(linear_response(posture), sources)
@@ -179,7 +179,7 @@ def _factor(case: _Case, plan: Plan, shares: NDArray) -> float:
 
 
 def _worst(cases: Sequence[_Case], shares: NDArray) -> dict[str, tuple[float, float]]:
-    """Return the largest value found and the largest bound for each quantity."""
+    """Return the largest value found and the largest bound of each limited quantity."""
     found: dict[str, tuple[float, float]] = {}
     for case in cases:
         low, high, _ = case.worst(shares)

@@ -2,8 +2,9 @@
 
 The set of positions is the set of all minimum-energy solutions (22), which is the
 assumption ``frozen`` of problem (27). All solutions have the same spring deformations,
-because the energy is strictly convex in them. They also have the same clearances at
-joints that transmit a force. The other joints may be anywhere within their clearances.
+because the energy is strictly convex in them. Joints that transmit a force also have
+the same positions in all solutions. The other joints may be anywhere within their
+clearances.
 
 Under a load, the energy minus the work of the load is minimised.
 """
@@ -99,7 +100,7 @@ def _under_load(
 def worst_error_slopes(
     prepared: LinearResponse, draws: Assembly, key: str, screws: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Differentiate the largest pose error with respect to platform screw and bounds.
+    """Differentiate the largest pose error by platform screw and clearance bounds.
 
     By the envelope theorem, the derivatives are those of the support function in the
     direction of the pose error.
@@ -136,7 +137,7 @@ def worst_error_slopes(
 def _pressing(
     prepared: LinearResponse, free: NDArray, along: NDArray, clearances: NDArray
 ) -> NDArray:
-    """Return the multipliers of the bounds of free clearances, (k, ..)."""
+    """Return the multipliers of the bounds of clearances without force, (k, ..)."""
     rows = clearance_constraints(prepared, ~free)[:, free]
     size = np.linalg.norm(along, axis=1, keepdims=True)
     moving = size[:, 0] > 0.0

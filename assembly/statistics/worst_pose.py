@@ -70,10 +70,11 @@ class WorstPose:
 
     Attributes:
         quantity: ``"rotation"`` or ``"translation"``.
-        reading: a key of :data:`MEANINGS`.
+        reading: definition of the worst case, a key of :data:`MEANINGS`.
         attained: [rad or m] largest value found.
         bound: [rad or m] upper bound.
-        direction: (3,) unit vector of the largest value found, in base axes.
+        direction: (3,) unit vector along the largest rotation or translation found, in
+            base axes.
         shares: [rad or m] contribution of each callout, independent error and clearance
             along ``direction``, in descending order.
         rigid: [rad or m] largest value for the definition ``rigid``, if the definition
@@ -151,7 +152,7 @@ def worst_pose(
     direction = direction / size if size else np.eye(3)[0]
     along = direction @ sets.screws[half : half + 3]
     parts = rigid_parts(sets, along) if reading == "rigid" else parts_of(sets, along)
-    shares: dict[str, float] = {}  # sum over all contacts of a joint
+    shares: dict[str, float] = {}  # contributions, summed over the contacts of a joint
     for name, part in zip(sets.names, parts, strict=True):
         shares[name] = shares.get(name, 0.0) + part
     ordered = tuple(sorted(shares.items(), key=lambda share: -share[1]))
@@ -170,8 +171,8 @@ def bound_worst_pose(
             along x, y and z.
 
     Returns:
-        A key of :data:`MEANINGS`, and bounds on the ``rotation`` [rad] and the
-        ``translation`` [m].
+        The definition of the worst case, a key of :data:`MEANINGS`, and bounds on the
+        ``rotation`` [rad] and the ``translation`` [m].
 
     Raises:
         BadInput: as for :func:`worst_pose`.
@@ -187,7 +188,7 @@ def bound_worst_pose(
 def _at_largest_clearances(
     prepared: LinearResponse, sources: Sources
 ) -> tuple[LinearResponse, Sources]:
-    """Return the response for the largest fit clearances, and the other errors."""
+    """Return the response for the largest fit clearances, and all other errors."""
     refuse_bolted(prepared.posture.robot, "worst case")
     if prepared.loads is not None:
         raise BadInput(
@@ -235,7 +236,7 @@ def _farthest(
         return (0.0, 0.0), np.zeros(6)
     bounds, screw, _ = farthest(np.zeros(6), half, tolerance * max(sizes), support)
     low = bounds[0]
-    # Each iteration increases the size of the screw.
+    # Each iteration increases the rotation or translation of the screw.
     for _ in range(50):
         further = support(screw[half : half + 3] / low)[1]
         size = float(np.linalg.norm(further[half : half + 3]))
@@ -246,7 +247,7 @@ def _farthest(
 
 
 def _sum_of_sizes(sets: ErrorSets, half: int) -> float:
-    """Return the sum of the largest pose errors of all zones [rad or m]."""
+    """Return the sum of the largest pose errors due to each zone [rad or m]."""
     # Cutting planes converge slowly if the set of screws is a ball. For a ball, this
     # sum is exact.
     total = 0.0
@@ -284,7 +285,7 @@ def _support(
 def _climb(
     prepared: LinearResponse, sources: Sources, quantity: str, seed: int, start: NDArray
 ) -> tuple[float, NDArray]:
-    """Search for the largest pose error at equilibrium, and return its direction."""
+    """Return the largest pose error found at equilibrium, and its vector."""
     half = 3 * POSE_ERRORS.index(quantity)
     own = zones_of_errors(sources)
     sizes = [sum(zone.dimensions) for _, zone, _ in own]
@@ -292,7 +293,7 @@ def _climb(
     scale = np.concatenate([unit for _, _, unit in own])
 
     def corners(slopes: NDArray) -> NDArray:
-        """Return the errors with the largest product with slopes, (k, m)."""
+        """Return the errors within all zones that maximise errors . slopes, (k, m)."""
         u = np.zeros_like(slopes)
         for row, w in zip(u, slopes * scale, strict=True):
             for (_, zone, _), columns in zip(own, parts, strict=True):

@@ -11,7 +11,7 @@ from forcefit.page.page import paragraph, section
 from forcefit.page.tables import Cell, Column, Value, table
 
 _LISTED = 8  # largest number of contributions in the text
-_LEAST = 1e-6  # smallest listed contribution, relative to the sum
+_LEAST = 1e-6  # smallest reported contribution, relative to the sum
 
 
 def worst_results(
@@ -25,8 +25,8 @@ def worst_results(
         seed: seed of the random starting corners of the search.
 
     Returns:
-        For each quantity: definition and its meaning, largest value found, upper bound,
-        unit, direction and contributions by name.
+        For each quantity, the definition of the worst case and its meaning, the largest
+        value found, upper bound, unit, direction, and contributions by name.
     """
     results = {}
     for key in POSE_ERRORS:
