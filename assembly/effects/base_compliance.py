@@ -36,7 +36,7 @@ def on_foundation(conditions: Conditions) -> Conditions:
 
 
 def _standing(conditions: Conditions, robot: Robot) -> Conditions:
-    """Return the conditions with an additional fixed frame after the base."""
+    """Return the conditions with a fixed frame inserted after the base."""
     still = np.broadcast_to(np.eye(4), (len(conditions), 1, 4, 4))
     zero = np.zeros((len(conditions), 1, 6))
     rest = (
@@ -74,7 +74,7 @@ def with_foundation(robot: Robot, values: Values) -> Robot:
 
 
 def _public(robot: Robot, values: Values) -> dict[str, float]:
-    """Convert fitted compliances to stiffnesses, negative for a stiffer foundation."""
+    """Convert fitted compliances to stiffnesses; negative compliances are allowed."""
     return {
         f"stiffness.{name.removeprefix('compliance.')}": 1 / c
         for name, c in values.items()

@@ -2,7 +2,7 @@
 
 Let m and c be the mass and centre in the file, and M and C the true values.  The
 parameter ``mass`` is M - m, and ``moment`` is M C - m c.  The weight is linear in both
-parameters.  The true centre is (m c + moment)/M.
+parameters.
 """
 
 from dataclasses import replace

@@ -1,8 +1,8 @@
 """Combine an effect of the robot file with an effect identified by a diagnosis.
 
 The effect of the file acts first.  Both effects together are equivalent to a single
-effect.  Its offsets and compliances are sums, its factors products, its eccentricities
-vector sums, and its frame rotations compositions.
+effect.  Offsets and compliances are added, factors are multiplied, eccentricities are
+added as vectors, and frame rotations are composed.
 """
 
 import math
@@ -61,7 +61,7 @@ def _product(declared: Values, found: Values) -> dict[str, float]:
 
 
 def _load(declared: Values, found: Values) -> dict[str, float]:
-    """Combine load gains; the gain of the diagnosis acts after that of the file."""
+    """Combine load gains; the gain of the file acts first."""
     factor = found.get("factor", 1.0)
     offsets = {k: factor * v for k, v in declared.items() if k != "factor"}
     more = {k: v for k, v in found.items() if k != "factor"}
@@ -93,7 +93,7 @@ def _registration(declared: Values, found: Values) -> dict[str, float]:
 
 
 def _drift(declared: Values, found: Values) -> dict[str, float]:
-    """Add the amplitudes of drifts that share a time constant."""
+    """Add the amplitudes of drifts with the same time constant."""
     constant = declared["time_constant"]
     if not math.isclose(found["time_constant"], constant, rel_tol=1e-9):
         raise ValueError(
@@ -103,7 +103,7 @@ def _drift(declared: Values, found: Values) -> dict[str, float]:
 
 
 def _contact(declared: Values, found: Values) -> dict[str, float]:
-    """Combine contact laws of different joints."""
+    """Combine the contact laws of different joints."""
     if set(declared) & set(found):
         raise ValueError(
             "two contact laws in series at one joint cannot be combined into one law"
@@ -112,7 +112,7 @@ def _contact(declared: Values, found: Values) -> dict[str, float]:
 
 
 def _delayed(declared: Values, found: Values) -> dict[str, float]:
-    """Combine expansions; those of one body must have equal time constants."""
+    """Combine expansions; time constants of the same body must be equal."""
     both = _sum(declared, found)
     for key in set(declared) & set(found):
         if key.endswith(".time_constant"):

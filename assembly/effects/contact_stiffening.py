@@ -25,7 +25,7 @@ def _apply(conditions: Conditions, values: Values) -> Conditions:
 
 
 def _public(robot: Robot, values: Values) -> dict[str, float]:
-    """Convert deflections d under a unit load to coefficients d^(-exponent)."""
+    """Convert the deflection d under a unit load to the coefficient d^(-exponent)."""
     parameters: dict[str, float] = {}
     for key, deflection in values.items():
         name, _, kind = key.rpartition(".")

@@ -2,7 +2,7 @@
 
 The body expands by coefficient x length x body temperature, along its beam or along the
 line between its joints.  The body temperature is the sensor temperature with a
-first-order lag.  Both are equal at the first reading of a session.
+first-order lag.  Both temperatures are equal at the first reading of a session.
 """
 
 import numpy as np
@@ -21,12 +21,12 @@ from forcefit.assembly.measurement.variables import past
 from forcefit.assembly.model.robot import Robot
 
 _SENSOR, _LATE = "cov.temperature", "time_constant"
-# initial guesses of the time constant, relative to the duration of the campaign
+# initial guesses of the time constant, relative to the duration of all measurements
 _SCAN = (0.03, 0.1, 0.3)
 
 
 def _warmth(conditions: Conditions, time_constant: float) -> NDArray:
-    """Return the body temperatures, which lag behind those of the sensor, (R,) [K]."""
+    """Return the body temperatures, which lag behind the sensor, (R,) [K]."""
     history, row = past(conditions, [_SENSOR])
     first = np.where(history.first, np.arange(len(history.first)), 0)
     began = history.values[_SENSOR][np.maximum.accumulate(first)]

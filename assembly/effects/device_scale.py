@@ -1,7 +1,7 @@
-"""Scale error of the measuring device, measured length = factor x true length.
+"""Scale error of the measuring device: measured length = factor x true length.
 
-Positions are measured from the origin of the registration.  Without registration, they
-are measured from the origin of the base.
+The origin of all positions is that of the measuring frame, or of the base if there is
+no registration.
 """
 
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Drift of the reading by amplitude (1 - exp(-time / time constant))."""
+"""Drift of the device reading: amplitude x (1 - exp(-time / time constant))."""
 
 from dataclasses import replace
 
@@ -11,7 +11,7 @@ from forcefit.stiffness.screws import SCREW
 
 _AMPLITUDE = tuple(f"amplitude.{axis.lower()}" for axis in SCREW)
 
-# initial guesses of the time constant, relative to the duration of the campaign
+# initial guesses of the time constant, relative to the duration of all measurements
 _SCAN = (0.03, 0.1, 0.3, 1.0, 3.0)
 
 

@@ -26,7 +26,7 @@ def _unit(robot: Robot, name: str) -> str:
 
 
 def _public(robot: Robot, values: Values) -> dict[str, float]:
-    """Convert fitted compliances to stiffnesses, negative for stiffer drives."""
+    """Convert fitted compliances to stiffnesses; negative compliances are allowed."""
     ends = len(".compliance")
     return {name[:-ends]: 1 / c for name, c in values.items() if abs(c) > RIGID}
 

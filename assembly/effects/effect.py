@@ -7,22 +7,23 @@ from forcefit.assembly.measurement.conditions import Conditions
 from forcefit.assembly.model.robot import Robot
 
 Values = Mapping[str, float]
-RIGID = 1e-12  # [rad/(N m), m/N] fitted compliance below which a spring is rigid
+RIGID = 1e-12  # [rad/(N m), m/N] compliance below which a fitted spring is rigid
 
 
 @dataclass(frozen=True)
 class Unknown:
-    """An unknown of a fit, chosen so that the model is nearly linear in it.
+    """Quantity that a fit determines, chosen so that the model is nearly linear in it.
 
     Attributes:
-        name: name of a parameter, or of part of a parameter.  For an effect at frames,
-            the name is appended to the frame name.
+        name: name of the parameter, or of a component of the parameter.  For an effect
+            at frames, the name is appended to the frame name.
         scale: typical magnitude, in the unit of the parameter.
         lower: smallest physically possible value.
         upper: largest physically possible value.
-        start: value without effect, at which the first derivatives are evaluated.
+        start: value at which the effect vanishes, and at which derivatives are first
+            evaluated.
         scan: initial guesses, if the model is strongly nonlinear.
-        scan_by: name of the covariate whose range multiplies ``scan``, or "".
+        scan_by: name of the covariate by whose range ``scan`` is multiplied, or "".
     """
 
     name: str
@@ -35,7 +36,7 @@ class Unknown:
 
 
 def _as_they_are(robot: Robot, values: Values) -> dict[str, float]:
-    """Return the unknowns as parameters without conversion."""
+    """Return the fitted values as parameters without conversion."""
     return dict(values)
 
 
@@ -51,23 +52,24 @@ class Effect:
             public name.
         frames: function that returns the frames of a robot at which the effect can act;
             None if the effect does not act at frames.
-        device_alone: whether the effect is an error of the measuring device.
+        device_alone: whether the effect is only an error of the measuring device.
         refines: name of an effect that is a limiting case of this effect, or "".
         tried: function that returns the frames at which a diagnosis searches for the
-            effect; None for ``frames``.
-        components: public parameters at each frame (``""`` for the frame name alone),
-            or of the complete effect.
-        unknowns: unknowns of the fit, at each frame or of the complete effect.
+            effect; None if they are those of ``frames``.
+        components: names of the parameters at each frame, or of the complete effect.
+            ``""`` denotes a parameter with the name of the frame.
+        unknowns: quantities that a fit determines, at each frame or for the complete
+            effect.
         public: function that converts unknowns (keys ``<frame>.<unknown>``) to
             parameters by public name.
         needs: covariates required to apply or identify the effect.
         linear: whether the platform deviation is linear in the unknowns for small
             motions.
-        by_row: whether the effect changes individual measurements and can be limited to
-            a session.
+        by_row: whether the effect can differ between measurements, and therefore be
+            limited to a session.
         finite: whether the effect requires finite motions.
         clearance: whether the effect adds clearance to joints.
-        device: unknowns that displace the measuring frame.
+        device: names of unknowns that displace the measuring frame.
         splits: whether each unknown can be fitted without the others.
         follows_load: whether the unknowns ``offset.<c>`` correspond to recorded load
             components.

@@ -1,4 +1,4 @@
-"""Encoder eccentricity, actual = command + amplitude sin(command + phase)."""
+"""Encoder eccentricity: actual angle = command + amplitude sin(command + phase)."""
 
 import math
 
@@ -26,7 +26,7 @@ def _apply(conditions: Conditions, values: Values) -> Conditions:
 
 
 def _public(robot: Robot, values: Values) -> dict[str, float]:
-    """Convert the coefficients of sin and cos of the command to amplitude and phase."""
+    """Convert the coefficients of sine and cosine to amplitude and phase."""
     parameters: dict[str, float] = {}
     for name in {key.rpartition(".")[0]: None for key in values}:
         sine = values.get(f"{name}.sine", 0.0)

@@ -1,4 +1,4 @@
-"""Encoder offset, by which the actual and commanded coordinates of a drive differ."""
+"""Encoder offset: difference between actual and commanded coordinate of a drive."""
 
 from forcefit.assembly.effects.effect import Effect, Unknown, Values
 from forcefit.assembly.effects.places import drives, own_unit, with_screws

@@ -1,11 +1,11 @@
-"""Forms of a function of one or two variables.
+"""Basis functions (forms) for functions of one or two variables.
 
-A form is a sum of basis columns, each multiplied by a coefficient.  The remaining
-parameters, called *shapes*, change the columns nonlinearly.  Examples of shapes are a
-time constant and a period.
+A function is a sum of basis functions, each multiplied by a coefficient.  A *form* is a
+family of basis functions.  It can have nonlinear parameters, called *shapes*, such as a
+time constant or a period.
 
 ========== ============================== ==========================================
-form       coefficients                   basis columns
+form       coefficients                   basis functions
 ========== ============================== ==========================================
 powers     ``0``, ``1``, ``2`` ..         x^i
            ``i.j`` of two variables       x^i y^j
@@ -48,26 +48,26 @@ from numpy.typing import NDArray
 Shapes = Mapping[str, float]
 Inputs = Sequence[NDArray]
 _MOST = 999  # largest number of powers, harmonics or knots
-# integer in the name of a column
+# integer in the name of a basis function
 _INDEX = re.compile("0|-?[1-9][0-9]{0,8}")
 
 
 @dataclass(frozen=True)
 class Form:
-    """Parametric form of a function of one or two variables.
+    """Family of basis functions of one or two variables.
 
     Attributes:
         name: name of the form in robot files.
         summary: one-line description.
         most: largest number of variables.
-        shapes: mapping of names of nonlinear parameters to True if required.
-        indices: smallest and largest integer at the beginning of a column name; None if
-            the names contain no integers.
-        words: allowed endings of a column name, such as ``"sine"``; ``""`` for names
-            without ending.
-        basis: function that returns the columns (R, p) for given column names, inputs
-            (R,) and shapes.
-        remembers: whether the result depends on earlier values of the first variable.
+        shapes: names of nonlinear parameters, mapped to True if required.
+        indices: smallest and largest integer with which the name of a basis function
+            can begin; None if names contain no integers.
+        words: allowed endings of the name of a basis function, such as ``"sine"``;
+            ``""`` for names without ending.
+        basis: function that returns the values (R, p) of basis functions for their p
+            names, inputs (R,) and shapes.
+        remembers: whether the function depends on earlier values of the first variable.
         least: smallest number of variables.
     """
 
@@ -82,7 +82,7 @@ class Form:
     least: int = 1
 
     def is_column(self, name: str, variables: int) -> bool:
-        """Return whether a name is a column name for the given number of variables."""
+        """Return whether a name is valid for a basis function of so many variables."""
         head, word = name, ""
         if self.words != ("",):
             head, _, word = name.rpartition(".")
@@ -99,7 +99,7 @@ class Form:
 
 
 def column_indices(name: str) -> list[int]:
-    """Return the integers at the beginning of a column name."""
+    """Return the integers with which the name of a basis function begins."""
     return [int(part) for part in name.split(".") if _INDEX.fullmatch(part)]
 
 
@@ -141,7 +141,7 @@ _ENDS = ("first", "last")
 
 
 def natural_spline(knots: NDArray, x: NDArray) -> NDArray:
-    """Return natural cubic splines (R, n) that are 1 at one knot and 0 at others."""
+    """Return natural cubic splines (R, n), each 1 at one knot and 0 at others."""
     from scipy.interpolate import CubicSpline
 
     if len(knots) < 2:
@@ -205,14 +205,14 @@ def _slip(names: Sequence[str], inputs: Inputs, shapes: Shapes) -> NDArray:
 
 
 def _knee(names: Sequence[str], inputs: Inputs, shapes: Shapes) -> NDArray:
-    """Divide a load into components below and above the knee."""
+    """Divide a load into its components below and above the knee."""
     first = np.clip(inputs[0], -shapes["at"], shapes["at"])
     parts = {"below": first, "above": inputs[0] - first, "size": first / shapes["at"]}
     return _stacked([parts[name] for name in names], inputs)
 
 
 def _stacked(columns: Sequence[NDArray], inputs: Inputs) -> NDArray:
-    """Combine columns to an array (R, p)."""
+    """Combine p columns to an array (R, p)."""
     rows = len(inputs[0])
     if not columns:
         return np.zeros((rows, 0))
@@ -223,7 +223,7 @@ _WAVES = ("sine", "cosine")
 
 
 def _memory(name: str, summary: str) -> Form:
-    """Return a form whose state lags behind the variable."""
+    """Return a form whose value lags behind the variable."""
     return Form(
         name, summary, 1, {"time_constant": True}, None, ("gain", "start"), _remembered,
         remembers=True,
@@ -258,7 +258,7 @@ FORMS: dict[str, Form] = {
 
 
 def shape_names(form: Form, variables: int) -> dict[str, bool]:
-    """Return the shape names of a form, mapped to True if required."""
+    """Return the names of a form's shapes, and whether each is required."""
     if form.name == "spline" and variables > 1:
         return {f"{end}.{k}": True for k in (1, 2) for end in _ENDS}
     return dict(form.shapes)

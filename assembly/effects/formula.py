@@ -30,8 +30,8 @@ _OPERATIONS: dict[type, Callable[[NDArray, NDArray], NDArray]] = {
 }  # fmt: skip
 _LONGEST = 500  # largest number of characters in a formula
 _DEEPEST = 50  # largest depth of nested brackets and operations
-_SAME = 1e-9  # largest difference between equal unit exponents
-# exponents of the units m, N, s, K ..; rad is dimensionless
+_SAME = 1e-9  # tolerance for the comparison of unit exponents
+# exponents of the units m, N, s, K .. in a unit; rad is dimensionless
 Unit = Mapping[str, float]
 
 
@@ -61,7 +61,7 @@ def parse_formula(text: str) -> ast.expr:
 
 
 def _check(node: ast.AST, depth: int) -> None:
-    """Raise BadInput for elements that are not in the grammar."""
+    """Raise BadInput for syntax that formulas do not support."""
     match node:
         case _ if depth > _DEEPEST:
             raise BadInput(f"found a formula nested deeper than {_DEEPEST}")
@@ -154,7 +154,7 @@ def parameter_units(
 
 @dataclass
 class _Units:
-    """System of equations between units; ``?name`` is the unit of a parameter."""
+    """Equations between units, in which ``?name`` is the unit of a parameter."""
 
     variables: Mapping[str, Unit]
     known: dict[str, dict[str, float]] = field(default_factory=dict)
@@ -193,7 +193,7 @@ class _Units:
         return {}
 
     def reduced(self, unit: Mapping[str, float]) -> dict[str, float]:
-        """Substitute the known units of parameters in a unit."""
+        """Replace the units of parameters in a unit by their known values."""
         reduction: dict[str, float] = {}
         for name, k in unit.items():
             reduction = _added(reduction, self.known.get(name, {name: 1.0}), k)
@@ -234,7 +234,7 @@ def _number(node: ast.AST) -> float | None:
 def _added(
     one: Mapping[str, float], other: Mapping[str, float], factor: float
 ) -> dict[str, float]:
-    """Return the product of a unit and a power of another unit."""
+    """Return the exponents of the product of a unit and a power of another unit."""
     names = dict.fromkeys([*one, *other])
     return {name: one.get(name, 0.0) + factor * other.get(name, 0.0) for name in names}
 

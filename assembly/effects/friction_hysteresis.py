@@ -1,4 +1,4 @@
-"""Coulomb friction at an elastic joint, torque = -tau x direction of approach."""
+"""Coulomb friction at an elastic joint: torque = -tau x direction of approach."""
 
 from forcefit.assembly.effects.effect import Effect, Unknown, Values
 from forcefit.assembly.effects.places import own_unit, with_screws
@@ -26,8 +26,7 @@ def _apply(conditions: Conditions, values: Values) -> Conditions:
     C = joint_compliances(conditions.robot)
     for name, tau in values.items():
         row = conditions.robot.index(name)
-        # An internal torque of the joint causes the stress-free motion compliance x
-        # torque.
+        # A friction torque is equivalent to a stress-free motion, compliance x torque.
         deflection = C[row, :, conditions.robot.frames[row].own_axis]
         conditions = with_screws(
             conditions, name, -tau * conditions.approach[:, None] * deflection

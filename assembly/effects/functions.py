@@ -49,7 +49,7 @@ def along(robot: Robot, where: str, component: str, values: NDArray) -> NDArray:
 
 
 def is_loaded(function: Function) -> bool:
-    """Return whether a function depends on wrenches in the robot."""
+    """Return whether the value of a function depends on wrenches in the robot."""
     wrench = any(name.startswith("wrench.") for name in function.variables)
     return wrench or function.kind == "compliance"
 
@@ -62,8 +62,8 @@ def covariates_of(robot: Robot, sessions: Iterable[str]) -> dict[str, str]:
         sessions: sessions to consider.
 
     Returns:
-        For each covariate, the title of a function that depends on it.  The names of
-        covariates have no prefix ``cov.``.
+        Covariates without the prefix ``cov.``, each with the title of a function that
+        depends on it.
     """
     owners: dict[str, str] = {}
     for function in robot.functions:
@@ -117,7 +117,7 @@ def parameters_of(function: Function, component: str) -> dict[str, float]:
 
 
 def columns_of(function: Function, component: str) -> list[str]:
-    """Return the names of the linear coefficients of a function."""
+    """Return the names of the coefficients in which a function is linear."""
     if function.form == FORMULA:
         return []
     shapes = shape_names(FORMS[function.form], len(function.variables))
@@ -125,16 +125,17 @@ def columns_of(function: Function, component: str) -> list[str]:
 
 
 def basis(conditions: Conditions, function: Function, names: Sequence[str]) -> NDArray:
-    """Evaluate the basis columns of a function.
+    """Evaluate the basis functions of a function.
 
     Args:
         conditions: conditions of R measurements.
-        function: function with a form and without wrenches.  Only its shape parameters
-            are used.
-        names: p names of columns, such as ``"1.sine"``.
+        function: function with a form and without wrenches.  Only its shapes are used,
+            not its coefficients.
+        names: p names of basis functions, such as ``"1.sine"``.
 
     Returns:
-        (R, p) columns in the units of the variables; NaN where a variable is unknown.
+        (R, p) values of the basis functions in the units of the variables; NaN where a
+        variable is unknown.
     """
     shapes = parameters_of(function, function.components[0])
     inputs = inputs_of(conditions, function)
@@ -149,8 +150,8 @@ def inputs_of(conditions: Conditions, function: Function) -> NDArray:
         function: the function.
 
     Returns:
-        (R, k) values of the variables, NaN for wrenches.  For a form with memory, the
-        state replaces the first variable.
+        (R, k) values of the variables, NaN for wrenches.  If the form depends on
+        earlier values, the present state replaces the first variable.
     """
     first, *further = function.variables
     inputs = [_now(conditions, name) for name in further]
@@ -173,7 +174,8 @@ def inputs_of(conditions: Conditions, function: Function) -> NDArray:
         return np.column_stack([history.direction(first)[row], *sizes])
     shapes = parameters_of(function, function.components[0])
     late = shapes["time_constant"]
-    # For the variable time, the input is the lagged response to a unit step at time 0.
+    # For the variable ``time``, the input is the lagged response to a unit step at time
+    # 0.
     if first in CLOCKS:
         return np.column_stack([1.0 - history.fading(late), history.fading(late)])[row]
     lagged = history.lagged(first, late, held=form.name == "creep")
@@ -181,7 +183,7 @@ def inputs_of(conditions: Conditions, function: Function) -> NDArray:
 
 
 def _now(conditions: Conditions, name: str) -> NDArray:
-    """Return the values of a variable, if possible from the history, (R,)."""
+    """Return the present values of a variable, (R,)."""
     if name.startswith("wrench."):
         return np.full(len(conditions), np.nan)
     if conditions.history is not None and conditions.row is not None:
@@ -219,8 +221,9 @@ def variable_names(variables: Sequence[str]) -> dict[str, int]:
         variables: public names of the variables.
 
     Returns:
-        Index of the variable for each name.  Names are the last part of the public
-        name, its first part if unique, and the public name with ``_`` in place of dots.
+        Index of the variable for each name.  A variable can be named by the last part
+        of its public name, by the first part if this is unique, and by the public name
+        with ``_`` in place of dots.
     """
     indices: dict[str, list[int]] = {}
     for k, name in enumerate(variables):
@@ -258,7 +261,7 @@ def apply_functions(
 
 
 def in_session(conditions: Conditions, session: str | None) -> NDArray:
-    """Return a mask (R,) of the readings of a session; all True for None."""
+    """Return a mask (R,) of the readings in a session, or of all readings for None."""
     if session is None:
         return np.ones(len(conditions), dtype=bool)
     if conditions.session is None:

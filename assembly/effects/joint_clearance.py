@@ -9,11 +9,11 @@ from forcefit.assembly.measurement.conditions import Conditions
 from forcefit.assembly.model.robot import Clearance, Frame, Robot
 
 _KINDS = ("radial", "axial", "tilt")
-_NONE_BELOW = 1e-9  # [m, rad] smaller clearances are treated as zero
+_NONE_BELOW = 1e-9  # [m, rad] clearance below which a joint has no clearance
 
 
 def moving_joints(robot: Robot) -> tuple[str, ...]:
-    """Return the mobile joints without clearance in the robot file."""
+    """Return the joints that move and have no clearance in the robot file."""
     return tuple(
         f.name for f in robot.frames if f.joint != "fixed" and _is_tight(f.clearance)
     )

@@ -75,7 +75,7 @@ class Library(Mapping[str, Effect]):
 
 
 def _naming_owner(effect: Effect, words: str) -> Effect:
-    """Add the name of the distribution to errors raised by an effect."""
+    """Add the name of the distribution to exceptions that its effect raises."""
     functions = {
         one.name: getattr(effect, one.name) for one in fields(effect)
         if callable(getattr(effect, one.name))

@@ -1,4 +1,4 @@
-"""Gain and offset of the load, applied load = gain x recorded load + offset."""
+"""Gain and offset of the load: applied load = gain x recorded load + offset."""
 
 from dataclasses import replace
 

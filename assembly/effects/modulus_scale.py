@@ -36,7 +36,7 @@ def _apply(conditions: Conditions, values: Values) -> Conditions:
 
 
 def _public(robot: Robot, values: Values) -> dict[str, float]:
-    """Convert relative changes 1 / factor - 1 to factors on the modulus."""
+    """Convert fitted values 1 / factor - 1 to factors on the modulus."""
     ends = len(".softer")
     return {name[:-ends]: 1 / (1 + s) for name, s in values.items()}
 

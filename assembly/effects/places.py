@@ -10,7 +10,7 @@ from forcefit.assembly.measurement.conditions import Conditions
 from forcefit.assembly.model.frame import between_origins
 from forcefit.assembly.model.robot import BeamLink, Frame, Robot, beam_axis
 
-_LEAST = 1e-6  # [m] smallest distance between the origins of a body
+_LEAST = 1e-6  # [m] smallest distance between both ends of a body with a length
 
 
 def drives(robot: Robot) -> tuple[str, ...]:
@@ -38,7 +38,7 @@ def bodies(robot: Robot) -> tuple[str, ...]:
 
 
 def growing(robot: Robot) -> tuple[str, ...]:
-    """Return the bodies whose length can vary."""
+    """Return the beams, or all bodies with a length if there are no beams."""
     return beams(robot) or bodies(robot)
 
 

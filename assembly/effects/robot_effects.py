@@ -54,7 +54,8 @@ def apply_robot_effects(
     Args:
         posture: posture of the robot without effects.
         load: (6,) [N m, N] wrench on the platform at its origin, base axes.
-        gravity: (3,) [m/s^2] gravity vector in base axes, added to that of effects.
+        gravity: (3,) [m/s^2] gravity vector in base axes, added to the gravity due to
+            effects.
         covariates: values by name: ``temperature`` [K] above calibration, ``time`` [s],
             ``approach``, other variables of functions, and ``session``.
         finite: whether the exact model is used.

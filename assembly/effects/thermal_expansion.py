@@ -1,4 +1,4 @@
-"""Thermal expansion of a body by coefficient x length x temperature.
+"""Thermal expansion of a body: elongation = coefficient x length x temperature.
 
 The body expands along its beam, or along the line between its joints.
 """

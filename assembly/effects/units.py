@@ -79,7 +79,7 @@ def units_of(robot: Robot, function: Function) -> dict[str, str]:
 def _parameter_unit(
     robot: Robot, function: Function, component: str, name: str
 ) -> str:  # fmt: skip
-    """Return the unit of a parameter in one component."""
+    """Return the unit of a parameter for one component of the function."""
     given = [variable_unit(robot, variable) for variable in function.variables]
     whole = result_unit(function, component)
     angle = component.startswith("r") and function.where != "load"
@@ -114,7 +114,7 @@ def _parameter_unit(
 
 
 def turning_variables(function: Function) -> tuple[str, ...]:
-    """Return the variables of a function that have a ``period``."""
+    """Return the variables in which a function is periodic."""
     if function.form == "reversal_waves":
         return function.variables[-1:]
     if function.form == "scaled_waves":
