@@ -2,15 +2,17 @@ r"""Inertial loads and weight of a moving beam.
 
 A beam moves approximately as a rigid body.  Its load per length is linear along the
 beam, q(x) = rho A (g - a(x)).  Its moment per length is constant, m = -rho (J alpha +
-omega x J omega).  At the tip of a cantilever, this load causes the same deflection as
+omega x J omega).  At the tip of a beam clamped at its base, this load causes the same
+deflection as the wrench
 
     F_x = Q_0 / 2 + Q_1 / 3                M_x = m_x L / 2
     F_y = Q_0 / 2 + Q_1 (7/20 + phi/3) / (1 + phi) + m_z / (1 + phi)
     M_z = Q_0 L / 12 + Q_1 L / 8 - L (F_y - m_z) / 2 + ..
 
-and so on, where Q_0 = q(0) L, Q_1 = (q(L) - q(0)) L and phi = 12 E I / (k G A L^2). For
-phi = 0, this wrench is the product of the consistent mass matrix and the accelerations
-of both ends.  The rest of the load acts at the base.
+where Q_0 = q(0) L, Q_1 = (q(L) - q(0)) L and phi = 12 E I / (k G A L^2).  The other
+components are similar.  For phi = 0, this wrench is the product of the consistent mass
+matrix and the accelerations of both ends.  The total load minus this wrench acts at the
+base.
 
 ======  =======================================================  ==============
 symbol  meaning                                                  unit
@@ -38,7 +40,7 @@ from forcefit.stiffness.beam.beam import section_axes
 from forcefit.stiffness.beam.beam_stress import peak_beam_stress, section_stress
 from forcefit.stiffness.beam.sections import declared_section
 
-_ALONG = 33  # number of sections; a parabolic moment is accurate to 1e-3
+_ALONG = 33  # number of sections at which the stress is computed
 _FEW = 34  # number of fibres used to locate the section with the largest stress
 
 
@@ -123,7 +125,7 @@ class BeamLoad:
             count: number of equally spaced sections.
 
         Returns:
-            (k, count, 6) [N m, N] wrenches, positive as at the tip.
+            (k, count, 6) [N m, N] wrenches, with the sign convention of ``tip``.
         """
         L, x = self.data.length, np.array([1.0, 0.0, 0.0])
         s = L * np.linspace(1, 0, count)[:, None]  # distance from the tip
@@ -136,7 +138,7 @@ class BeamLoad:
 
 @lru_cache(maxsize=256)
 def beam_data(frame: Frame) -> BeamData | None:
-    """Return the data of a frame's beam, or None without a beam or a density."""
+    """Return the properties of a frame's beam, or None without a beam or a density."""
     link = frame.link
     if not isinstance(link, BeamLink) or not link.density:
         return None
@@ -146,7 +148,8 @@ def beam_data(frame: Frame) -> BeamData | None:
     second = np.array([section.I_y + section.I_z, section.I_y, section.I_z])
     turned = np.kron(np.eye(2), axes)
     C = turned.T @ link_compliance(frame) @ turned
-    # compliances L^3 / 3 E I + L / k G A for a force and L / E I for a moment
+    # The tip compliance is L^3 / 3 E I + L / k G A for a force, and L / E I for a
+    # moment.
     bending, turning = np.diag(C)[[4, 5]], np.diag(C)[[2, 1]]
     shear = 12 * (bending - turning * length**2 / 3) / (turning * length**2)
     return BeamData(
@@ -190,8 +193,8 @@ def beam_load(motion: Motion, body: int, gravity: NDArray) -> BeamLoad | None:
 def beam_stress(frame: Frame, load: BeamLoad, tip: NDArray) -> NDArray:
     """Return the largest von Mises stress of a beam under its distributed load.
 
-    A subset of the fibres is evaluated at 33 sections, and all fibres at the section
-    with the largest stress.
+    The stress in 34 fibres is evaluated at 33 sections.  At the section with the
+    largest stress, all fibres are evaluated.
 
     Args:
         frame: frame of a beam with a declared cross-section.

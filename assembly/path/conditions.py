@@ -1,8 +1,8 @@
-"""Loads on a robot, and effects in its robot file, along a path.
+"""Loads on a robot along a path, and the effects in its robot file.
 
-At each instant, the effects change errors, springs, masses, loads and gravity as in
-``forcefit assembly solve``.  Effects that depend on the direction of approach or on
-earlier measurements are not supported.
+At each instant, the effects change errors, springs, masses, loads and gravity as in the
+command ``forcefit assembly solve``.  Effects that depend on the direction of approach
+or on earlier measurements are not supported.
 """
 
 from collections.abc import Mapping
@@ -102,8 +102,9 @@ def path_conditions(
         under: values of covariates by name.
 
     Returns:
-        Conditions with k rows.  The effects change the springs, clearances and masses
-        of their robot.  An elastic foundation is an additional frame.
+        Conditions with k rows.  Effects that change springs, clearances or masses are
+        applied to their robot.  An elastic foundation is an additional frame of this
+        robot.
     """
     covariates: dict[str, ArrayLike] = dict(under)
     if "time" in covariates:

@@ -25,7 +25,7 @@ def path_dataset(errors: "PathErrors", command: str = "") -> "xarray.Dataset":
         command: command line for the provenance, or an empty string.
 
     Returns:
-        Data set over ``time`` with the unit and meaning of each variable.  Its
+        Data set over ``time`` that includes the unit and meaning of each variable.  Its
         attributes include the robot, the profile and the program.
     """
     import xarray

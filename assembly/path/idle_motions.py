@@ -17,7 +17,7 @@ from forcefit.assembly.path.inertial_loads import InertialLoads, inertial_loads
 from forcefit.assembly.path.motion import Motion, carries_matrix, idle_rates
 
 _MASSLESS = 1e-12  # [-] tolerance for zero inertias, relative to the largest inertia
-_ROUNDING = 1e-20  # [-] round-off of an inertia, relative to mass x (longest arm)^2
+_ROUNDING = 1e-20  # [-] round-off of an inertia, relative to its upper bound
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +28,7 @@ class IdleMotions:
         joints: (k, n, d) [rad or m] rates of n joints in d idle motions at k points.
         bodies: d twists (k, n, 6) of the bodies, at the base's origin.
         parts: d twists (k, n, 6) of the bodies that each joint moves.
-        inverse: (k, d, d) pseudoinverse of the inertia of the idle motions.
+        inverse: (k, d, d) pseudoinverse of the mass matrix of the idle motions.
     """
 
     joints: NDArray
@@ -60,7 +60,7 @@ def idle_motions(motion: Motion) -> IdleMotions | None:
 
 
 def momentum_free_rates(motion: Motion, idle: IdleMotions) -> NDArray:
-    """Return changes of the joint rates that make the momentum of idle motions zero.
+    """Return changes of joint rates for which the momentum of idle motions is zero.
 
     Args:
         motion: motion at k points with arbitrary rates of the idle motions.
@@ -113,9 +113,9 @@ def _inverse(inertia: NDArray, least: NDArray) -> NDArray:
     """Return the pseudoinverses of symmetric matrices.
 
     Args:
-        inertia: (k, d, d) inertia of the idle motions.
-        least: (k,) tolerance for zero eigenvalues, which is the round-off of the
-            inertia.
+        inertia: (k, d, d) mass matrix of the idle motions.
+        least: (k,) round-off of the mass matrix; smaller eigenvalues are treated as
+            zero.
 
     Returns:
         (k, d, d) pseudoinverses.
@@ -127,7 +127,7 @@ def _inverse(inertia: NDArray, least: NDArray) -> NDArray:
 
 
 def _largest_inertia(motion: Motion, bodies: list[NDArray]) -> NDArray:
-    """Return the inertia if the whole mass moved with the fastest body, (k,)."""
+    """Return an upper bound on the inertia of an idle motion, (k,)."""
     along = np.zeros_like(motion.twists)
     along[..., 3] = 1.0
     still = replace(motion, twists=np.zeros_like(along), accelerations=along)

@@ -1,7 +1,7 @@
 r"""D'Alembert loads and weight of all bodies of a moving robot.
 
-The loads of a rigid body of mass m, centre c and inertia tensor I, at its frame's
-origin O, are
+The load on a rigid body of mass m, centre c and inertia tensor I, at its frame's
+origin, is
 
     F = m (g - a_c),        M = c x F - (I alpha + omega x I omega)
 
@@ -30,8 +30,8 @@ class InertialLoads:
         bodies: (k, n, 6) [N m, N] loads on each body, at its frame's origin.
         carried: (k, n, 6) [N m, N] loads on the body that each frame's joint moves, at
             the frame's origin.
-        at_tips: (k, n, 6) [N m, N] loads of links with a density, which ``bodies``
-            includes, in the axes of the frames.
+        at_tips: (k, n, 6) [N m, N] loads at the tips of links with a density, in the
+            axes of the frames.  They are included in ``bodies``.
         beams: distributed loads of beams, by frame index.
     """
 
@@ -99,6 +99,6 @@ def _of_rigid_body(motion: Motion, i: int, gravity: NDArray) -> NDArray:
 
 
 def _turned(R: NDArray, wrenches: NDArray) -> NDArray:
-    """Return wrenches (k, 6) in rotated axes."""
+    """Return wrenches (k, 6) in other axes."""
     halves = wrenches.reshape(len(wrenches), 2, 3)
     return (halves @ np.swapaxes(R, -1, -2)).reshape(len(wrenches), 6)

@@ -1,9 +1,9 @@
 """Inertial loads and weight of a moving mesh link.
 
 The mass matrix of the finite elements is condensed to the motions of both ends of the
-link and multiplied by their accelerations.  The resultant may differ from that of the
-rigid link if its centre of mass is not between the ends.  Half of the difference is
-added at each end.
+link and multiplied by their accelerations.  The resultant of these loads can differ
+from that of a rigid link, for example if the centre of mass is not between the ends.
+Half of the difference is added at each end.
 """
 
 import numpy as np
@@ -47,7 +47,8 @@ def mesh_end_wrenches(
         for point in (tip, tip - R @ span)
     )
     e = span / np.linalg.norm(span)
-    # angular accelerations that agree with the slope of the acceleration along the axis
+    # the slope of the acceleration along the axis, as an angular acceleration of both
+    # ends
     slope = alpha + np.cross(e, omega) * (omega @ e)[:, None]
     wrenches = -np.hstack([slope, at_base, slope, at_tip]) @ M.T
     base, tip = wrenches[:, :6], wrenches[:, 6:]
@@ -58,7 +59,7 @@ def mesh_end_wrenches(
 
 
 def _at_tip(wrenches: NDArray, span: NDArray) -> NDArray:
-    """Return base wrenches (k, 6) with the tip as reference point."""
+    """Return wrenches (k, 6) at the tip that are equivalent to base wrenches."""
     read = wrenches.copy()
     read[:, :3] -= np.cross(span, wrenches[:, 3:])
     return read
@@ -85,7 +86,7 @@ def _rigid(
     rigid = ends.T @ M @ ends
     wrench = -np.hstack([alpha, at_tip]) @ rigid
     wrench[:, :3] -= np.cross(omega, omega @ rigid[:3, :3])
-    # mass times vector from the tip to the centre of mass
+    # mass times the vector from the tip to the centre of mass
     first = np.array([rigid[2, 4], rigid[0, 5], rigid[1, 3]])
     wrench[:, 3:] -= np.cross(omega, np.cross(omega, first))
     return wrench

@@ -3,7 +3,7 @@ r"""Velocities and accelerations of all bodies of a robot along a path.
 ======  ======================  ============  =====================================
 symbol  code                    shape         meaning
 ======  ======================  ============  =====================================
-S_j     ``screws``              (k, n, 6)     unit motion of joint j, base axes
+S_j     ``screws``              (k, n, 6)     unit twist of joint j, base axes
 q', q'' ``rates``               (k, n)        rates and second derivatives of the
                                               joint coordinates
 V_j     ``twists``              (k, n, 6)     twist [omega, v] of body j, with v at
@@ -13,10 +13,10 @@ A_j     ``accelerations``       (k, n, 6)     derivative of V_j with time
 
 The twist of a body is V = sum S_j q'_j over the joints that move it, and its derivative
 is A = sum S_j q''_j + [V_j, S_j] q'_j.  Both frames of a closure have the same V and A.
-These equations and those of the prescribed pose components are linear in q' and in q'',
-with the same matrix.  The minimum-norm solution is used if a rate is undetermined, for
-example the spin of a rod between two ball joints.  Such motions are then corrected by
-:mod:`forcefit.assembly.path.idle_motions`.
+The closure equations and those of the prescribed pose components are linear in q' and
+in q'', with the same matrix.  The minimum-norm solution is used if a rate is
+undetermined, for example the spin of a rod between two ball joints.  The module
+:mod:`forcefit.assembly.path.idle_motions` then corrects such motions.
 
 Sources:
     Featherstone (2008), Rigid Body Dynamics Algorithms, chapters 2 and 8 (spatial
@@ -101,9 +101,10 @@ def follow_path(
 
     Args:
         postures: k postures on the path.
-        names: c prescribed components of one kind, ``tx`` .. or ``q.<frame>``. If joint
-            coordinates are prescribed, unnamed drives do not move.
-        path: (k, c) components [m or rad], first derivatives and second derivatives.
+        names: c prescribed components, either pose components ``tx`` .. or joint
+            coordinates ``q.<frame>``.  In the second case, all other drives do not
+            move.
+        path: three arrays (k, c): components [m or rad], first and second derivatives.
         idle: (k, n) [rad/s or m/s] joint rates of idle motions, which are added to the
             minimum-norm solution, see
             :func:`forcefit.assembly.path.idle_motions.momentum_free_rates`.
@@ -151,7 +152,7 @@ def follow_path(
 def _with_all_drives(
     robot: Robot, names: tuple[str, ...], path: tuple[NDArray, NDArray, NDArray]
 ) -> tuple[tuple[str, ...], tuple[NDArray, NDArray, NDArray]]:
-    """Return a path of joint coordinates with the missing drives, which do not move."""
+    """Return a path of joint coordinates, to which drives at rest are added."""
     drives = [f"q.{f.name}" for f in robot.frames if f.actuated]
     still = [name for name in drives if name not in names]
     zero = np.zeros((len(path[0]), len(still)))
@@ -177,7 +178,7 @@ def _closures(robot: Robot) -> NDArray:
 
 
 def _of_closures(robot: Robot, bodies: NDArray) -> NDArray:
-    """Return the screw of the first frame minus that of the second, (k, 6 closures)."""
+    """Return differences of frame screws at the closures, (k, 6 closures)."""
     pairs = _closures(robot)
     first, second = bodies[:, pairs[:, 0]], bodies[:, pairs[:, 1]]
     return (first - second).reshape(len(bodies), 6 * len(pairs))
@@ -270,7 +271,7 @@ def _turning_of_jacobian(turn: NDArray, rate: NDArray) -> NDArray:
 
 
 def _inverse(values: NDArray, mismatch: Any) -> NDArray:
-    """Return inverse singular values, 0 below the threshold, (k, m)."""
+    """Return inverse singular values, (k, m), with 0 for values below the threshold."""
     least = np.maximum(_SINGULAR, _NOISE * np.broadcast_to(mismatch, len(values)))
     kept = values > least[:, None] * values[:, :1]
     return np.where(kept, 1 / np.where(kept, values, 1.0), 0.0)
@@ -283,8 +284,8 @@ def idle_rates(motion: Motion) -> NDArray:
         motion: motion of a robot of n frames at k points.
 
     Returns:
-        (k, n, d) [rad or m] d independent motions, where d is the smallest number at
-        all points.
+        (k, n, d) [rad or m] d independent motions, where d is the smallest number of
+        such motions at any point.
     """
     robot = motion.postures.robot
     passive = np.array([f.passive for f in robot.frames])

@@ -2,7 +2,7 @@
 
 At each instant, inertia and weight act as static loads, and problem (22) is solved.
 Vibration, damping and the inertial forces of the deflection itself are neglected.  This
-is valid if the path takes many periods of the first natural frequency, and if the
+is valid if the path takes many periods of the first natural vibration, and if the
 acceleration is continuous.
 """
 
@@ -51,8 +51,8 @@ if TYPE_CHECKING:
     import xarray
 
 _BLOCK = 2000  # number of points that are solved and stored together
-_BLOCK_OF_TANGENTS = 100  # this number if the compliance is computed under load
-# results that are available at points without an equilibrium
+_BLOCK_OF_TANGENTS = 100  # number of points per block with compliance under load
+# names of results that exist at points without an equilibrium
 _GEOMETRIC = {
     "coordinates", "rates", "second_rates", "platform", "platform_velocity",
     "platform_acceleration", "compliance",
@@ -69,7 +69,7 @@ class PathErrors:
     Attributes:
         robot: the robot with the effects in its file applied.  An elastic foundation is
             an additional frame.
-        declared: the robot as declared in its file.
+        declared: the robot as defined in its file, without effects applied.
         trajectory: components of the pose over time.
         assumption: assumption for the pose error bounds, problem (27); ``"none"`` for
             no bounds.
@@ -82,7 +82,8 @@ class PathErrors:
             - ``coordinates``, ``rates``, ``second_rates`` (k, n): joint coordinates and
               their derivatives
             - ``platform`` (k, 4, 4): pose of the platform
-            - ``platform_velocity``, ``platform_acceleration`` (k, 6): at its origin
+            - ``platform_velocity``, ``platform_acceleration`` (k, 6): motion at its
+              origin
             - ``platform_screw`` (k, 6): pose error due to geometric errors and loads
             - ``inertial_screw`` (k, 6): change of the pose error due to accelerations
             - ``energy`` (k,): elastic energy
@@ -133,12 +134,12 @@ class PathErrors:
 
     @property
     def inertial(self) -> NDArray:
-        """Change of the pose error due to the accelerations, (k, 6) [rad, m]."""
+        """Change of the pose error due to accelerations, (k, 6) [rad, m]."""
         return self.arrays["inertial_screw"]
 
     @property
     def periods(self) -> float:
-        """Duration of the path in periods of the first mode; NaN if unknown."""
+        """Duration of the path divided by the first natural period; NaN if unknown."""
         return self.trajectory.duration * self.frequency
 
     @property
@@ -222,7 +223,7 @@ def path_errors(
 
 @dataclass(frozen=True, eq=False)
 class _Asked:
-    """Arguments of :func:`path_errors`, shared by all blocks."""
+    """Arguments of :func:`path_errors` that all blocks of points share."""
 
     robot: Robot
     trajectory: Trajectory
@@ -317,7 +318,7 @@ def _conditions(asked: _Asked, rows: slice, there: Posture) -> Conditions:
 
 
 def _verdicts(asked: _Asked, rows: slice, there: Posture) -> list[tuple[str, str]]:
-    """Return the status of each posture, and the reason."""
+    """Return the status of each posture, and the reason if it is not ok."""
     names = asked.trajectory.names
     goals = goals_of(names, asked.robot, asked.trajectory.values[rows])
     target = Target(coordinates=goals) if of_joints(names) else Target(goals)
@@ -343,7 +344,7 @@ def _followed(
 def _statuses(
     assembly: Assembly, verdict: list[tuple[str, str]]
 ) -> tuple[NDArray, NDArray]:
-    """Return the status of each point, and the reason."""
+    """Return the status of each point, and the reason if it is not ok."""
     status, reason = assembly.status.astype(object), assembly.reason.astype(object)
     for i, (geometric, why) in enumerate(verdict):
         if geometric and (status[i] == OK or geometric == SINGULAR):

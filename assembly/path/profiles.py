@@ -1,6 +1,7 @@
-"""Rest-to-rest motion profiles: fraction s of the path at the relative time t.
+"""Rest-to-rest motion profiles: traversed fraction s of the path at relative time t.
 
-The peaks of speed and acceleration refer to s and t, which range from 0 to 1.
+Both s and t range from 0 to 1.  The columns "speed" and "acceleration" contain the
+peaks of ds/dt and d^2s/dt^2.
 
 ==========  ========================  ======  ============  =======================
 name        s                         speed   acceleration  discontinuity
@@ -34,11 +35,11 @@ def _polynomial(*coefficients: float) -> Law:
 
 def _trapezoid(t: NDArray) -> tuple[NDArray, NDArray, NDArray]:
     """Return s, s' and s'' of the trapezoidal profile."""
-    left = np.minimum(t, 1 - t)  # time to the nearest end
+    left = np.minimum(t, 1 - t)  # time from the start or to the end, if shorter
     ramp = left < 1 / 3
     way = np.where(ramp, 2.25 * left**2, 1.5 * left - 0.25)
     speed = np.where(ramp, 4.5 * left, 1.5)
-    # at t = 1/3 and 2/3, the acceleration of the first or last third is returned
+    # at the jumps t = 1/3 and 2/3, return the acceleration of the first or last third
     size = np.where(left <= 1 / 3, 4.5, 0.0)
     return np.where(t <= 0.5, way, 1 - way), speed, np.where(t <= 0.5, size, -size)
 

@@ -101,7 +101,7 @@ def path_page(
 
 
 def _good(summary: Mapping[str, Any]) -> bool | None:
-    """Return the verdict on a path, or None if vibration may be significant."""
+    """Return True if a path can be followed, None if vibration may be significant."""
     if summary["status"] != OK:
         return False
     periods = summary["periods"] or 0.0
@@ -129,7 +129,7 @@ def _verdict(summary: Mapping[str, Any]) -> str:
 
 
 def _tiles(summary: Mapping[str, Any]) -> list[Tile]:
-    """Return tiles for deflection, drive force and periods."""
+    """Return tiles on deflection, drive force and duration in natural periods."""
     tiles = []
     for key in ("inertial_rotation", "inertial_translation", "stress"):
         peak = summary.get("largest", {}).get(key)

@@ -48,7 +48,8 @@ class PathTimes:
         acceleration: [m/s^2, or rad/s^2 or m/s^2 of drives] largest acceleration of the
             profile.
         interval: [s] time between the poses of a path without times.
-        ends: ``"rest"`` or ``"moving"``, for a path with times.
+        ends: for a path with times, ``"rest"`` if speed and acceleration are zero at
+            both ends, or ``"moving"``.
         points: number of equally spaced instants.
     """
 
@@ -110,7 +111,8 @@ def errors_along_path(
         acceleration: [m/s^2, or rad/s^2 or m/s^2 of drives] largest acceleration of the
             profile.
         interval: [s] time between the poses of a path without times.
-        ends: ``"rest"`` or ``"moving"``, for a path with times.
+        ends: for a path with times, ``"rest"`` if speed and acceleration are zero at
+            both ends, or ``"moving"``.
         points: number of equally spaced instants.
         load: (6,) [N m, N] constant load on the platform at its origin, base axes.
         gravity: (3,) [m/s^2] gravity in base axes; None for no gravity.
@@ -158,7 +160,7 @@ def errors_along_path(
 def _identity(
     robot: Robot, trajectory: Trajectory, asked: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """Return the values that must be equal to those in a journal to resume a path."""
+    """Return values that identify a path; a journal must have equal values."""
     digest = sha256(trajectory.law.encode())
     for name in ("times", "values", "first", "second"):
         digest.update(np.ascontiguousarray(getattr(trajectory, name)).tobytes())

@@ -16,11 +16,12 @@ from forcefit.results.display import largest_row, listing
 from forcefit.results.text import in_unit, lines_of, table_lines
 from forcefit.results.units import FACTORS
 
-# [periods] shortest path for which vibration is small, at most 15 % (quintic profile)
+# [periods] shortest duration for which vibration is small; at most 15 % for the quintic
+# profile
 LEAST_PERIODS = 10.0
 _STARTS = 1e-6  # [-] tolerance for zero end accelerations, relative to the largest
 LAWS = {"times": "spline through poses at given times"}
-# description, SI unit and displayed unit of the largest values
+# description, SI unit and displayed unit of each reported largest value
 LARGEST = {
     "inertial_translation": ("deflection due to acceleration", "m", "um"),
     "inertial_rotation": ("rotation due to acceleration", "rad", "mrad"),
@@ -106,8 +107,8 @@ def path_summary(errors: PathErrors) -> dict[str, Any]:
 def _peak(
     values: NDArray, times: NDArray, owners: list[str] | None = None
 ) -> dict[str, Any]:
-    """Return the largest value, its time, and its body or link."""
-    known = np.where(np.isfinite(values), values, -1.0)  # magnitudes are not negative
+    """Return the largest value, with its time and its body or link."""
+    known = np.where(np.isfinite(values), values, -1.0)  # magnitudes are >= 0
     over_time = known if known.ndim == 1 else known.max(axis=1)
     row = largest_row(over_time)
     peak: dict[str, Any] = {"value": float(over_time[row]), "time": float(times[row])}

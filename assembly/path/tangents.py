@@ -1,7 +1,7 @@
 """Platform compliance along a path, nominal or under the loads at each instant.
 
-The tangent compliance is computed for a robot at rest under the d'Alembert loads.  They
-are dead loads, which do not change if the platform moves.
+The tangent compliance is computed for a robot at rest under the d'Alembert loads.
+These loads are dead loads, which do not change if the platform moves.
 """
 
 from typing import Any

@@ -16,8 +16,8 @@ from forcefit.assembly.path.path_file import PathTable
 from forcefit.assembly.path.profiles import JUMPING, PROFILES
 from forcefit.inputs.table import BadInput, nearest
 
-MOST_POINTS = 20_000  # maximum number of points; a hexapod then needs 600 MB
-_FINE = 4001  # number of instants for the peak speed and acceleration
+MOST_POINTS = 20_000  # maximum number of points
+_FINE = 4001  # number of instants at which peak speed and acceleration are searched
 _ROWS_MOVING = 6  # minimum number of poses for a quintic spline without end conditions
 
 
@@ -96,7 +96,7 @@ def profiled(
         table: path, whose times are not used.
         points: number of equally spaced instants.
         profile: name in :data:`forcefit.assembly.path.profiles.PROFILES`.
-        size: [m] length equivalent to 1 rad in the chord length.
+        size: [m] length by which rotations are multiplied in the chord length.
         duration: [s] duration of the motion; None if limits are given.
         speed: [m/s, or rad/s of drives] largest speed of the platform's origin, or of
             any named joint.
@@ -165,7 +165,7 @@ def _within(
     names: tuple[str, ...], first: NDArray, second: NDArray, speed: float | None,
     acceleration: float | None,
 ) -> float:  # fmt: skip
-    """Return the shortest duration [s] for which a motion is within limits."""
+    """Return the shortest duration [s] with speed and acceleration within limits."""
     # speed is inversely proportional to the duration, acceleration to its square
     moved = [k for k, name in enumerate(names) if name[0] == "t"]
     if names[0].startswith("q."):
