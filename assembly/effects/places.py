@@ -78,7 +78,7 @@ def with_screws(conditions: Conditions, frame: str, screws: NDArray) -> Conditio
 def with_frame(
     conditions: Conditions, frame: str, change: Callable[[Frame], Frame]
 ) -> Conditions:
-    """Replace one frame of the robot in the conditions."""
+    """Replace one frame of the robot to which the conditions belong."""
     row = conditions.robot.index(frame)
     frames = list(conditions.robot.frames)
     frames[row] = change(frames[row])

@@ -256,7 +256,8 @@ def wrenches_on_frames(place: Placement, loads: DeadLoads) -> tuple[NDArray, NDA
     if loads.drives.any():
         joint = joint + drive_wrenches(place.model.posture, loads, place.carried)
     if loads.load.any():
-        # the load on the platform acts on its body
+        # all bodies on the path to the platform transmit this wrench, and all joints on
+        # the path except that of the platform's frame
         last = robot.index(robot.platform)
         on_path = robot.on_path[last][:, None] * place.load_wrench(loads.load)
         body, joint = body + on_path, joint + on_path

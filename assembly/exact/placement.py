@@ -90,7 +90,7 @@ class Placement:
 
     @property
     def body_ends(self) -> NDArray:
-        """Ends of the bodies, before the motions in the joint, (n, 4, 4)."""
+        """Poses of the bodies' ends, before clearance and joint motions, (n, 4, 4)."""
         return self._poses[1]
 
     @cached_property

@@ -192,7 +192,7 @@ def _cones(bounds: NDArray, scales: NDArray) -> tuple[NDArray, NDArray, NDArray]
 
 
 def _free(bounds: NDArray, robot: Robot) -> NDArray:
-    """Return unit columns of unbounded motions."""
+    """Return a unit screw for each unbounded joint motion, as columns."""
     rows = [6 * i + r for i, cone in np.argwhere(np.isinf(bounds)) for r in CONES[cone]]
     columns = np.zeros((6 * len(bounds), len(rows)))
     columns[rows, np.arange(len(rows))] = 1.0

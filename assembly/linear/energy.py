@@ -199,7 +199,7 @@ def failure_status(error: Exception) -> str:
 def _solve_one(
     posture: Posture, load: NDArray, loads: FrameLoads, method: Method
 ) -> Assembly:
-    """Solve one posture by the compiled or, if necessary, the reference method."""
+    """Solve problem (22) at one posture, by the compiled method if possible."""
     robot = posture.robot
     if method == "reference":
         return least_energy(posture, load, loads)
@@ -393,7 +393,7 @@ def _certify(rows: _Rows, points: Assembly) -> None:
 
 
 def _fill(given: tuple[Any, ...], rows: _Rows, loads: NDArray | None) -> None:
-    """Solve the points that have errors or loads; leave other results at zero."""
+    """Solve problems with errors or loads; the results of all others remain zero."""
     if loads is not None or np.count_nonzero(given[2][:1]) or given[2].any():
         structure, T, errors, mismatch = given
         assemble_side_by_side(structure, T, errors, mismatch, loads, rows)
@@ -430,7 +430,7 @@ def _of_rows(
 
 
 def _by_reference(where: Assembly, own_axes_free: bool) -> Assembly | Exception:
-    """Solve one point by the reference method; return the result or the exception."""
+    """Return the result of the reference method for one problem, or its exception."""
     try:
         return least_energy(where.posture, where.load, where.frame_loads, own_axes_free)
     except (CannotAssemble, FreeMotion, SolverFailed) as error:
@@ -441,7 +441,7 @@ def _record(
     rows: _Rows, apart: dict[int, Assembly | Exception], i: int,
     found: Assembly | Exception,
 ) -> None:  # fmt: skip
-    """Store the result of one point in ``rows``, or in ``apart`` if shapes differ."""
+    """Store the result of one problem in ``rows``, or in ``apart`` if shapes differ."""
     rows["method"][i] = "reference"
     if isinstance(found, Exception):
         for name in (*_NUMBERS, "platform_screw", *_VECTORS):

@@ -56,13 +56,13 @@ class FrameLoads:
         return bool(np.count_nonzero(self.body) or np.count_nonzero(self.joint))
 
     def __getitem__(self, rows: Any) -> "FrameLoads":
-        """Return the loads of one point or of a selection."""
+        """Return the loads at one posture or at a selection of postures."""
         parts = (self.body, self.joint, self.distributed)
         return FrameLoads(*(part[rows] if part.ndim > 1 else part for part in parts))
 
     @property
     def at_tips(self) -> NDArray:
-        """Field ``distributed`` as one wrench per frame, (..., n, 6) [N m, N]."""
+        """Tip wrenches of distributed weights, one per frame, (..., n, 6) [N m, N]."""
         full = np.broadcast_to(self.distributed, self.body.shape)
         return full.reshape(*full.shape[:-1], -1, 6)
 

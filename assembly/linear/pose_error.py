@@ -191,7 +191,7 @@ def bound_pose_error(
 
 
 def _bounds_of_many(assembly: Assembly, asked: Asked) -> PoseError:
-    """Bound the errors at many points; use the reference method where needed."""
+    """Bound the pose errors of many assemblies."""
     rows, left = compiled_bounds(assembly, asked)
     status, reason = assembly.status.copy(), assembly.reason.copy()
     left &= status == OK
@@ -211,7 +211,7 @@ def _bounds_of_many(assembly: Assembly, asked: Asked) -> PoseError:
 
 
 def _bounds_of_one(assembly: Assembly, asked: Asked) -> PoseError:
-    """Bound the errors at one point from a set of screws constructed in numpy."""
+    """Bound the pose errors of one assembly in numpy."""
     reachable = reachable_screws(assembly, asked.assumption, asked.energy_budget)
     reachable = reachable.at_point(asked.offset)
     rotation, rotation_screw, supports = reachable.farthest(

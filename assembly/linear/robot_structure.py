@@ -104,7 +104,7 @@ class _Tree:
 
 @lru_cache(maxsize=32)
 def _structure(joints: VirtualJoints, tree: _Tree, own_axes_free: bool) -> Structure:
-    """Return the arrays; robots that differ only in their errors share them."""
+    """Return the arrays of a robot, which do not depend on its errors."""
     robot = tree.robot
     on_path = robot.on_path[tree.platform]
     signs = closure_signs(robot).T.astype(float)
@@ -150,7 +150,7 @@ def _structure(joints: VirtualJoints, tree: _Tree, own_axes_free: bool) -> Struc
 
 
 def _by_frame(columns: NDArray) -> tuple[NDArray, NDArray]:
-    """Return the frame of each column, and its screw in the frame axes, (count, 6)."""
+    """Return the frame of each column, and its screw in frame axes, (count, 6)."""
     blocks = columns.T.reshape(columns.shape[1], len(columns) // 6, 6)
     frame = np.abs(blocks).max(axis=2).argmax(axis=1) if len(blocks) else np.zeros(0)
     frame = frame.astype(np.int64)

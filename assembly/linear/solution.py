@@ -93,7 +93,7 @@ class Solution(PointResults, Generic[N]):
         return self.linearisation.posture
 
     def __getitem__(self, rows: Any) -> Self:
-        """Return one or several points; raise the exception of a failed point."""
+        """Return the solution at one point or a selection of points."""
         if not isinstance(rows, (int, np.integer)):
             return self._taken(np.arange(len(self))[rows])
         i = range(len(self))[rows]
@@ -189,7 +189,7 @@ class Solution(PointResults, Generic[N]):
 
     @property
     def as_many(self) -> Self:
-        """Solution of one point in the form of k = 1 points."""
+        """This solution in the form of a solution at k = 1 points."""
         lin = self.linearisation
         rows: dict[str, Any] = {
             name: np.asarray(getattr(self, name))[None]

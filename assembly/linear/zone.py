@@ -70,7 +70,7 @@ class Zone(PointResults, Generic[N]):
     }
 
     def _figures(self) -> Figures:
-        """Return the margin of one point, or the largest margin of many points."""
+        """Return the margin of one posture, or the largest margin of many postures."""
         if not self.of_many:
             margin, bound = f"{self.margin:.6g}", f"{self.bound:.6g}"
             return {"margin": margin, "bound": bound, "method": self.method}
@@ -81,7 +81,7 @@ class Zone(PointResults, Generic[N]):
         return {"points": points, "margin": f"at most {largest:.6g} where finite"}
 
     def __getitem__(self, rows: Any) -> "Zone":
-        """Return one point or a selection; raise SolverFailed for a failed point."""
+        """Return the margins of one posture or a selection of postures."""
         taken = super().__getitem__(rows)
         if not taken.of_many and np.isnan(taken.margin):
             raise SolverFailed("smallest factor on the clearances", taken.reason)
@@ -184,7 +184,7 @@ def zone_margin(
 
 
 def _erring(posture: Posture, errors: NDArray, i: int) -> Posture:
-    """Return the posture of a point with the geometric errors of that point."""
+    """Return one of k postures, with its own geometric errors."""
     if posture.transforms.ndim > 3:
         posture = posture[i if len(posture.transforms) > 1 else 0]
     own = errors if errors.ndim == 2 else errors[i]

@@ -1,4 +1,4 @@
-"""Contact springs in series with joints, load = coefficient |deflection|^exponent."""
+"""Contact springs in series with joints: load = coefficient |deflection|^exponent."""
 
 from dataclasses import replace
 

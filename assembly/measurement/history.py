@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-STILL = 1e-9  # [rad, m] smaller changes of a command are ignored
+STILL = 1e-9  # [rad, m] changes of a command below this value are ignored
 
 
 @dataclass(frozen=True, eq=False)

@@ -265,7 +265,7 @@ def read(conditions: Conditions, screws: NDArray) -> NDArray:
 
 
 def _turned(R: NDArray, vectors: NDArray) -> NDArray:
-    """Rotate vectors (R, 3) by a common matrix or by one matrix each."""
+    """Rotate vectors (R, 3) by a common matrix, or each vector by its own matrix."""
     if R.ndim == 2:
         return vectors @ R.T
     return np.einsum("rij,...j->ri" if vectors.ndim == 1 else "rij,rj->ri", R, vectors)

@@ -13,7 +13,7 @@ closures, and F the free motions.  The matrix is factorised once for each postur
 symbol  code                  shape        meaning
 ======  ====================  ===========  ===========================================
 J       ``rows``              (c,6K,6n)    closures at c postures, scaled
-P       ``platform``          (c,6,6n)     screws to the platform screw, eq. (8)
+P       ``platform``          (c,6,6n)     from frame screws to platform screw, eq. (8)
 lambda  ``multipliers``       (R,6K)       multipliers of the scaled closures
 w       ``joint_wrenches``    (R,6n)       wrenches through all joints
 ======  ====================  ===========  ===========================================
@@ -266,7 +266,7 @@ def flexibility(postures: Posture) -> Flexibility:
         ValueError: the robot has clearances.
     """
     robot = postures.robot
-    # Robots that differ only in errors and loads share the factorisation.
+    # The factorisation is cached. It does not depend on errors and loads.
     springs = link_compliances(robot), joint_compliances(robot)
     arrays = *springs, clearance_bounds(robot), own_screws(robot)
     return _factorise(content_of(postures, arrays, (robot.closures, robot.platform)))

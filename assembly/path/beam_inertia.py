@@ -80,7 +80,7 @@ class BeamLoad:
     m: NDArray
 
     def rows(self, which: NDArray) -> "BeamLoad":
-        """Return the load at selected points of the path."""
+        """Return the beam's load at selected points of the path."""
         return replace(self, q0=self.q0[which], q1=self.q1[which], m=self.m[which])
 
     def at_tip(self) -> NDArray:

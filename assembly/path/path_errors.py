@@ -52,7 +52,7 @@ if TYPE_CHECKING:
 
 _BLOCK = 2000  # number of points that are solved and stored together
 _BLOCK_OF_TANGENTS = 100  # number of points per block with compliance under load
-# names of results that exist at points without an equilibrium
+# names of results that are also known at points without an equilibrium
 _GEOMETRIC = {
     "coordinates", "rates", "second_rates", "platform", "platform_velocity",
     "platform_acceleration", "compliance",

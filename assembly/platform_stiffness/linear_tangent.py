@@ -112,7 +112,7 @@ def active_tangent(assembly: Assembly, side: Side = "loading") -> PlatformStiffn
 
 
 def _tangents(u: NDArray) -> NDArray:
-    """Return the tangents to the boundary of a cone at a point u (d,), (d - 1, d)."""
+    """Return tangents to the boundary of a cone at a point u, as rows (d - 1, d)."""
     if len(u) == 2:
         return np.array([[-u[1], u[0]]])
     return np.asarray(np.linalg.svd(u[None])[2][1:])

@@ -132,7 +132,7 @@ def closest_of_same_energy(
 
 
 def _closest(u: NDArray, last: NDArray, rows: NDArray, group: NDArray) -> NDArray:
-    """Return the closest point for one program."""
+    """Return the minimiser that is closest to a given point, for one program."""
     eye, zero = np.eye(len(u)), np.zeros(len(u))
     try:
         found = minimise_energy(eye, -last, zero, rows, rows @ u, group)

@@ -147,7 +147,7 @@ def price_shares(allocation: Allocation) -> NDArray:
 def _taken(
     allocation: Allocation, key: str, reached: float, at: str
 ) -> dict[str, float | str]:
-    """Return a limited pose error without geometric errors, and its effect on cost."""
+    """Return the pose error due to clearances, its limit, and its effect on cost."""
     plan, limit = allocation.plan, allocation.plan.limits[key]
     # The pose error is approximately the pose error due to clearances plus a term that
     # is proportional to the tolerances.

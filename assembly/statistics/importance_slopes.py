@@ -70,7 +70,7 @@ def platform_slopes(prepared: LinearResponse, draws: Assembly) -> NDArray:
 
 
 def error_units(sources: Sources, design: SaltelliDesign) -> list[str]:
-    """Return the unit of each group's errors."""
+    """Return the unit of the errors in each group."""
     units = sources.units
     of_groups = [{units[i] for i in columns} for _, columns in design.groups]
     return [of.pop() if len(of) == 1 else "rad, m" for of in of_groups]

@@ -115,7 +115,7 @@ def histogram_figure(
 
 
 def _histogram(panel: Any, text: str, values: Any) -> None:
-    """Draw the histogram of a quantity or of its largest component."""
+    """Draw the histogram of a quantity, or of its maximum over all links."""
     x = values.max(axis=1) if values.ndim == 2 else values
     x = x[np.isfinite(x)]
     panel.set(xlabel=text, ylabel="draws")

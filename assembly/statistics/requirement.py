@@ -132,7 +132,7 @@ class Requirement:
 
     @cached_property
     def prepared(self) -> dict[str, list]:
-        """Problem (21) or linear response of each posture, by quantity."""
+        """For each quantity, problem (21) or the linear response at each posture."""
         return {
             key: [prepare_margins(p, MARGINS[key]) for p in self.postures]
             if key in MARGINS else [e.energies for e in self.experiments]

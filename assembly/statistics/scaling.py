@@ -148,7 +148,7 @@ def _next_factor(
 
 
 def _allowed_failures(draws: int, asked: float) -> int:
-    """Return the largest number of violations that demonstrates a yield."""
+    """Return the largest number of failed draws with which a yield is demonstrated."""
     # The lower bound on the yield decreases with the number of failures.
     low, high = -1, draws
     while high - low > 1:

@@ -1,4 +1,4 @@
-"""Figures of robots, of results at one point, and of data sets."""
+"""Figures of robots, of results at one posture, and of data sets."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path

@@ -40,7 +40,7 @@ Progress = Callable[[str, int, int], None]
 
 @dataclass(frozen=True, eq=False)
 class _Case:
-    """A limit at a posture."""
+    """A limit at a posture, with the sets of all errors and clearances."""
 
     key: str
     sets: ErrorSets
@@ -130,7 +130,7 @@ def allot_worst_case(
 
 
 def _case(posture: Posture, plan: Plan, key: str) -> _Case:
-    """Return a limit at a posture, with error zones for the largest widths."""
+    """Return the data of a limit at a posture, with zones of the largest widths."""
     sources = plan.sources
     assert isinstance(sources, CalloutSources)
     sets = error_sets(linear_response(posture), sources)
@@ -168,7 +168,7 @@ def _plane(case: _Case, plan: Plan, shares: NDArray) -> list[NDArray]:
 
 
 def _factor(case: _Case, plan: Plan, shares: NDArray) -> float:
-    """Return a factor on tolerances with which the bound satisfies the limit."""
+    """Return a factor on all tolerances with which a limit is satisfied."""
     # The worst pose error is a convex function of the factor, so linear interpolation
     # between zero and the tolerances gives an upper bound.
     limit, high = plan.limits[case.key], case.worst(shares)[1]

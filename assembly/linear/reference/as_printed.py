@@ -104,7 +104,7 @@ def _root_of_stiffness(C: NDArray) -> NDArray:
 
 
 def _clearance_constraints(c: Any, bounds: NDArray, factor: NDArray) -> list:
-    """Return the constraints (2)-(5) with bounds multiplied by ``factor``."""
+    """Return the constraints (2)-(5), with all bounds multiplied by ``factor``."""
     import cvxpy as cp
 
     constraints = []
@@ -146,7 +146,7 @@ def _assembly_constraints(
 
 
 def _solve(problem: Any, allowed: set[str]) -> None:
-    """Solve a problem with small tolerances; raise RuntimeError for other statuses."""
+    """Solve a problem with small tolerances; raise RuntimeError without an optimum."""
     import cvxpy as cp
 
     tight = {"tol_gap_abs": 1e-12, "tol_gap_rel": 1e-11, "tol_feas": 1e-11}

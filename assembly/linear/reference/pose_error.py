@@ -111,7 +111,7 @@ class ReachableSet:
     __repr__, _repr_html_ = short_repr, html_table
 
     def unbounded(self, part: int) -> bool:
-        """Return whether the rotation (``part`` 0) or translation (3) is unbounded."""
+        """Return whether the rotation (``part`` 0) or the translation (3) is unbounded."""
         free = self.free[part : part + 3]
         return bool(np.abs(free).max(initial=0.0) > UNBOUNDED)
 
@@ -361,7 +361,7 @@ class _Motion:
 
 
 def clearances_in(assembly: Assembly, joints: VirtualJoints) -> NDArray:
-    """Return the clearance motions of an assembly in other basis columns."""
+    """Return the clearance motions of an assembly for other basis columns."""
     screws = clearance_components(joints.robot, assembly.clearance_screws).ravel()
     u = joints.cones.T @ screws / (joints.cones**2).sum(axis=0)
     return into_cones(u, joints.group)

@@ -296,7 +296,7 @@ def _rigid_rows(
     rank = rank_of(S, ROWS_RANK, noise)
     errors = np.abs(lin.rows * lin.posture.robot.errors.ravel()).max(initial=0.0)
     unclosed = np.abs(U[:, rank:].T @ wanted).max(initial=0.0)
-    # Rows are rigid within a tolerance, so a load still deforms them slightly.
+    # A load slightly deforms equations that are treated as rigid.
     bent = np.abs(right).max(initial=0.0)
     allowed = 1e-12 + 10 * tolerance * max(errors, bent)
     independent = U[:, :rank]
