@@ -183,7 +183,7 @@ def bound_screw(assembly: Assembly) -> ScrewBound:
         )
 
     def uncertain(joints: VirtualJoints) -> MovingCones:
-        """Return cones of all unknowns that can vary within the duality gap."""
+        """Return the unknowns that are uncertain because of the duality gap."""
         columns, start, group, room = _room(assembly, joints, gap)
         springs = joints.elastic * np.sqrt(2.0 * gap)
         columns = np.hstack([columns * room, springs])

@@ -109,8 +109,8 @@ def _structure(joints: VirtualJoints, tree: _Tree, own_axes_free: bool) -> Struc
     on_path = robot.on_path[tree.platform]
     signs = closure_signs(robot).T.astype(float)
     patterns, pattern_of = np.unique(signs, axis=0, return_inverse=True)
-    # The springs of a group have equal signs in all closures and on the path to the
-    # platform.
+    # All springs of a group have the same signs in all closures. Either all or none of
+    # them are on the path to the platform.
     spring_frame, springs = _by_frame(joints.elastic)
     acting = np.any(signs[spring_frame] != 0.0, axis=1)
     key = 2 * pattern_of[spring_frame] + on_path[spring_frame]

@@ -210,7 +210,7 @@ class RowState:
 
     @cached_property
     def passive_motion(self) -> NDArray:
-        """Additional motions of passive joints, (R, n) [rad or m]."""
+        """Motions of passive joints from the nominal posture, (R, n) [rad or m]."""
         moved = self.motions @ self.rows.flexible.free.T
         own = [f.own_axis for f in self.rows.conditions.robot.frames]
         return moved.reshape(*self.screws.shape[1:])[..., np.arange(len(own)), own]

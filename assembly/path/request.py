@@ -160,7 +160,7 @@ def errors_along_path(
 def _identity(
     robot: Robot, trajectory: Trajectory, asked: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """Return values that identify a path; a journal must have equal values."""
+    """Return values that must agree with those in a journal."""
     digest = sha256(trajectory.law.encode())
     for name in ("times", "values", "first", "second"):
         digest.update(np.ascontiguousarray(getattr(trajectory, name)).tobytes())

@@ -123,7 +123,7 @@ def _of_one(
     posture: Posture, state: State, load: ArrayLike | None, gravity: ArrayLike | None,
     offset: NDArray, side: Side, method: Method,
 ) -> PlatformStiffness:  # fmt: skip
-    """Return the stiffness at one posture."""
+    """Return the platform stiffness at one posture."""
     platform = posture.platform
     if state == "nominal":
         tangent = without_clearance(posture)

@@ -162,7 +162,7 @@ def importance_dataset(
 def _parts(variances: NDArray) -> NDArray:
     """Compute the parts of d groups, (2, d), from screw variances, (6, d)."""
     lost = np.isnan(variances).all(axis=0)
-    # The index of a constant component is NaN.
+    # The Sobol indices of a constant component are NaN.
     variances = np.maximum(np.nan_to_num(variances), 0.0)
     part = np.sqrt(np.stack([variances[:3].sum(axis=0), variances[3:].sum(axis=0)]))
     part[:, lost] = np.nan

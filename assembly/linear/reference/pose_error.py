@@ -111,7 +111,7 @@ class ReachableSet:
     __repr__, _repr_html_ = short_repr, html_table
 
     def unbounded(self, part: int) -> bool:
-        """Return whether the rotation (``part`` 0) or the translation (3) is unbounded."""
+        """Return whether the rotation (part 0) or translation (part 3) is unbounded."""
         free = self.free[part : part + 3]
         return bool(np.abs(free).max(initial=0.0) > UNBOUNDED)
 
@@ -165,7 +165,8 @@ class ReachableSet:
 
     def _screw_near(self, v: NDArray) -> NDArray:
         """Return the platform screw [rad, m] at a point of the set near v."""
-        # Rows are satisfied to machine precision, cones to 5e-9 of their size.
+        # The screw satisfies the closures to machine precision, and the bounds of the
+        # cones to 5e-9 of their size.
         start, group = self.start, self.group
         step = v - start
         step = step - self.rows.T @ (self.rows @ step)
