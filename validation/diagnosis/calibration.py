@@ -17,13 +17,15 @@ from forcefit.validation.diagnosis.verdict import verdict
 
 @dataclass(frozen=True)
 class Calibration:
-    """Success and error rates of a diagnosis for a given campaign design.
+    """Success and error rates of a diagnosis, estimated by simulation.
 
     Attributes:
-        campaigns: number of simulated campaigns of each kind.
-        without: number of simulated pure-noise campaigns with each verdict.
-        with_found: number of simulated campaigns with each verdict, for campaigns that
-            contain the identified effects.
+        campaigns: number of simulated campaigns with effects, which equals the number
+            of campaigns without effects.
+        without: mapping from each verdict to its number of occurrences in the campaigns
+            without effects.
+        with_found: mapping from each verdict to its number of occurrences in the
+            campaigns that contain the identified effects.
         right: fraction of the campaigns with effects in which the diagnosis identified
             exactly these effects.
         false_claims: fraction of all verdicts that claim absent effects.
@@ -41,12 +43,13 @@ def calibrate(
 ) -> Calibration:
     """Simulate and diagnose campaigns with the design of a measured campaign.
 
-    The simulated readings are linear in the effects of the identified machine. The
-    final fit of the diagnosis is omitted.
+    The simulated readings are linear in the effects of the identified machine. To save
+    time, the simulated diagnoses omit the final fit.
 
     Args:
         diagnosis: diagnosis whose design and identified machine are simulated.
-        count: number of campaigns of each kind.
+        count: number of campaigns with effects, and number of campaigns without
+            effects.
         update: function called with the number of finished campaigns.
 
     Returns:

@@ -1,7 +1,7 @@
 """Describe candidate functions, which represent effects outside the library.
 
-A candidate function is a small displacement or a compliance at a frame, at the base or
-in the readings. Its value depends on one or two variables.
+A candidate function describes a small displacement or a compliance that depends on one
+or two variables. It acts at a frame, at the base or on the readings.
 """
 
 from collections.abc import Iterator, Sequence
@@ -19,7 +19,7 @@ from forcefit.assembly.model.robot import Frame, Robot
 from forcefit.validation.diagnosis.function_forms import CandidateShape
 
 TURN, SHIFT = AXES[:3], AXES[3:]
-# Changes below this fraction of a vector's largest component are round-off.
+# Changes below this fraction of the largest vector component are treated as zero.
 _ROUNDING = 1e-12
 
 
@@ -34,7 +34,7 @@ class CandidatePart:
 
     @property
     def variables(self) -> tuple[str, ...]:
-        """Public names of the variables, one or two."""
+        """Public names of the one or two variables of the function."""
         second = (self.second_variable,) if self.second_variable else ()
         return (self.variable, *second)
 
@@ -46,7 +46,7 @@ class Candidate:
     Attributes:
         parts: locations and variables.
         kind: ``"screw"`` or ``"compliance"``.
-        shape: form of the function, the same for all parts.
+        shape: functional form, such as a polynomial, which is the same for all parts.
     """
 
     parts: tuple[CandidatePart, ...]
@@ -83,7 +83,7 @@ def variables_of(conditions: Conditions) -> list[str]:
     """Return the names of the variables on which a function can depend.
 
     Variables are drive coordinates, loads, positions and covariates. A variable is
-    returned if it varies and if at least one session contains all its values.
+    returned if its values differ and if at least one session has a value in every row.
     """
     names = [f"q.{name}" for name in drives(conditions.robot)]
     names += [f"load.{axis}" for axis in ("mx", "my", "mz", "fx", "fy", "fz")]
@@ -103,7 +103,7 @@ def variables_of(conditions: Conditions) -> list[str]:
 
 
 def _kind(name: str) -> str:
-    """Return the vector to which a component belongs, or the name of a scalar."""
+    """Return the name of the vector to which a component belongs."""
     vectors = "position.", "load.m", "load.f"
     return next((v for v in vectors if name.startswith(v)), name)
 

@@ -1,8 +1,9 @@
 """Decide which effects of a fitted machine the readings support.
 
-An effect is claimed if it satisfies three conditions.  Its change of the readings
-exceeds the uncertainty of this change.  Noise alone is unlikely to cause this change.
-No shape parameter is at a bound, and no other parameter is at its upper bound.
+An effect is supported if it satisfies three conditions. The change of the readings due
+to the effect exceeds the uncertainty of this change. Noise alone is unlikely to cause
+this change. No shape parameter is at a bound, and no other parameter is at its upper
+bound.
 """
 
 from dataclasses import dataclass
@@ -17,14 +18,16 @@ from forcefit.validation.diagnosis.lack_of_fit import UNLIKELY
 from forcefit.validation.diagnosis.separability import orthonormal_basis
 from forcefit.validation.diagnosis.unknowns import STEP, Acting, effects_in
 
-# Relative distance from a bound below which an unknown is treated as at the bound.
+# An unknown is treated as being at a bound if its relative distance from the bound is
+# smaller than this value.
 _AT_BOUND = 1e-3
 
 
 def supported(fit: MachineFit, one: Acting) -> bool:
     """Return whether the readings support an effect of the fitted machine.
 
-    The pose of the measuring frame is always supported, because every campaign has one.
+    The pose of the measuring frame is always supported, because every campaign has a
+    measuring frame.
     """
     slots = one.hypothesis.slots
     if one.device or not slots:
@@ -50,7 +53,7 @@ def supported(fit: MachineFit, one: Acting) -> bool:
 
 
 def _without_devices(fit: MachineFit, slopes: NDArray) -> NDArray:
-    """Project out of derivatives (n, k) the changes that a moved device also causes."""
+    """Return derivatives (n, k) with the effect of a moved measuring device removed."""
     own = [fit.own(one)[2] for one in fit.unknowns.effects if one.device]
     if not own:
         return slopes

@@ -1,4 +1,4 @@
-"""Compute the regression columns of all candidate effects of a campaign."""
+"""Compute the design matrices of all candidate effects of a campaign."""
 
 import math
 from collections import Counter
@@ -45,33 +45,34 @@ FUNCTION = "function"
 _CLOCK = 0.999  # correlation with time above which a variable is treated as time
 # Number of random rows on which functions are scored first.
 _SAMPLE = 500
-# Smallest fraction of a column that must remain after motions of the measuring frame
-# are projected out. Otherwise the column is dropped.
+# A column of a design matrix is dropped if a smaller fraction of its norm remains after
+# motions of the measuring frame are projected out.
 _ALIKE = 1e-3
 # Smallest visible change, as a sum of squares over the whitened readings.
 _VISIBLE = 4.0
 
 
 class Columns:
-    """Regression columns of all candidate effects, for N measured cells.
+    """Design matrices of all candidate effects, for N readings.
 
     Attributes:
         campaign: campaign of R rows.
-        conditions: measuring conditions of these rows.
-        row: (N,) row of each cell.
-        block: (N,) configuration or time span of each cell.
-        visit: (N,) row of each cell in the file.
+        conditions: measuring conditions of the rows.
+        row: (N,) row of each reading.
+        block: (N,) index of the configuration or time span of each reading.
+        visit: (N,) index of the row of the measuring file that contains each reading.
         motions: (R, 6, 6) change of the readings per platform motion, see
-            :func:`.platform_motions`. None if every file row contains a single point.
-        device: hypothesis for the pose of the measuring frame. None if this pose is
-            known.
-        flat: (N, f) columns for the pose of the measuring frame in each session.
-        library: elements of the library effects.
-        nuisance: geometric errors and springs, which every machine has.
+            :func:`.platform_motions`. None if every row of the file contains a single
+            point.
+        device: hypothesis that the pose of the measuring frame is unknown. None if this
+            pose is known.
+        flat: (N, f) design matrix for the poses of the measuring frame in all sessions.
+        library: linear models of the library effects.
+        nuisance: design matrix of geometric errors and joint springs.
         functions: candidate functions at single locations.
-        sampled: (N,) mask of the cells on which functions are scored first.
-        explicit: functions at several locations, with their columns in the sampled
-            cells.
+        sampled: (N,) mask of the readings on which functions are scored first.
+        explicit: functions that act at several locations, with their design matrices
+            for the sampled readings.
     """
 
     def __init__(
@@ -137,7 +138,7 @@ class Columns:
         return [e for e in made if e.columns.shape[1] or e.offset is not None]
 
     def without_clocks(self) -> "Columns":
-        """Return the columns without effects and functions of time."""
+        """Return a copy without effects and functions that depend on time."""
         other = copy(self)
         timed = {name for name, effect in LIBRARY.items() if effect.needs == ("time",)}
         other.library = [e for e in self.library if e.name not in timed]
@@ -153,7 +154,7 @@ class Columns:
         return bool(self.library or self.explicit or self.functions.variables)
 
     def loadings(self, cells: NDArray) -> NDArray | None:
-        """Return changes (n, 6) of the readings per platform motion, over sigma."""
+        """Return changes (n, 6) of the readings / sigma per platform motion."""
         if self.motions is None:
             return None
         measured = self.campaign.cells
@@ -163,10 +164,10 @@ class Columns:
     def whitening(
         self, cells: NDArray, root: NDArray, common: tuple[float, float]
     ) -> Whitening:
-        """Return the whitening transformation of selected cells (N,).
+        """Return the whitening transformation of selected readings.
 
         Args:
-            cells: (N,) mask of the n selected cells.
+            cells: (N,) mask of the n selected readings.
             root: (n,) square roots of the relative precisions.
             common: [rad, m] standard deviations of the common platform motion, divided
                 by tau.
@@ -191,13 +192,13 @@ class Columns:
         return bool(abs(np.corrcoef(x, time)[0, 1]) > _CLOCK)
 
     def _named(self) -> NDArray:
-        """Return the columns (N, c) of library effects that have a single unknown."""
+        """Return the design matrix (N, c) of library effects with one unknown."""
         alone = [e.columns for e in self.library if e.columns.shape[1] == 1]
         return np.hstack([np.zeros((len(self.row), 0)), *alone])
 
     @cached_property
     def flat(self) -> NDArray:
-        """Columns (N, f) for the pose of the measuring frame in each session."""
+        """Design matrix (N, f) for the poses of the measuring frame in all sessions."""
         if self.device is None:
             return np.zeros((len(self.row), 0))
         columns = self.tangents.at_start(self.device).columns
@@ -226,7 +227,7 @@ def _shows(signature: Signature) -> bool:
 
 
 def _print(signature: Signature) -> object:
-    """Return a key that is equal for hypotheses with the same effect and columns."""
+    """Return a key that is equal for equivalent hypotheses."""
     shown = signature.columns[:, signature.columns.any(axis=0)]
     starts = tuple(s.start for s in signature.hypothesis.slots if s.shape)
     return signature.hypothesis.effect, tuple(sorted(fingerprints(shown))), starts

@@ -3,8 +3,8 @@
 A device may measure several points of the platform together. Their readings then share
 the repeatability error of the machine. This common noise is modelled as a small random
 platform motion in each measurement, with one standard deviation for rotations and one
-for translations. Both maximise the evidence of a model in which all other unknowns are
-marginalised.
+for translations. The two standard deviations maximise the evidence, which is the
+probability density of the readings with all other unknowns integrated out.
 """
 
 import math
@@ -17,15 +17,15 @@ from forcefit.validation.diagnosis.gaussian import size_penalty
 from forcefit.validation.diagnosis.states import IN_USE, Models, State
 from forcefit.validation.diagnosis.weighted_readings import NONE
 
-# First step of the logarithms of both standard deviations, which start at one sigma.
+# First step of the logarithm of a standard deviation in the optimisation.
 _STEP = 1.0
 _CLOSE = 0.05  # tolerance on the logarithms of the standard deviations
-# [sigma] Lower bound on the noise that a standard deviation causes in the readings.
+# [sigma] Lower bound on the common noise in the readings.
 _LEAST = 0.02
 # [sigma] Common noise above which models without common noise are not tested.
 _CLEAR = 1.0
 _EVALUATIONS = 40  # maximum number of evaluations of the evidence
-_STABLE = 0.1  # largest difference between the logarithms of agreeing estimates
+_STABLE = 0.1  # largest difference of the logarithms of two estimates that agree
 
 
 def common_sizes(state: State) -> tuple[float, float]:
@@ -60,7 +60,7 @@ def common_sizes(state: State) -> tuple[float, float]:
 def _largest(
     state: State, kinds: tuple[int, ...], units: list[float]
 ) -> tuple[tuple[float, float], float]:
-    """Return the standard deviations that maximise the evidence, and this maximum."""
+    """Return the standard deviations that maximise the evidence, and its maximum."""
 
     def sizes(logs: NDArray) -> tuple[float, float]:
         own = dict(zip(kinds, np.exp(logs).tolist(), strict=True))

@@ -33,13 +33,13 @@ class Declared:
 
     @cached_property
     def derivatives(self) -> Derivatives:
-        """Derivatives of the declared readings, with joints at their rest positions."""
+        """Derivatives of predicted readings, with joints at rest positions."""
         return Derivatives(at_rest(self.conditions))
 
     def bent(
         self, campaign: Campaign, conditions: Conditions, errors: NDArray, least: float
     ) -> Conditions | None:
-        """Add the second-order effect of geometric errors to conditions.
+        """Add the second-order change due to geometric errors to measuring conditions.
 
         Args:
             campaign: campaign of R rows.
@@ -48,7 +48,8 @@ class Declared:
             least: [sigma] smallest second-order change of a reading.
 
         Returns:
-            The new conditions, or None if all second-order changes are smaller.
+            The new conditions, or None if all second-order changes are smaller than
+            ``least``.
         """
         if not errors.any():
             return None
@@ -68,8 +69,8 @@ def declared(campaign: Campaign, *, finite: bool = False) -> Declared:
 
     Args:
         campaign: campaign of R rows.
-        finite: whether the declared model computes finite motions. The robot file may
-            also request finite motions.
+        finite: whether to compute finite instead of first-order motions. The robot file
+            can also request this.
 
     Returns:
         The declared model, which does not depend on the readings.

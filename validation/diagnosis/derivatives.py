@@ -24,10 +24,10 @@ STEP = 1e-3
 
 
 class Derivatives:
-    """Readings of R rows near the declared model, and their derivatives.
+    """Predicted readings for R rows of the declared model, and their derivatives.
 
     Attributes:
-        conditions: declared conditions, including a fitted pose of the measuring
+        conditions: measuring conditions, including a fitted pose of the measuring
             device.
     """
 
@@ -71,11 +71,11 @@ class Derivatives:
         return predict(changed).deviation
 
     def begun(self, effect: str, slot: Slot, shapes: Mapping[str, float]) -> NDArray:
-        """Return the readings (R, 6) [rad, m] after a small step of one unknown.
+        """Return the readings (R, 6) [rad, m] after a small change of one unknown.
 
         Args:
             effect: name of the effect.
-            slot: the unknown.
+            slot: the unknown to change.
             shapes: values of the shape parameters of the effect.
         """
         key = (effect, slot.names, tuple(sorted(set(shapes.values()))))

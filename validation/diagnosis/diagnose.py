@@ -47,11 +47,11 @@ def diagnose(
         campaign: measured deviations.
         finite: whether the search computes finite motions of the declared model.  It
             always does if the robot file contains ``geometric_stiffening``.
-        odds: mapping from the name of an effect, ``"function"`` (any function),
-            ``"geometry"`` or ``"springs"`` to a factor on its prior odds.  A factor of
-            0 excludes the effect.
-        update: function called with the name of the step, the finished count and the
-            total.
+        odds: factors on prior odds, by name of the effect. The names ``"function"``
+            (any function), ``"geometry"`` and ``"springs"`` are also accepted. A factor
+            of 0 excludes the effect.
+        update: function called with the name of the step, the number of finished parts
+            of the step and the number of all parts.
 
     Returns:
         The diagnosis.
@@ -61,10 +61,10 @@ def diagnose(
             determine it.
     """
     held = hold_out(campaign)
-    design = declared(campaign, finite=finite)  # common to all folds
+    design = declared(campaign, finite=finite)  # the same for all folds
 
     def found(rows: NDArray) -> tuple[Traced, MachineFit, tuple[SetupBlunder, ...]]:
-        """Search and fit selected rows.
+        """Search for effects in selected rows, and fit the machine to these rows.
 
         Returns:
             The result of the search, the fitted machine, and the set-up blunders.
@@ -72,8 +72,8 @@ def diagnose(
         part = hidden(campaign, ~rows)
         seen = part.cells.any(axis=1)
         setup = setup_blunders(part.take(seen), conditions_of(part).take(seen))
-        # If there are set-up blunders, no effects are searched for, because effects
-        # could imitate a blunder.
+        # If there are set-up blunders, no effects are searched for, because an effect
+        # can explain the same deviations as a blunder.
         nothing = dict.fromkeys((*LIBRARY, FUNCTION, GEOMETRY, SPRINGS), 0.0)
         own = nothing if setup else odds
         return *trace(part, rows, design, update, odds=own), setup

@@ -33,11 +33,11 @@ class Diagnosis:
     """Result of the diagnosis of a campaign.
 
     Attributes:
-        campaign: the measurements with the declared sigma.
+        campaign: the measurements with the declared standard deviations.
         verdict: ``"explained"``, ``"learned"``, ``"none_needed"``, ``"ambiguous"``,
             ``"outside_library"`` or ``"not_enough_rows"``.
         fit: the identified machine, with all parameters fitted together.
-        traced: result of the search.
+        traced: result of the search for effects.
         claimed: names of the claimed effects.
         effects: names of all effects of the identified machine, claimed or not.
         probability: probability of each detectable library effect.
@@ -45,28 +45,28 @@ class Diagnosis:
             first.
         lack: lack-of-fit test of the fitted rows.
         before: errors of the declared model on the held-out rows, without outliers.
-        after: errors of fitted machines on the same rows, which were not used in the
-            fits.
+        after: errors of the fitted machines on the held-out rows.
         saved: errors of the saved robot on all rows to which it was fitted.
-        noise: errors expected from noise alone.
+        noise: errors expected due to noise alone.
         with_outliers: ``before`` and ``after`` including the held-out outliers.
         uncertainty: [-] standard error of ``after.normalised``.
         noise_scale: ratio of true to declared sigma, and its standard deviation.
         noise_in_time: correlation of the noise in time.  None if there is no
             correlation.
-        sequence: models from the declared to the identified machine, with their errors.
+        sequence: sequence of models from the declared to the identified machine, with
+            their errors.
         held: the held-out rows and how they were chosen.
         outliers: (R,) bool, True for rows excluded from all computations.
         conditions: declared conditions, including the pose of the measuring device.
-        open: (R,) bool, True for rows in which the pose is undetermined because of
-            clearances, in the declared model or with the identified effects.
+        open: (R,) bool, True for rows in which the predicted pose is undetermined
+            because of clearances.
         residual_before: (R, 6) [rad, m] reading minus prediction of the declared model,
             NaN if not measured.
         residual_after: (R, 6) [rad, m] reading minus prediction of the saved robot.
         trends: variables on which the residual depends.
         next: the best additional measurement if the verdict is ambiguous.
         needed: description of the additional rows that a verdict requires.
-        remarks: sentences about implausible parameters and impossible readings.
+        remarks: sentences about implausible parameters and impossible sensor readings.
         setup: blunders in the set-up of the campaign.
         wording: function that converts a diagnosis to text.
     """

@@ -1,8 +1,9 @@
-"""Describe library effects and functions as elements of a linear model.
+"""Describe library effects and functions by linear models.
 
-An element adds ``offset + columns d`` to the whitened readings.  Unknowns d of the same
-unit share a prior standard deviation.  They are scaled so that their columns have an
-rms norm of one.
+A library effect or function adds ``offset + columns d`` to the whitened readings, with
+a design matrix ``columns`` and scaled unknowns d. Unknowns with the same unit have the
+same prior standard deviation. They are scaled so that their columns have an rms norm of
+one.
 """
 
 from collections.abc import Iterable
@@ -20,7 +21,7 @@ from forcefit.validation.diagnosis.signatures import Signature
 from forcefit.validation.diagnosis.whitening import Whitening
 
 _PLAUSIBLE = 1e3  # largest prior standard deviation, relative to a plausible value
-_NO_OFFSET = 1e-9  # [sigma] offset below which an effect has no offset
+_NO_OFFSET = 1e-9  # [sigma] offset that is treated as zero
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,18 +30,20 @@ class Element:
 
     Attributes:
         name: name of the effect, ``""`` for a function.
-        columns: (N, m) whitened change of the readings per scaled unknown.
+        columns: (N, m) design matrix, which is the whitened change of the readings per
+            scaled unknown.
         scale: (m,) factor from a scaled unknown to its value.
         offset: (N,) whitened contribution at d = 0. None if it is zero.
         lower, upper: (m,) bounds of the scaled unknowns.
         given: (m,) fixed prior standard deviation, NaN if it is optimised.
         most: largest plausible prior standard deviation.
         log_prior: logarithm of the prior probability.
-        what: the hypothesis of a library effect, or the candidate function.
+        what: the hypothesis if this is a library effect, otherwise the candidate
+            function.
         slots: (m,) index of each unknown in the parameters of ``what``.
-        begin: values of these parameters at d = 0.
-        first: the element linearised at its start values.  None if this element is
-            linearised at its start values.
+        begin: parameters of ``what`` at d = 0.
+        first: the same element linearised at its start values. None if it is already
+            linearised there.
     """
 
     name: str
@@ -64,13 +67,13 @@ class Element:
 
     @property
     def hypothesis(self) -> Hypothesis:
-        """Hypothesis, if the element is a library effect."""
+        """Hypothesis of a library effect."""
         assert isinstance(self.what, Hypothesis)
         return self.what
 
     @property
     def candidate(self) -> Candidate:
-        """Candidate, if the element is a function."""
+        """Candidate of a function."""
         assert isinstance(self.what, Candidate)
         return self.what
 
@@ -80,7 +83,7 @@ class Element:
         return np.abs(self.lower) < 1e-12
 
     def values(self, d: NDArray) -> NDArray:
-        """Return the parameters of the element for scaled unknowns d, within bounds."""
+        """Return the parameters for scaled unknowns d, limited to their bounds."""
         x = self.begin.copy()
         x[self.slots] += np.clip(d, self.lower, self.upper) * self.scale
         return x
@@ -89,7 +92,7 @@ class Element:
 def effect_element(
     signature: Signature, robot: Robot, log_prior: float, shapes: NDArray | None = None
 ) -> Element:
-    """Return the element of a library effect.
+    """Return the linear model of a library effect.
 
     Args:
         signature: derivatives of the effect.
@@ -99,7 +102,7 @@ def effect_element(
             start values.
 
     Returns:
-        The element, without unknowns that do not affect the readings.
+        The linear model, without unknowns that do not affect the readings.
     """
     h = signature.hypothesis
     shape = np.array([slot.shape for slot in h.slots], dtype=bool)
@@ -114,8 +117,7 @@ def effect_element(
     kinds = [_kind(robot, h, k) for k in slots.tolist()]
     norm = _norms(columns, kinds)
     norm = np.where(shape[slots], 1.0, norm)
-    # If an effect is linearised at its start values, its shape parameters have no
-    # columns.
+    # Shape parameters are fixed if the effect is linearised at its start values.
     held = np.where(shape & (shapes is None), 0.0, begin)
     offset = signature.offset + signature.columns @ held
     scale = plausible / norm
@@ -157,7 +159,7 @@ def function_element(
     candidate: Candidate, columns: NDArray, axes: NDArray, falling: NDArray,
     most: float, log_prior: float,
 ) -> Element | None:  # fmt: skip
-    """Return the element of a function, or None if it does not affect the readings.
+    """Return the linear model of a function, or None if no reading depends on it.
 
     Args:
         candidate: the function.
@@ -180,17 +182,17 @@ def function_element(
 
 
 class Dense:
-    """Elements with stored columns, whose scores are computed in batches."""
+    """Linear models with stored design matrices, which are scored in batches."""
 
     def __init__(
         self, elements: list[Element], cells: NDArray, whiten: Whitening
     ) -> None:
-        """Store elements for selected cells, grouped by their number of columns.
+        """Store linear models for selected readings, grouped by number of columns.
 
         Args:
-            elements: the elements.
-            cells: (N,) mask of the selected cells.
-            whiten: whitening transformation of these cells.
+            elements: the linear models of effects and functions.
+            cells: (N,) mask of the selected readings.
+            whiten: whitening transformation of these readings.
         """
         self.elements = elements
         self._offsets: list[tuple[int, NDArray]] = []
@@ -211,7 +213,7 @@ class Dense:
             self._groups.append((np.array(own), B, gram, most, bounded))
 
     def gains(self, marginal: Marginal) -> NDArray:
-        """Return the log evidence ratio for adding each element to a model."""
+        """Return the log evidence ratios for adding each linear model."""
         gains = np.full(len(self.elements), -np.inf)
         for own, B, gram, most, bounded in self._groups:
             m = gram.shape[1]

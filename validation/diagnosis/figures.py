@@ -39,7 +39,7 @@ def error_chart(diagnosis: Diagnosis) -> str:
 
 
 def sequence_chart(diagnosis: Diagnosis) -> str:
-    """Return a bar chart of the error [sigma] of each model in the model sequence."""
+    """Return a bar chart of the error of each model in the model sequence, [sigma]."""
     values: dict[str, float] = {}
     for step in diagnosis.sequence:
         again = step.term in values  # several functions may be learned
@@ -146,9 +146,10 @@ def probability_chart(diagnosis: Diagnosis) -> str:
 
 
 def confounding_chart(diagnosis: Diagnosis) -> str:
-    """Return a chart of how well each effect can imitate each other effect."""
+    """Return a chart of the similarity of the effects."""
     columns: dict[str, NDArray] = {}
-    for element in diagnosis.traced.columns.library:  # most general first
+    # The most general hypothesis is listed first.
+    for element in diagnosis.traced.columns.library:
         if np.any(element.columns):
             columns.setdefault(element.name, element.columns)
     angles = compare_signatures(columns)
@@ -156,7 +157,7 @@ def confounding_chart(diagnosis: Diagnosis) -> str:
 
 
 def imitation_chart(shared: NDArray, names: tuple[str, ...]) -> str:
-    """Return a chart of how well each effect can imitate each other effect.
+    """Return a chart of the similarity of the effects.
 
     Args:
         shared: (m, m) fraction of effect i that effect j can imitate, in element [i,
@@ -190,7 +191,7 @@ def worst_row(diagnosis: Diagnosis) -> tuple[int, str]:
 
 
 def assembled(diagnosis: Diagnosis, row: int) -> Assembly | None:
-    """Return the pose of the identified machine under the load of a row, or None."""
+    """Return the identified machine, assembled under the load of a row."""
     campaign = replace(diagnosis.campaign, robot=diagnosis.robot)
     try:
         forced = assemble_row(replace(conditions_of(campaign), exact=False), row)

@@ -12,7 +12,7 @@ halved.
 ======  ==============  =========  ===================================================
 symbol  code            shape      meaning
 ======  ==============  =========  ===================================================
-y       ``measured``    (n,)       readings of the fitted cells
+y       ``measured``    (n,)       readings used in the fit
 W       ``whiten``      (n, n)     transformation to independent noise
 A       ``A``           (n, k)     df/dx / sigma, whitened
 P       ``precision``   (k,)       1 / s^2
@@ -40,7 +40,7 @@ from forcefit.validation.diagnosis.unknowns import Acting, Unknowns
 from forcefit.validation.diagnosis.whitening import whitening_of
 
 _STEPS = 20  # maximum number of Gauss-Newton steps
-_SLOPES = 6  # number of steps after which the derivatives are recomputed
+_SLOPES = 6  # the derivatives are recomputed after this number of steps
 _SHORTEST = 1 / 64  # smallest fraction of a Gauss-Newton step
 # Decrease of F in one step below which the iteration ends.
 _SETTLED = 1e-3
@@ -56,8 +56,8 @@ class MachineFit:
         unknowns: the fitted parameters.
         x: (k,) most probable values of the parameters.
         covariance: (k, k) posterior covariance of x.
-        slopes: (n, k) derivatives of the whitened fitted readings with respect to x.
-        residual: (n,) whitened residual of the fitted readings.
+        slopes: (n, k) derivatives of the whitened predicted readings with respect to x.
+        residual: (n,) whitened residual of the readings used in the fit.
     """
 
     unknowns: Unknowns
@@ -78,7 +78,7 @@ class MachineFit:
 
     @property
     def determined(self) -> NDArray:
-        """Fraction (k,) of the prior variance that the readings remove."""
+        """Relative reduction (k,) of the prior variances due to the readings."""
         prior = self.unknowns.std**2
         return 1.0 - np.clip(np.diag(self.covariance) / prior, 0.0, 1.0)
 
@@ -172,7 +172,7 @@ def _step(unknowns: Unknowns, A: NDArray, left: NDArray, x: NDArray) -> NDArray:
     step = solve_triangular(L, y, lower=True, trans=1, check_finite=False)
     low, high = ((bound - x) / std for bound in unknowns.bounds)
     if np.any(step < low) or np.any(step > high):
-        # The bounded step is the bounded minimiser of |L' step - y|.
+        # The step minimises |L' step - y| within the bounds.
         wide = high - low > 0.0
         step = np.zeros(len(x))
         free = lsq_linear(L.T[:, wide], y, (low[wide], high[wide]), method="bvls")

@@ -1,7 +1,7 @@
-"""List the forms of functions of one or two variables, with prior probabilities.
+"""List functional forms, such as polynomials, with their prior probabilities.
 
-All families of forms have equal prior probability, which is divided among the forms of
-the family.  Higher harmonics have a smaller prior probability.
+All families of functional forms have equal prior probability. The probability of a
+family is divided among its forms.  Higher harmonics have a smaller prior probability.
 """
 
 import math
@@ -16,7 +16,7 @@ from forcefit.assembly.measurement.variables import variable
 from forcefit.assembly.model.robot import Robot
 
 KNOTS = 7  # number of spline knots
-MANY = 150  # smallest number of rows for which high harmonics are tested
+MANY = 150  # smallest number of rows with which high harmonics are tested
 # Tested time constants, relative to the duration of the campaign.
 LAGS = 0.02, 0.03, 0.05, 0.07, 0.1, 0.14, 0.2, 0.3, 0.5
 _CYCLES = 0.5, 1, 1.5, 2, 3, 4, 6  # tested numbers of cycles during the campaign
@@ -28,19 +28,19 @@ _ALL_DEPTHS = tuple(0.01 * 1.4**k for k in range(15))
 _TURNS = 0.5
 # Largest tested number of screw turns over the travel of a slide.
 _MOST_TURNS = 200.0
-_FINER = 1.2  # first step factor in the refinement of a shape parameter
+_FINER = 1.2  # first factor on a shape parameter when it is refined
 # Loads below this fraction of the largest load are treated as zero.
 _NO_LOAD = 1e-3
-_HIGH = 12  # highest harmonic that is tested without lower ones
+_HIGH = 12  # highest harmonic that is tested without lower harmonics
 _CLOCKS = "time", "cov.time"
-# Number of tested times of a jump, first and in the refined search.
+# Number of tested times of a jump in the first search and in the refined search.
 _JUMPS, _MANY_JUMPS = 10, 91
 _INNER = np.linspace(0.1, 0.9, 9)  # quantiles of a variable used as shape parameters
 
 
 @dataclass(frozen=True)
 class CandidateShape:
-    """A form of a function, linear in its coefficients.
+    """A functional form that is linear in its coefficients, such as a polynomial.
 
     Attributes:
         form: a name of :data:`forcefit.assembly.effects.forms.FORMS`.
@@ -54,12 +54,12 @@ class CandidateShape:
 
     @property
     def bends(self) -> NDArray:
-        """Shape parameter to fit, (1,), or an empty array (0,)."""
+        """Shape parameter to fit, (1,), or an empty array if there is none."""
         one = len(self.given) == 1 and self.form != "step"
         return np.array([value for _, value in self.given] if one else [])
 
     def bent(self, by: float) -> "CandidateShape":
-        """Return the form with its shape parameter increased by ``by``."""
+        """Return the functional form with its shape parameter increased by ``by``."""
         ((key, value),) = self.given
         return replace(self, given=((key, value + by),))
 
@@ -69,7 +69,7 @@ def _powers(*powers: int) -> CandidateShape:
 
 
 def _waves(*orders: int, form: str = "waves") -> CandidateShape:
-    """Return the harmonics of an angle with given orders."""
+    """Return the sines and cosines of multiples of an angle."""
     names = tuple(f"{k}.{w}" for k in orders for w in ("sine", "cosine"))
     return CandidateShape(form, names)
 
@@ -77,7 +77,7 @@ def _waves(*orders: int, form: str = "waves") -> CandidateShape:
 def _at_each(
     form: str, names: tuple[str, ...], key: str, values: Iterable[float]
 ) -> list[CandidateShape]:
-    """Return one form for each given value of the shape parameter."""
+    """Return one functional form for each given value of the shape parameter."""
     return [CandidateShape(form, names, ((key, float(v)),)) for v in values]
 
 
@@ -93,7 +93,7 @@ def is_angle(robot: Robot, name: str) -> bool:
 
 
 def first(conditions: Conditions, name: str) -> list[CandidateShape]:
-    """Return the forms that are tested first for a variable."""
+    """Return the functional forms of a variable that are tested first."""
     if name == "approach":
         return [STRAIGHT]
     cubic, memory = _powers(0, 1, 2, 3), _reversals(conditions, name, _DEPTHS)
@@ -105,7 +105,7 @@ def first(conditions: Conditions, name: str) -> list[CandidateShape]:
 
 
 def every(conditions: Conditions, name: str) -> list[CandidateShape]:
-    """Return all forms of functions of one variable."""
+    """Return all functional forms of one variable."""
     if name == "approach":
         return [STRAIGHT]
     x, time = variable(conditions, name), conditions.time
@@ -134,7 +134,7 @@ def every(conditions: Conditions, name: str) -> list[CandidateShape]:
 
 
 def uneven(conditions: Conditions, name: str) -> list[CandidateShape]:
-    """Return the forms of a compliance that depends on an angle."""
+    """Return the functional forms of a compliance that depends on an angle."""
     if not is_angle(conditions.robot, name):
         return []
     names = [("0.cosine", f"{k}.sine", f"{k}.cosine") for k in range(1, 5)]
@@ -155,12 +155,12 @@ def screw(
 
 
 def is_screw(shape: CandidateShape) -> bool:
-    """Return whether a form is a harmonic with a given period."""
+    """Return whether a functional form is a harmonic with a given period."""
     return shape.form.endswith("waves") and bool(shape.given)
 
 
 def of_direction(conditions: Conditions, name: str) -> list[CandidateShape]:
-    """Return forms of backlash that depends on the angle of a drive or of its screw."""
+    """Return functional forms of backlash that varies with the angle of a drive."""
     if is_angle(conditions.robot, name):
         return [CandidateShape("reversal_waves", _ANGLE)]
     return screw(conditions, name, "reversal_waves", _ANGLE)
@@ -169,7 +169,7 @@ def of_direction(conditions: Conditions, name: str) -> list[CandidateShape]:
 def of_two(
     conditions: Conditions, first: str, second: str
 ) -> tuple[tuple[str, str], list[CandidateShape]] | None:
-    """Return the forms of functions of two variables, and the ordered variables.
+    """Return the functional forms of two variables, and the ordered variables.
 
     If no function of these variables is considered, return None.
     """
@@ -196,7 +196,7 @@ def of_two(
 def knees(load: NDArray, *, jump: bool) -> list[CandidateShape]:
     """Return piecewise linear springs whose stiffness changes at a given load.
 
-    With ``jump``, include a spring with a jump at zero load.
+    If ``jump`` is true, a spring with a jump at zero load is included.
     """
     least = _NO_LOAD * float(load.max(initial=0.0))
     levels = np.unique(np.quantile(load, _INNER))
@@ -210,10 +210,10 @@ def knees(load: NDArray, *, jump: bool) -> list[CandidateShape]:
 def near(
     conditions: Conditions, variables: Sequence[str], shape: CandidateShape, part: float
 ) -> list[CandidateShape]:
-    """Return a form with slightly smaller and slightly larger shape parameter.
+    """Return two functional forms with a slightly smaller and a larger shape parameter.
 
-    The change is ``part`` times half the step of the first search.  The result is empty
-    if no shape parameter is fitted.
+    The change is ``part`` times half the distance between the values in the first
+    search. If no shape parameter is fitted, the result is empty.
     """
     if not len(shape.bends):
         return []
@@ -236,7 +236,7 @@ def _steps(conditions: Conditions, name: str, count: int) -> list[CandidateShape
 def _reversals(
     conditions: Conditions, name: str, depths: Sequence[float]
 ) -> list[CandidateShape]:
-    """Return forms that depend on the direction of motion and forms of hysteresis."""
+    """Return functional forms of backlash and hysteresis."""
     if not name.startswith(("q.", "load.")) or name == "load.force":
         return []
     size = float(np.ptp(variable(conditions, name)))
@@ -245,7 +245,7 @@ def _reversals(
 
 
 def log_priors(shapes: Sequence[CandidateShape]) -> NDArray:
-    """Return the logarithms of the prior probabilities of the forms."""
+    """Return the logarithms of the prior probabilities of functional forms."""
     weight = np.array([_weight(shape) for shape in shapes])
     families = [shape.form for shape in shapes]
     total = {f: weight[[g == f for g in families]].sum() for f in set(families)}
@@ -254,14 +254,14 @@ def log_priors(shapes: Sequence[CandidateShape]) -> NDArray:
 
 
 def _weight(shape: CandidateShape) -> float:
-    """Return the relative prior probability of a form in its family."""
+    """Return the relative prior probability of a functional form in its family."""
     if is_screw(shape):
         return dict(shape.given)["period"]
     return 1.0 / max(*_orders(shape), 1) if shape.form.endswith("waves") else 1.0
 
 
 def falling(shape: CandidateShape, count: int) -> NDArray:
-    """Return relative prior standard deviations (count,) of the columns of a form."""
+    """Return relative prior standard deviations (count,) of the coefficients."""
     if shape.form != "waves" or count != len(shape.names):
         return np.ones(count)
     order = np.array(_orders(shape))
@@ -269,9 +269,9 @@ def falling(shape: CandidateShape, count: int) -> NDArray:
 
 
 def _orders(shape: CandidateShape) -> list[int]:
-    """Return the order of each harmonic column.
+    """Return the order of the harmonic of each coefficient.
 
-    If a column has two orders, the larger one is returned.
+    For a product of two harmonics, the larger order is returned.
     """
     parts = [name.split(".")[:-1] for name in shape.names]
     return [max(abs(int(part)) for part in orders) for orders in parts]

@@ -1,16 +1,17 @@
-"""Score candidate functions for all combinations of locations and forms.
+"""Score candidate functions for all combinations of locations and functional forms.
 
-A column of a function is a product B_(rc)q = a_rc P_rq.  Here a_rc is the response of
-reading c in row r to a screw component, and P_rq is column q of the form in row r.
-Inner products of columns therefore factor:
+The design matrix of a function has the elements B_(rc)q = a_rc P_rq. Here a_rc is the
+response of reading c in row r to a screw component, and P_rq is basis function q of the
+functional form in row r. Inner products are therefore computed from products over rows,
+with the columns U of :mod:`.gaussian`:
 
 ======  ===============  ===========  ================================================
 symbol  code             shape        meaning
 ======  ===============  ===========  ================================================
 a       ``answers``      (S, R, 6)    whitened response to a unit screw component
-W       ``squares``      (S, R)       sum of a^2 over the cells of a row
-P       ``numbers``      (R, q)       columns of all forms of a variable
-T       ``through``      (R, S, p)    sum over the cells of a row of a times U
+W       ``squares``      (S, R)       sum of a^2 over the readings of a row
+P       ``numbers``      (R, q)       basis functions of all forms of a variable
+T       ``through``      (R, S, p)    sum of a U over the readings of a row
 ======  ===============  ===========  ================================================
 
     B'B = P' W P,    U'B = T' P,    B'C^-1 z = P' (sum of a C^-1 z).
@@ -41,7 +42,7 @@ from forcefit.validation.diagnosis.places import Places, Weighted, Where
 from forcefit.validation.diagnosis.sensitivities import Sensitivities, in_cells
 
 Variables = tuple[str, ...]
-# A request contains the variables of a function and the forms to score.
+# A request contains the variables of a function and the functional forms to score.
 Request = tuple[Variables, tuple[CandidateShape, ...]]
 # Largest number of columns of a function with six components.
 _WIDEST = 36
@@ -60,7 +61,7 @@ class ScoredFunction:
 
 
 def _by_kind(turns: NDArray, gram: NDArray) -> NDArray:
-    """Return rms norms (f, c, m) of columns, for rotations and for translations."""
+    """Return the rms norm of each column's kind, rotation or translation, (f, c, m)."""
     diagonal = np.einsum("...kk->...k", gram)
     squares = np.zeros_like(diagonal)
     for kind in (turns, ~turns):
@@ -95,7 +96,7 @@ class Functions:
         return other
 
     def at_rows(self, rows: NDArray) -> "Functions":
-        """Restrict the columns of the candidate functions to selected rows."""
+        """Restrict the design matrices of the candidate functions to selected rows."""
         other = copy(self)
         other.campaign = self.campaign.take(rows)
         other.sensitivities = self.sensitivities.take(rows)
@@ -107,7 +108,7 @@ class Functions:
         return self.conditions if rows.all() else self.conditions.take(rows)
 
     def _shapes_of(self, variables: Variables) -> dict[CandidateShape, float]:
-        """Return all forms of functions of given variables with their log priors."""
+        """Return all functional forms of given variables with their log priors."""
         known = self.known(*variables)
         if len(variables) == 1:
             shapes = forms.every(known, variables[0])
@@ -126,12 +127,12 @@ class Functions:
         return {s: prior + float(p) for s, p in zip(shapes, logs, strict=True)}
 
     def _prior(self, variables: Variables, shape: CandidateShape) -> float:
-        """Return the log prior of a form at one location."""
+        """Return the log prior probability of a functional form at one location."""
         known = self.shapes_of(variables)
         return known.get(shape, min(known.values(), default=-math.inf))
 
     def first_look(self) -> list[Request]:
-        """Return the forms to score first for each variable."""
+        """Return the functional forms to score first for each variable."""
         requests: list[Request] = []
         for name in self.variables:
             shapes = forms.first(self.known(name), name)
@@ -140,9 +141,9 @@ class Functions:
         return requests
 
     def products(self, names: Iterable[str]) -> list[Request]:
-        """Return forms to score for functions of two variables.
+        """Return the functional forms of two variables to score.
 
-        One of the variables is among ``names``.
+        One of the two variables is among ``names``.
         """
         requests: dict[Variables, tuple[CandidateShape, ...]] = {}
         for name in names:
@@ -161,12 +162,12 @@ class Functions:
         self, marginal: Marginal, weighted: Weighted,
         requests: Sequence[Request], most: int,
     ) -> list[ScoredFunction]:  # fmt: skip
-        """Return the functions that improve a model most, best first.
+        """Return the functions that most increase the evidence of a model, best first.
 
         Args:
-            marginal: model, which was fitted to the cells of ``weighted``.
+            marginal: model, which was fitted to the same readings as ``weighted``.
             weighted: weighted responses.
-            requests: variables and forms to score.
+            requests: variables and functional forms to score.
             most: largest number of functions to return for each request.
         """
         if not len(self.places):
@@ -203,8 +204,8 @@ class Functions:
     ) -> Iterator[list[tuple[int, int]]]:
         """Yield batches of functions that have equal numbers of columns.
 
-        Each function is given by the indices of its request and its form.  A column
-        occupies ``size`` values in memory.
+        Each function is given by the index of its request and the index of its
+        functional form. A column occupies ``size`` values in memory.
         """
         by_width: dict[int, list[tuple[int, int]]] = {}
         for number, (variables, shapes) in enumerate(requests):
@@ -219,13 +220,13 @@ class Functions:
         self, own: list[tuple[int, int]], requests: Sequence[Request],
         weighted: Weighted, through: NDArray, on: NDArray,
     ) -> Iterator[tuple[NDArray, NDArray, NDArray, NDArray, NDArray]]:  # fmt: skip
-        """Compute inner products of columns of f forms at all locations.
+        """Compute inner products of the columns of f functional forms at all locations.
 
         Yields:
-            Arrays for c functions with m columns each: (c, 3) indices of request, form
-            and location; (c, m, m) B'C^-1 B; (c, m) B'C^-1 z; (c,) largest plausible
-            prior standard deviation; (c,) log prior.  Columns B are scaled to a norm of
-            about 1.
+            Arrays for c functions with m columns each: (c, 3) indices of request,
+            functional form and location; (c, m, m) B'C^-1 B; (c, m) B'C^-1 z; (c,)
+            largest plausible prior standard deviation; (c,) log prior.  Columns B are
+            scaled to a norm of about 1.
         """
         named = [(requests[number][0], requests[number][1][k]) for number, k in own]
         each = [self._numbers(*name)[weighted.rows] for name in named]
@@ -261,12 +262,12 @@ class Functions:
             )  # fmt: skip
 
     def _columns(self, variables: Variables, shape: CandidateShape) -> NDArray:
-        """Return the columns (R, q) of a form times their relative prior deviations."""
+        """Return the basis functions times their relative prior deviations, (R, q)."""
         columns = self.sensitivities.basis(variables, shape)[0]
         return columns * forms.falling(shape, columns.shape[1])
 
     def equivalents(self, one: Candidate) -> list[tuple[CandidatePart, ...]]:
-        """Return other locations at which a candidate function has equal columns."""
+        """Return other locations at which a function changes the readings equally."""
         if len(one.parts) > 1:
             return []
         part = one.parts[0]
@@ -276,7 +277,7 @@ class Functions:
         return [_at(p, part.variables, one.shape).parts for p in same]
 
     def element(self, one: Candidate, log_prior: float) -> Element | None:
-        """Return the element of a candidate, or None if it affects no reading."""
+        """Return the linear model of a candidate, or None if it affects no reading."""
         columns = in_cells(self.sensitivities, one, self.campaign)
         axes = self.sensitivities.axes(one)
         each = columns.shape[1] // sum(len(p.components) for p in one.parts)
@@ -289,6 +290,6 @@ class Functions:
 def _at(
     place: tuple[Where, ...], variables: Variables, shape: CandidateShape
 ) -> Candidate:
-    """Return the candidate function of given variables at a location."""
+    """Return a candidate function of given variables at a location."""
     part = CandidatePart(place[0][0], tuple(w[1] for w in place), *variables)
     return Candidate((part,), place[0][2], shape)

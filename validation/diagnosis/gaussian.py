@@ -29,15 +29,15 @@ from scipy.special import log_ndtr
 
 # Degrees of freedom of the prior of tau^2.
 FREEDOM = 20.0
-# [sigma] Prior standard deviations of a contribution to the readings.  The evidence is
-# averaged over these values.
+# [sigma] Standard deviations of the change of the readings due to an effect. The
+# evidence is averaged over these values.
 SIZES = 10.0 ** np.arange(-0.5, 4.1, 0.5)
 SPAN = math.log(SIZES[-1] / SIZES[0])
 _SEEN = 1e-8  # eigenvalue of a normalised Gram matrix that is treated as zero
 
 
 def deviance(squares: NDArray | float, count: int) -> NDArray | float:
-    """Return the part of -2 ln p(z) that depends on z' C^-1 z."""
+    """Return the term of -2 ln p(z) that depends on z' C^-1 z."""
     return (FREEDOM + count) * np.log1p(np.asarray(squares) / FREEDOM)
 
 
@@ -50,7 +50,7 @@ def scale(squares: float, count: int) -> tuple[float, float]:
 
 @dataclass(frozen=True, eq=False)
 class Marginal:
-    """A linear model whose unknowns are marginalised."""
+    """Linear model of readings with the Gaussian unknowns integrated out."""
 
     factor_columns: NDArray
     held: NDArray
@@ -58,13 +58,13 @@ class Marginal:
 
 
 def marginalise(columns: NDArray, std: NDArray, z: NDArray, flat: NDArray) -> Marginal:
-    """Return a linear model whose unknowns are marginalised.
+    """Return the linear model of readings with the Gaussian unknowns integrated out.
 
     Args:
         z: (n,) readings, orthogonal to ``flat``.
-        columns: (n, k) columns of the unknowns.
+        columns: (n, k) design matrix of the unknowns.
         std: (k,) prior standard deviations of the unknowns.
-        flat: (n, f) orthonormal columns of unknowns with a flat prior.
+        flat: (n, f) orthonormal design matrix of the unknowns with a flat prior.
     """
     X = columns * std
     M = X.T @ X
@@ -78,7 +78,7 @@ def marginalise(columns: NDArray, std: NDArray, z: NDArray, flat: NDArray) -> Ma
 def leave_block_out(
     marginal: Marginal, blocks: NDArray, tau: float = 1.0
 ) -> tuple[NDArray, NDArray]:
-    """Predict each block of readings (n,) by an exact fit to all other blocks.
+    """Predict each block of readings (n,) by a fit to the readings of all other blocks.
 
     Returns:
         (n,) prediction errors, and (blocks,) logarithms of the predictive densities.
@@ -90,7 +90,7 @@ def leave_block_out(
         if len(U) <= U.shape[1]:
             left = np.eye(len(U)) - U @ U.T
             errors[own] = np.linalg.lstsq(left, held, rcond=None)[0]
-        else:  # Woodbury identity, with one equation for each column
+        else:  # Woodbury identity
             left = np.eye(U.shape[1]) - U.T @ U
             errors[own] = held + U @ np.linalg.lstsq(left, U.T @ held, rcond=None)[0]
         size = np.linalg.slogdet(left)[1] - len(U) * math.log(2 * math.pi * tau**2)
@@ -102,7 +102,7 @@ def evidence_gains(
     gram: NDArray, along: NDArray, most: NDArray, bounded: NDArray | bool,
     marginal: Marginal,
 ) -> NDArray:  # fmt: skip
-    """Return the log evidence ratios of candidates, averaged over prior deviations.
+    """Return log evidence ratios, averaged over prior standard deviations.
 
     Args:
         gram: (c, m, m) matrices B'C^-1 B of c candidates, with columns scaled to a norm
@@ -145,11 +145,10 @@ def evidence_gains(
 
 
 def size_penalty(determined: float) -> float:
-    """Return the evidence penalty for optimising a prior standard deviation.
+    """Return the penalty on the log evidence for optimising a standard deviation.
 
-    The penalty is the logarithm of the ratio between the maximum of the evidence and
-    its average over all standard deviations, by Laplace's approximation.
-    ``determined`` is the number of well-determined unknowns with this standard
-    deviation.
+    The penalty is the logarithm of the maximum evidence divided by the average evidence
+    over all prior standard deviations, by Laplace's approximation. ``determined`` is
+    the number of well-determined unknowns with this standard deviation.
     """
     return math.log(SPAN) + 0.5 * math.log(max(determined, 1.0) / math.pi)

@@ -1,8 +1,9 @@
-"""Choose the held-out rows, which are whole configurations or time spans.
+"""Choose the rows that are held out of the fits to test the identified machine.
 
-A campaign of at least 60 configurations is split once into fitted and held-out rows.  A
-smaller campaign is tested by nested cross-validation.  In each fold, the whole
-diagnosis is repeated without the held-out rows of the fold.
+All rows of a configuration, or of a time span, are held out together. A campaign of at
+least 60 configurations is split once into fitted and held-out rows.  A smaller campaign
+is tested by nested cross-validation.  In each fold, the whole diagnosis is repeated
+without the held-out rows of the fold.
 """
 
 from dataclasses import dataclass, replace
@@ -15,7 +16,7 @@ from forcefit.validation.campaign.campaign import Campaign
 FEWEST = 8  # smallest number of configurations or time spans for a test
 # Smallest number of configurations for a single split.
 _SPLIT = 60
-# Fractions of blocks that are held out from few blocks and from many blocks.
+# Held-out fraction of the blocks for few blocks, and for many blocks.
 _SHARES = (1 / 4, 1 / 10)
 _ENOUGH = 60  # number of held-out blocks that is sufficient
 # Number of folds (Hastie, Tibshirani, Friedman, Elements of Statistical Learning,
@@ -31,7 +32,7 @@ class HeldOut:
     Attributes:
         how: ``"split"``, ``"folds"`` or ``"none"``.
         folds: mask (R,) of the held-out rows of each fold.  A split has one fold.
-        words: description of the method.
+        words: description of how the rows were chosen.
     """
 
     how: str
@@ -48,8 +49,8 @@ def hold_out(campaign: Campaign) -> HeldOut:
     """Choose the held-out rows of a diagnosis.
 
     Returns:
-        The held-out rows.  For fewer than two blocks, the method is ``"none"``, and all
-        rows are both fitted and tested.
+        The held-out rows. If there are fewer than two blocks, ``how`` is ``"none"``,
+        and all rows are both fitted and tested.
     """
     blocks, kind = blocks_of(campaign)
     names = np.random.default_rng(0).permutation(np.unique(blocks))
@@ -81,18 +82,22 @@ def hidden(campaign: Campaign, rows: NDArray) -> Campaign:
 
 
 def drawn(visit: NDArray, most: int) -> NDArray:
-    """Return a mask (R,) of about ``most`` random rows, without splitting visits."""
+    """Return a mask (R,) of about ``most`` random rows.
+
+    Rows that were measured together are selected together.
+    """
     listed = np.unique(visit)
     count = most * len(listed) // max(len(visit), 1)
     return np.isin(visit, np.random.default_rng(0).permutation(listed)[:count])
 
 
 def blocks_of(campaign: Campaign) -> tuple[NDArray, str]:
-    """Return the blocks of rows that are held out as a whole.
+    """Return the blocks, which are groups of rows that are held out together.
 
     Returns:
-        (R,) index of the block of each row, and the kind of block as text.  Blocks are
-        configurations or, if there are too few configurations, time spans.
+        (R,) index of the block of each row, and a description of the blocks. A block
+        contains the rows of one configuration. If there are too few configurations, a
+        block contains the rows of one time span.
     """
     blocks = campaign.configuration
     if len(np.unique(blocks)) >= FEWEST:

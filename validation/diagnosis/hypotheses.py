@@ -1,8 +1,8 @@
 """List the hypotheses of a diagnosis, which are library effects at certain frames.
 
-An effect may act at one frame or at several frames.  The frames may have separate or
-common parameters.  Each of these possibilities is a separate hypothesis.  Each fitted
-parameter of a hypothesis is called a slot.
+An effect may act at one frame or at several frames, with separate or common parameters.
+Each of these possibilities is a separate hypothesis. A fitted parameter of a hypothesis
+is called a slot.
 
 Between sessions, the machine may be homed, its tool may be changed, or the measuring
 device may be moved.  An effect may therefore have different parameters in each session.
@@ -34,7 +34,7 @@ class Slot:
         names: names of the unknowns with this value.
         unknown: scale and bounds of the unknowns.
         start: start value of a fit.
-        shape: whether the model is strongly nonlinear in the parameter.
+        shape: whether the readings depend on the parameter in a strongly nonlinear way.
         session: name of the session to which the parameter applies.  None for all
             sessions.
     """
@@ -61,7 +61,7 @@ class Hypothesis:
     slots: tuple[Slot, ...]
 
     def public(self, robot: Robot, x: Sequence[float] | NDArray) -> dict[str, float]:
-        """Return the parameters by public name, in SI units, for slot values x."""
+        """Return the effect parameters in SI units, by public name."""
         values = {
             name: float(value)
             for slot, value in zip(self.slots, x, strict=True)
@@ -144,7 +144,7 @@ def _choices(
 def _groupings(
     places: tuple[str, ...], each: int
 ) -> Iterator[tuple[tuple[str, ...], ...]]:
-    """Yield all divisions of frames into groups with common unknowns."""
+    """Yield all ways to divide frames into groups with common parameters."""
     if not places:
         return
     kinds: dict[str, list[str]] = {}
@@ -185,8 +185,8 @@ def _scanned(
 def with_declared(listed: Sequence[Hypothesis], robot: Robot) -> list[Hypothesis]:
     """Return the hypotheses that can be combined with the declared effects.
 
-    A declared effect and a hypothesis of the same effect must be equivalent to a single
-    effect.  Contact laws and delays are therefore omitted if one is declared.
+    A hypothesis of a declared effect is included only if both together are equivalent
+    to a single effect. Declared contact laws and delays are therefore omitted.
     """
     curved = {
         (name, key.removesuffix(".coefficient").removesuffix(".time_constant"))
@@ -207,13 +207,13 @@ def with_declared(listed: Sequence[Hypothesis], robot: Robot) -> list[Hypothesis
     return list(kept)
 
 
-# Effects of which two instances are not equivalent to a single instance.
+# Effects for which the sum of two instances is not equivalent to a single instance.
 _CURVED = ("contact_stiffening", "delayed_expansion")
 _SPRINGS = ("drive_compliance", "base_compliance")
 
 
 def _stiffer(slot: Slot, soft: Mapping[str, float]) -> Slot:
-    """Return a slot that permits joints to be stiffer than declared."""
+    """Return a fitted parameter that permits joints to be stiffer than declared."""
     names = [
         n.removesuffix(".compliance").replace("compliance.", "stiffness.")
         for n in slot.names
@@ -223,7 +223,7 @@ def _stiffer(slot: Slot, soft: Mapping[str, float]) -> Slot:
 
 
 def _held(slot: Slot, constant: float) -> Slot:
-    """Return a slot of a drift with a fixed time constant."""
+    """Return a fitted parameter of a drift whose time constant is fixed."""
     if slot.names != ("time_constant",):
         return slot
     unknown = replace(slot.unknown, lower=constant, upper=constant, scan=())
@@ -261,7 +261,7 @@ def sessions_of(h: Hypothesis) -> tuple[str | None, ...]:
 
 
 def in_one_session(h: Hypothesis, session: str | None) -> tuple[Hypothesis, NDArray]:
-    """Return the part of a hypothesis that acts in one session, and its slots."""
+    """Return the hypothesis for one session, and its fitted parameters."""
     own = [k for k, s in enumerate(h.slots) if s.session in (None, session)]
     slots = tuple(replace(h.slots[k], session=None) for k in own)
     return replace(h, slots=slots), np.array(own, dtype=int)

@@ -1,4 +1,4 @@
-"""List candidate functions that act at several locations.
+"""List candidate functions that act at several locations of the machine.
 
 For example, all bodies may swell with humidity, or all drives may have backlash.  The
 function has the same form at all locations, but separate coefficients.
@@ -36,7 +36,7 @@ def joint_functions(functions: Functions, rows: NDArray) -> list[Element]:
 
     Args:
         functions: functions at single locations.
-        rows: rows for which columns are computed.
+        rows: rows for which design matrices are computed.
     """
     some = functions.at_rows(rows)
     listed: list[tuple[Candidate, float]] = []
@@ -55,7 +55,7 @@ def _of_wrench(functions: Functions) -> list[tuple[Candidate, float]]:
     prior = -math.log(4.0 * max(len(functions.variables), 1) * max(len(joints), 1))
     listed = []
     for name, component, kind in joints:
-        if component == THREAD:  # the wrench along a thread is no variable
+        if component == THREAD:  # the wrench along a thread is not a variable
             continue
         wrench = f"wrench.{name}.{'mf'[component[0] == 't']}{component[1]}"
         part = CandidatePart(name, (component,), wrench)
@@ -71,7 +71,7 @@ def _knees(functions: Functions, name: str, component: str) -> list[CandidateSha
     """Return springs with load-dependent stiffness for the load of a joint."""
     robot = functions.conditions.robot
     frame, axis = robot.frame(name), AXES.index(component)
-    if frame.pitch:  # the wrench along a thread is no variable
+    if frame.pitch:  # the wrench along a thread is not a variable
         return []
     if axis != frame.own_axis or name not in (*drives(robot), *elastic_joints(robot)):
         return []

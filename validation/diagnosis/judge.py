@@ -47,18 +47,19 @@ from forcefit.validation.diagnosis.whitening import (
     whitening_of,
 )
 
-# [sigma] Smallest rms of a held-out residual that is not treated as noise.
+# [sigma] Largest rms of the held-out residuals that is treated as noise.
 _LOOSE = 1.25
-# Largest accepted number of determined unknowns per reading.
+# Largest accepted number of unknowns per reading. Only unknowns that the readings
+# determine are counted.
 _SHARE = 0.5
 
 
 @dataclass(frozen=True, eq=False)
 class Judged:
-    """A fitted machine and the held-out rows on which it is tested.
+    """Fitted machine with masks of the fitted rows and of the held-out rows.
 
     Attributes:
-        fit: the machine.
+        fit: the fitted machine.
         used: (R,) mask of the fitted rows.
         held: (R,) mask of the held-out rows.
     """
@@ -197,7 +198,7 @@ def _of_all_rows(
 def _with_noise_in_time(
     fitting: Campaign, fit: MachineFit
 ) -> tuple[MachineFit, NoiseInTime | None]:
-    """Enlarge the covariance of a fit if its noise is correlated in time."""
+    """Enlarge the covariance of a fit if the noise is correlated in time."""
     noise = noise_in_time(fitting, fit.residual)
     if noise is None or not len(fit.x):
         return fit, noise
@@ -209,7 +210,7 @@ def _fails(
     campaign: Campaign, folds: Sequence[Judged], residual: NDArray, rows: NDArray,
     lack: LackOfFit,
 ) -> bool:  # fmt: skip
-    """Return whether held-out residuals are larger than noise and fit errors."""
+    """Return whether held-out residuals exceed the noise and errors of the fit."""
     squares, count = 0.0, 0
     for one in folds:
         own = campaign.cells & (one.held & rows)[:, None] & np.isfinite(residual)

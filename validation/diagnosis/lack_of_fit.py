@@ -24,9 +24,10 @@ from forcefit.validation.diagnosis.noise import repeat_scatter
 from forcefit.validation.diagnosis.separability import orthonormal_basis
 
 SIGNIFICANT = 1e-4  # p-value below which a residual is not noise
-UNLIKELY = 1e-3  # p-value below which one of many tested hypotheses is rejected
-OUTLIERS = 20  # number of rows for each accepted outlier
-# Number of bins of a covariate.  Rows in one bin can be repeats of each other.
+UNLIKELY = 1e-3  # p-value below which a hypothesis is rejected, if many are tested
+OUTLIERS = 20  # there is at most one outlier in this number of rows
+# Number of bins of a covariate. Rows in the same bin are treated as repeated
+# measurements.
 _LEVELS = 30
 _OUTLYING = 5.5  # smallest rms of an outlier, relative to the median rms of all rows
 _MOST = 6  # largest number of reported trends
@@ -37,12 +38,14 @@ class LackOfFit:
     """Result of the test of a residual.
 
     Attributes:
-        rms: [-] rms of the whitened residual per degree of freedom.
-        probability: p-value of the residual for noise with the declared sigma.
-        repeats: [-] rms of the whitened scatter of repeats, NaN without repeats.
-        repeats_freedom: [-] degrees of freedom of this scatter.
-        against_repeats: p-value of the residual for noise with the scatter of the
+        rms: [-] square root of the squared whitened residual per degree of freedom.
+        probability: p-value of the hypothesis that the residual is noise with the
+            declared sigma.
+        repeats: [-] rms scatter of repeated measurements, divided by sigma. NaN without
             repeats.
+        repeats_freedom: [-] degrees of freedom of ``repeats``.
+        against_repeats: p-value of the hypothesis that the residual is noise with the
+            scatter of the repeated measurements.
         common: whether noise common to several points was estimated.  The residual is
             then also tested against the scatter of repeats.
     """
@@ -72,10 +75,10 @@ class LackOfFit:
 
 
 def lack_of_fit(campaign: Campaign, residual: NDArray, unknowns: int) -> LackOfFit:
-    """Return the result of a test whether a residual is noise.
+    """Return the result of testing whether a residual is noise.
 
     Args:
-        campaign: campaign of R rows with N measured cells.
+        campaign: campaign of R rows with N readings.
         residual: (N,) whitened residual.
         unknowns: number of fitted unknowns.
     """
@@ -100,7 +103,7 @@ def lack_of_fit(campaign: Campaign, residual: NDArray, unknowns: int) -> LackOfF
 
 
 def _alike(campaign: Campaign) -> NDArray:
-    """Return numbers (R,) that are equal for rows with similar conditions."""
+    """Return labels (R,) that are equal for rows with similar conditions."""
     # Time is ignored.  Each other covariate is divided into bins.
     parts = [campaign.repeat]
     for name, values in campaign.covariates.items():
@@ -114,9 +117,9 @@ def outlying(campaign: Campaign, residual: NDArray, most: int | None = None) -> 
     """Return a mask of the rows whose residuals are outliers.
 
     Args:
-        campaign: campaign of R rows with N measured cells.
+        campaign: campaign of R rows with N readings.
         residual: (N,) whitened residual.
-        most: largest number of outliers, by default one row in twenty.
+        most: largest number of outliers, by default 5 % of the rows.
 
     Returns:
         Mask (R,) of the outliers.

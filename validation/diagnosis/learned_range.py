@@ -1,4 +1,4 @@
-"""Determine the range on which a model was identified, and rows outside it.
+"""Find rows outside the range of the variables in which a model was identified.
 
 An identified effect is known only in the range of the variables in the campaign.  If a
 joint made a full turn, its angle is compared modulo one turn, unless a function in the
@@ -19,8 +19,8 @@ from forcefit.validation.campaign.campaign import LOAD, Campaign
 
 _MARGIN = 0.05  # accepted distance from the range, relative to its width
 _SAME = 1e-3  # accepted distance from the range, relative to the largest value
-# Forms that are periodic in the first variable.  The first two forms are also periodic
-# in the second variable.
+# Functional forms that are periodic in the first variable. The first two forms are also
+# periodic in the second variable.
 _PERIODIC = ("waves", "reversal_waves", "scaled_waves", "reversal", "slip")
 
 
@@ -30,10 +30,10 @@ class Beyond:
 
     Attributes:
         variable: public name of the variable.
-        learned: smallest and largest value during identification.
-        now: smallest and largest value in the compared campaign.
-        rows: number of rows of this campaign outside the range.
-        count: total number of rows.
+        learned: smallest and largest value in the campaign used for identification.
+        now: smallest and largest value in the campaign to be predicted.
+        rows: number of rows outside the range in the campaign to be predicted.
+        count: number of all rows in the campaign to be predicted.
     """
 
     variable: str
@@ -74,8 +74,8 @@ def learned_range(campaign: Campaign, rows: NDArray) -> dict[str, tuple[float, f
 def beyond(robot: Robot, campaign: Campaign) -> tuple[Beyond, ...]:
     """Return the variables outside the range in which a robot was identified.
 
-    A distance from the range of up to 5 % of its width is accepted.  The result is
-    empty if the robot file contains no range.
+    Values are accepted up to a distance of 5 % of the width of the range.  The result
+    is empty if the robot file contains no range.
     """
     left = []
     for name, values, outside in _outside(robot, campaign):
@@ -86,7 +86,7 @@ def beyond(robot: Robot, campaign: Campaign) -> tuple[Beyond, ...]:
 
 
 def beyond_by_row(robot: Robot, campaign: Campaign) -> NDArray:
-    """Return for each row the names of the variables outside their range."""
+    """Return the names of the variables outside their range in each row."""
     names = np.full(len(campaign), "", dtype=object)
     for name, _, outside in _outside(robot, campaign):
         names[outside] = [f"{before} {name}".strip() for before in names[outside]]

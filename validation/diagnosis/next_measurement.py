@@ -6,7 +6,7 @@ the prediction of B.  If A is true, the best measurement has the largest non-cen
 
     d' (I + J C J')^-1 d.
 
-Because the true model is unknown, the smaller value for A and for B is used.
+Because the true model is unknown, the smaller of the values for A and B is used.
 
 Sources:
     Atkinson, Fedorov (1975), The design of experiments for discriminating between two
@@ -35,7 +35,7 @@ _TRIED = 240  # number of compared measuring conditions
 _FURTHER = 1.5
 # Step of numerical derivatives, relative to the standard deviation of a parameter.
 _STEP = 1e-3
-# Smallest accepted non-centrality, relative to the largest one.
+# Smallest accepted non-centrality, relative to the largest non-centrality.
 _AS_GOOD = 0.97
 _DECIDES = 1.0  # [-] smallest non-centrality of a useful measurement
 
@@ -46,9 +46,10 @@ class NextMeasurement:
 
     Attributes:
         why: the reason for the measurement as a sentence.
-        configuration: commanded coordinates or pose by column name.
+        configuration: mapping from column names to commanded coordinates or pose
+            components.
         load: (6,) [N m, N] load at the reference point, base axes.
-        covariates: temperature and side of approach, if recorded.
+        covariates: temperature and direction of approach, if recorded.
         power: [-] non-centrality of one measurement.  With a value of 10, the
             measurement nearly always decides between the models.
     """
@@ -68,9 +69,10 @@ def next_measurement(
 ) -> NextMeasurement | None:
     """Return the measurement that best discriminates between two models.
 
-    Configurations are measured ones or lie between two measured ones.  Loads and
-    temperatures may exceed their measured ranges by half.  If no measurement
-    distinguishes a rival model from the best model, the next rival is tested.
+    A tested configuration is a measured configuration or lies between two measured
+    configurations.  Loads and temperatures may exceed their measured ranges by half.
+    If no measurement distinguishes a rival model from the best model, the next rival is
+    tested.
 
     Args:
         campaign: the measurements.
@@ -101,7 +103,7 @@ def _measurement(
     campaign: Campaign, tried: Conditions, best: int, power: float,
     fits: Sequence[MachineFit],
 ) -> NextMeasurement:  # fmt: skip
-    """Convert a tested condition to a measurement."""
+    """Convert one of the tested measuring conditions to a measurement."""
     sets = [sorted({e.hypothesis.effect for e in one.effects}) for one in fits]
     names = [" + ".join(effects) or "nothing" for effects in sets]
     why = (
@@ -116,7 +118,7 @@ def _measurement(
 
 
 def _conditions_tried(conditions: Conditions) -> Conditions:
-    """Return random measuring conditions to compare."""
+    """Return random measuring conditions to be tested."""
     rng = np.random.default_rng(0)
     tried = _between(conditions.take(rng.integers(0, len(conditions), _TRIED)), rng)
     largest = np.abs(conditions.load).max(axis=0)
@@ -215,7 +217,7 @@ def _power(d: NDArray, J: NDArray, C: NDArray) -> NDArray:
 
 
 def _configuration(campaign: Campaign, tried: Conditions, row: int) -> dict[str, float]:
-    """Return the commanded configuration of a tested condition by column name."""
+    """Return the commanded configuration by column name."""
     if campaign.commanded == "joints":
         return {
             f"q.{frame.name}": float(tried.coordinates[row, i])

@@ -22,7 +22,7 @@ _LEFT_OUT = 1e-12  # weight of a blunder, relative to that of a good reading
 _CLEAR = 10.0
 # Largest accepted fraction of blunders among the readings.
 _MANY = 0.05
-_UNLIKE = 4.0  # smallest reported difference of tau from 1, in standard deviations
+_UNLIKE = 4.0  # smallest reported abs(tau - 1), in standard deviations
 _CLOSE = 0.2  # smallest abs(ln tau) that is reported
 _CHANCE = 1e-4  # p-value below which the readings are reported as not repeatable
 _MEDIAN = 0.4549  # median of chi-square with one degree of freedom
@@ -51,7 +51,7 @@ def probability_good(squares: NDArray, *, clearly: bool = False) -> NDArray:
 
     Args:
         squares: (n,) expected squares of the whitened residuals.
-        clearly: whether only large residuals are treated as blunders.
+        clearly: whether only residuals above 10 tau are treated as blunders.
 
     Returns:
         The probabilities.  Values above 0.5 are set to 1. If there are too many
@@ -69,14 +69,14 @@ def probability_good(squares: NDArray, *, clearly: bool = False) -> NDArray:
 
 
 def cell_weights(good: NDArray) -> NDArray:
-    """Return relative precisions (n,), 1 for good readings and about 0 for blunders."""
+    """Return weights (n,), 1 for good readings and about 0 for blunders."""
     return np.maximum(good, _LEFT_OUT)
 
 
 def repeat_scatter(z: NDArray, group: NDArray) -> tuple[float, int]:
-    """Return the rms of whitened readings about the means of groups of repeats.
+    """Return the rms scatter of repeated readings about their means.
 
-    The second value is the number of degrees of freedom.
+    The second returned value is the number of degrees of freedom.
     """
     _, number, count = np.unique(group, return_inverse=True, return_counts=True)
     mean = np.bincount(number, weights=z) / count
@@ -95,7 +95,8 @@ def findings(
         tau: ratio of true to declared sigma.
         tau_std: standard deviation of tau.
         repeats: result of :func:`repeat_scatter` for the residual.
-        memory: whether the model of a row depends on earlier rows.
+        memory: whether the model predicts a row from earlier rows, for example because
+            of hysteresis.
         common: [rad, m] noise that is common to the points of a measurement.
     """
     told = []

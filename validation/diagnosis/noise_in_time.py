@@ -1,7 +1,7 @@
-r"""Estimate noise that is correlated in time and its effect on uncertainties.
+r"""Estimate noise that is correlated in time, and the resulting uncertainties.
 
 Within a session, the noise of each component of a reading is partly white and partly an
-Ornstein-Uhlenbeck process.  Its correlation between times t_i and t_j is
+Ornstein-Uhlenbeck process.  The correlation of the noise at times t_i and t_j is
 
     R_ij = (1 - a) delta_ij + a exp(-|t_i - t_j| / tau).
 
@@ -46,7 +46,8 @@ class NoiseInTime:
     Attributes:
         share: [-] fraction of the variance that is correlated.
         constant: [s] correlation time.
-        probability: probability that white noise shows a correlation this large.
+        probability: probability that white noise has an estimated correlation at least
+            this large.
     """
 
     share: float
@@ -58,7 +59,7 @@ def noise_in_time(campaign: Campaign, residual: NDArray) -> NoiseInTime | None:
     """Estimate the correlation of a residual in time.
 
     Args:
-        campaign: campaign of R rows with N measured cells.
+        campaign: campaign of R rows with N readings.
         residual: (N,) whitened residual.
 
     Returns:
@@ -95,7 +96,7 @@ def widened(
     Args:
         covariance: (k, k) covariance H for white noise.
         slopes: (N, k) derivatives G of the whitened readings.
-        campaign: campaign of R rows with N measured cells.
+        campaign: campaign of R rows with N readings.
         noise: the correlated noise.
     """
     along = np.zeros_like(slopes)  # product (R - 1) G
@@ -110,7 +111,7 @@ def widened(
 
 
 def _series(campaign: Campaign) -> Iterator[tuple[NDArray, NDArray]]:
-    """Yield the times and cells of each component, point and session."""
+    """Yield the times and indices of the readings, by component, point and session."""
     rows, columns = np.nonzero(campaign.cells)
     time = campaign.covariates["time"][rows]
     own = [
@@ -127,9 +128,10 @@ def _series(campaign: Campaign) -> Iterator[tuple[NDArray, NDArray]]:
 def _innovations(
     times: NDArray, z: NDArray, constants: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Return the sums of v^2 / S and ln S over a series, each (shares, constants).
+    """Return the sums of v^2 / S and of ln S over a time series.
 
-    Here v is the innovation of the Kalman filter, and S is its variance.
+    Here v is the innovation of the Kalman filter, and S is its variance. The sums are
+    arrays (shares, constants), one value for each pair of noise parameters.
     """
     share = _SHARES[:, None]
     fading = np.exp(-np.diff(times)[:, None] / constants)

@@ -1,9 +1,9 @@
-"""Describe nuisance parameters, which are geometric errors and joint compliances.
+"""Describe the nuisance parameters: geometric errors and joint compliances.
 
 Every machine has small geometric errors and compliances.  Each of these unknowns has a
 Gaussian prior about its declared value.  The prior standard deviation is the
-``tolerance`` of the frame.  Without a tolerance, it is common to a group of unknowns
-and estimated from the readings.
+``tolerance`` of the frame.  Without a tolerance, all unknowns of a group have the same
+prior standard deviation, which is estimated from the readings.
 """
 
 from collections.abc import Container
@@ -25,14 +25,14 @@ KINDS = ("rotation", "translation")
 LARGEST_TURN = 0.2  # [rad] largest plausible rotation error of a frame or drive
 # Largest plausible translation of a frame, relative to the size of the robot.
 LARGEST_SHIFT = 0.1
-# Norm of a column that is treated as zero, relative to the largest in its group.
+# Norm of a column that is treated as zero, relative to the largest norm in its group.
 _ROUNDING = 1e-9
 _SAME = 1 - 1e-6  # smallest cosine of two parallel columns
 
 
 @dataclass(frozen=True, eq=False)
 class Nuisance:
-    """Columns and priors of k unknown geometric errors and joint compliances.
+    """Design matrix and priors of k unknown geometric errors and joint compliances.
 
     Attributes:
         columns: (N, k) change of the whitened readings per unknown.
@@ -81,9 +81,9 @@ def nuisance(
     Args:
         campaign: the measurements.
         conditions: declared conditions of the campaign.
-        response: responses of the readings under these conditions.
-        named: (N, c) columns of library effects with a single unknown.  Springs with a
-            parallel column are omitted.
+        response: changes of the readings per unit screw at the frames.
+        named: (N, c) design matrix of library effects with a single unknown. Springs
+            with a parallel column are omitted.
         kinds: kinds of nuisance parameters to return.
     """
     robot, n = campaign.robot, len(campaign.robot.frames)
@@ -128,7 +128,7 @@ def visible(small: Nuisance) -> NDArray:
 
 
 def _is_among(columns: NDArray, named: NDArray) -> NDArray:
-    """Return a mask (k,) of the columns (N, k) that are parallel to a given column."""
+    """Return a mask (k,) of columns that are parallel to one of another matrix."""
     unit = [c / np.maximum(np.linalg.norm(c, axis=0), 1e-300) for c in (named, columns)]
     return np.asarray((np.abs(unit[0].T @ unit[1]) > _SAME).any(axis=0))
 

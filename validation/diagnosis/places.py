@@ -1,8 +1,8 @@
-"""List the locations at which a function can act, with the responses of the readings.
+"""List the locations at which functions can act, and the changes of the readings.
 
-A location is a screw component at a frame, at the base or in the reading, a component
-of the load, or several components at one frame.  Locations with equal responses are
-listed only once.
+A location is a screw component at a frame, at the base or of the reading, or a
+component of the load. A location can also consist of several components at one frame.
+Locations with equal changes of the readings are listed only once.
 """
 
 from dataclasses import dataclass, field
@@ -26,21 +26,23 @@ Where = tuple[str, str, str]  # location, screw component, kind of candidate fun
 # Largest plausible unrecorded force, relative to the largest recorded force.
 _HEAVY = 10.0
 _FORCE = 1000.0  # [N] largest plausible unrecorded force if no load is recorded
-# Largest number of columns of a form for which inner products are cached.
+# Inner products are cached for functional forms with at most this number of columns.
 _REMEMBERED = 8
 
 
 @dataclass(frozen=True, eq=False)
 class Weighted:
-    """Weighted responses of selected cells to functions at all locations.
+    """Weighted changes of selected readings per unit displacement at all locations.
 
     Attributes:
-        rows: (R,) rows that contain selected cells.
-        answers: (S, R, 6) responses, zero in cells that are not selected.
-        squares: (S, R) sums of squares over the cells of each row.
-        pair_products: (pairs, R) sums of products of two components at one location.
-        cells: row and component of the selected cells.
-        known: cache of inner products of each form.
+        rows: (R,) rows that contain selected readings.
+        answers: (S, R, 6) changes of the readings, zero for readings that are not
+            selected.
+        squares: (S, R) sums of squares of ``answers`` over each row.
+        pair_products: (pairs, R) sums of products of ``answers`` for two components at
+            one location.
+        cells: row and component of the selected readings.
+        known: cache of the inner products for each functional form.
     """
 
     rows: NDArray
@@ -51,7 +53,7 @@ class Weighted:
     known: dict[object, tuple[NDArray, NDArray]] = field(default_factory=dict)
 
     def products(self, key: object, columns: NDArray) -> tuple[NDArray, NDArray]:
-        """Return inner products of the columns (R, m) of a form.
+        """Return inner products for the basis functions (R, m) of a functional form.
 
         Returns:
             (S, m, m) inner products for each component, and (pairs, m, m) inner
@@ -73,11 +75,11 @@ class Places:
 
     Attributes:
         names: screw components of each location.
-        members: indices of these components in the list of S single components.
-        equal: other components with the same response.
-        most: largest plausible unknown at each location.
-        sizes: for each number of components, the locations, their members, and a mask
-            of the rotations.
+        members: indices of the screw components in the list of S single components.
+        equal: other components that change the readings equally.
+        most: largest plausible displacement, compliance or force at each location.
+        sizes: mapping from the number of components to the locations with this number,
+            their members, and a mask of the rotations.
     """
 
     def __init__(self, campaign: Campaign, sensitivities: Sensitivities) -> None:
@@ -115,7 +117,7 @@ class Places:
         return sorted(singles, key=self._preference), combined
 
     def _list_singles(self, singles: list[Where]) -> None:
-        """List the single screw components with distinct responses."""
+        """List the single screw components that change the readings differently."""
         over_sigma = np.where(self._campaign.cells, 1 / self._campaign.sigma, 0.0)
         shown, answers = [], []
         for where in singles:
@@ -175,7 +177,7 @@ class Places:
         return most / size if size > 0 else 0.0
 
     def weighted(self, cells: NDArray, whiten: Whitening) -> Weighted:
-        """Return the weighted responses at all locations in selected cells (N,)."""
+        """Return the weighted changes of selected readings for all locations."""
         row, component = (axis[cells] for axis in np.nonzero(self._campaign.cells))
         rows, row = np.unique(row, return_inverse=True)
         answers = np.zeros((len(self._answers), len(rows), 6))
@@ -188,7 +190,7 @@ class Places:
         return Weighted(rows, answers, squares, pair_products, (row, component))
 
     def joined(self, members: NDArray, whole: NDArray, cross: NDArray) -> NDArray:
-        """Return inner products (f, c, s m, s m) for combinations of s components."""
+        """Return inner products for combinations of s components, (f, c, s m, s m)."""
         c, s = members.shape
         f, _, m, _ = whole.shape
         B = np.zeros((f, c, s, m, s, m))

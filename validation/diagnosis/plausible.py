@@ -1,8 +1,8 @@
 """Find implausible machine parameters and impossible sensor readings.
 
-The plausible ranges are wide.  They depend on the size of the robot and on the largest
-load.  If a parameter is outside its range, the deviation probably has a different
-cause, and no effect is claimed.
+The plausible ranges are wide. They depend on the size of the robot and on the largest
+load. A fitted parameter outside its range shows that the fitted model is probably
+wrong.
 
 Sources:
     Ashby, Materials Selection in Mechanical Design, 4th ed., figure 4.11 (expansion of
@@ -96,7 +96,8 @@ def _parameters(
     bare = campaign.robot.without_effects()
     for one in fit.effects:
         values = one.hypothesis.public(bare, fit.own(one)[0])
-        if one.session is None:  # session values are differences from the file
+        # Values of a session are differences from the robot file.
+        if one.session is None:
             machine = fit.robot.effects.get(one.hypothesis.effect, {})
             values = {k: machine.get(k, v) for k, v in values.items()}
         went = 1.0

@@ -1,7 +1,7 @@
-"""Estimate prior standard deviations of groups of unknowns by maximum evidence.
+"""Estimate the prior standard deviations of groups of unknowns.
 
-With posterior mean mu and covariance V of the unknowns of a group, and their prior
-standard deviation s,
+The standard deviations maximise the evidence p(z). With posterior means mu and
+variances V of the unknowns of a group, and their prior standard deviation s,
 
     d ln p(z) / d ln s = sum of [(mu^2 + V)/s^2 - 1],
 
@@ -26,15 +26,15 @@ Eigen = tuple[NDArray, NDArray]
 _STEPS = 25  # maximum number of iterations
 # Change in ln s below which the iteration ends.
 _SETTLED = 0.03
-_LEAP = 4.0  # largest factor by which s changes in one iteration
-_BEGIN = 4.0  # [sigma] start value of the contribution of a group to the readings
-# [sigma] Smallest contribution of a group to the readings.
+_LEAP = 4.0  # largest factor between the values of s in successive iterations
+_BEGIN = 4.0  # [sigma] start value of the rms contribution of a group to the readings
+# [sigma] Smallest rms contribution of a group to the readings.
 _LEAST = 1e-2
 
 
 @dataclass(frozen=True, eq=False)
 class Sizes:
-    """Optimised prior standard deviations and the posterior for them.
+    """Optimised prior standard deviations, and the resulting posterior distribution.
 
     Attributes:
         std: (k,) prior standard deviation of each unknown, divided by the noise scale
@@ -44,7 +44,7 @@ class Sizes:
         covariance: (k, k) posterior covariance, divided by tau^2.
         squares: value of z' C^-1 z.
         log_det: value of ln det C.
-        cost: evidence penalty of the optimisation, see :func:`.gaussian.size_penalty`.
+        cost: penalty on the log evidence, see :func:`.gaussian.size_penalty`.
     """
 
     std: NDArray
@@ -57,7 +57,7 @@ class Sizes:
 
     @property
     def determined(self) -> NDArray:
-        """Fraction (k,) of the prior variance that the readings remove."""
+        """Relative reduction (k,) of the prior variances due to the readings."""
         with np.errstate(divide="ignore", invalid="ignore"):
             share = 1 - np.diag(self.covariance) / self.std**2
         return np.where(self.std > 0, share, 0.0)
@@ -65,13 +65,13 @@ class Sizes:
 
 @dataclass(frozen=True, eq=False)
 class Grouped:
-    """Linear model whose k unknowns share a prior standard deviation in each group.
+    """Linear model of k unknowns with a common prior standard deviation in each group.
 
     Attributes:
-        gram: (k, k) inner products of columns.
-        along: (k,) inner products with the readings.
+        gram: (k, k) inner products of the columns of the design matrix.
+        along: (k,) inner products of the columns with the readings.
         squares: sum of squares of the readings.
-        count: n, number of readings.
+        count: number of readings.
         group: (k,) group of each unknown.
         given: (k,) fixed prior standard deviation, NaN if it is optimised.
         most: (k,) largest plausible prior standard deviation.
@@ -160,8 +160,8 @@ class _Posterior:
     Attributes:
         std: (k,) prior standard deviations.
         x: (k,) posterior means divided by the prior standard deviations.
-        determined: (k,) 1 minus the posterior variances, relative to the prior.  Only
-            the sum is valid for the largest group.
+        determined: (k,) 1 minus the ratio of posterior to prior variance. For the
+            unknowns of the largest group, only the sum of these values is valid.
         left: value of z' C^-1 z.
         log_det: value of ln det C.
         D: 1 plus s^2 times the eigenvalues.
@@ -181,10 +181,10 @@ class _Posterior:
 
 @dataclass(frozen=True, eq=False)
 class _Turned:
-    """Inner products after a rotation of the unknowns of the largest group.
+    """Inner products of the design matrix after a rotation of the largest group.
 
-    The rotation makes the block of these unknowns diagonal.  Because they share one
-    standard deviation, D is diagonal in
+    The rotation of the unknowns makes the block of the largest group diagonal. Because
+    these unknowns have the same standard deviation, D is diagonal in
 
         M = 1 + S G S = [A  C; C' D].
 
@@ -197,7 +197,7 @@ class _Turned:
         rest: indices of all other unknowns.
         inner: inner products among the other unknowns.
         across: inner products between the other unknowns and this group.
-        along: (k,) inner products with the readings.
+        along: (k,) inner products of the columns with the readings.
     """
 
     values: NDArray
@@ -255,7 +255,7 @@ class _Turned:
 def _turned(
     gram: NDArray, along: NDArray, group: NDArray, eigen: Eigen | None
 ) -> _Turned:
-    """Rotate the unknowns of a group so that their inner products are diagonal."""
+    """Rotate the unknowns of a group to make their inner products diagonal."""
     rest = np.setdiff1d(np.arange(len(gram)), group)
     values, V = eigen or np.linalg.eigh(gram[np.ix_(group, group)])
     turned = along.copy()

@@ -1,8 +1,9 @@
 """Estimate the extrapolation errors of functions.
 
-The range of a variable is divided into five parts.  Each part is predicted by a fit to
-the other four parts, with the prior standard deviations of the model.  Random held-out
-rows do not test extrapolation, because they are surrounded by fitted rows.
+The range of a variable is divided into five intervals. The readings in each interval
+are predicted by a fit to the other four intervals, with the prior standard deviations
+of the model.  Random held-out rows do not test extrapolation, because they are
+surrounded by fitted rows.
 """
 
 from dataclasses import dataclass
@@ -15,8 +16,8 @@ from forcefit.validation.diagnosis.candidates import Candidate
 from forcefit.validation.diagnosis.gaussian import leave_block_out
 from forcefit.validation.diagnosis.states import State
 
-PARTS = 5  # number of parts of the range of a variable
-_DISTINCT = 4  # smallest number of distinct values in each part
+PARTS = 5  # number of intervals into which the range of a variable is divided
+_DISTINCT = 4  # smallest number of distinct values in each interval
 
 
 @dataclass(frozen=True)
@@ -43,7 +44,7 @@ def range_error(
         candidate: the function.
         best: model with the function.
         without: model without the function.
-        rows: (n,) rows of the fitted cells.
+        rows: (n,) row of each reading used in the fit.
 
     Returns:
         The largest error over the variables of the function.  None if no variable has

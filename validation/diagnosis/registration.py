@@ -31,8 +31,9 @@ def register(campaign: Campaign, conditions: Conditions) -> Conditions:
     """Fit the pose of the measuring device to the declared model.
 
     Args:
-        campaign: rows from which the pose is estimated.
-        conditions: conditions of these or other rows, to which the pose is added.
+        campaign: campaign with the rows from which the pose is estimated.
+        conditions: measuring conditions to which the pose is added. Their rows may
+            differ from the rows of ``campaign``.
 
     Returns:
         The conditions with the pose of the device in each session.
@@ -76,7 +77,8 @@ def coarse_frame(campaign: Campaign, conditions: Conditions) -> dict[str, float]
     seen = (nominal + campaign.measured[:, 3:])[full]
     thought = (nominal + model[:, 3:])[full]
     if not turned.any() and not off_one_line(thought):
-        known = campaign.registration == "known"  # a command option requested the fit
+        # The fit was requested by a command option.
+        known = campaign.registration == "known"
         found = "a fit of the registration" if known else "an unknown registration"
         instead = "--fit zeros" if known else 'registration = "known" in campaign.toml'
         raise BadInput(
@@ -98,7 +100,7 @@ def device_rotation(
     """Return the rotation of the device, fitted to orientations or to points.
 
     Args:
-        points: (P, 3) [m] points in base axes.  They are used if there are no
+        points: (P, 3) [m] points in base axes. Points are used only if there are no
             orientations.
         seen: (P, 3) [m] the same points in the axes of the device.
         turns: (T, 3, 3) orientations in base axes.
@@ -110,7 +112,7 @@ def device_rotation(
     if len(turns):
         gap = seen_turns @ np.swapaxes(turns, 1, 2)
         return Rotation.from_matrix(gap).mean().as_matrix()
-    # It is sufficient to centre one of the two sets of points.
+    # The rotation is the same if only one of the two sets of points is centred.
     centred = points - points.mean(axis=0)
     return Rotation.align_vectors(seen, centred)[0].as_matrix()
 

@@ -1,9 +1,9 @@
 """Linearise the effects of a model at their estimates.
 
-Derivatives at the start values neglect products of effects, nonlinear parameters such
-as time constants, and finite motions.  The nonlinear prediction is therefore compared
-with the sum of the linear contributions of all effects.  If they differ, all
-derivatives are recomputed at the estimates.
+A linearisation at the start values neglects interactions of effects, nonlinear
+parameters such as time constants, and finite motions. The nonlinear prediction is
+therefore compared with the sum of the linear contributions of all effects. If the two
+differ, all effects are linearised again at the estimates.
 """
 
 from collections.abc import Sequence
@@ -18,7 +18,7 @@ from forcefit.validation.diagnosis.signatures import Signature, Tangents
 from forcefit.validation.diagnosis.states import Models, State
 
 _ROUNDS = 3  # maximum number of linearisations
-MOVED = 0.3  # smallest relevant change of the log posterior
+MOVED = 0.3  # smallest change of the log posterior that requires another linearisation
 _LINEAR = 0.5  # largest accepted sum of squared whitened linearisation errors
 # Largest factor by which a nonlinear parameter changes in one linearisation.
 _SHIFT = 3.0
@@ -31,8 +31,8 @@ class Relinearisation:
         """Create an empty cache.
 
         Args:
-            tangents: derivatives of all cells.
-            models: models of the readings.
+            tangents: derivatives of all readings.
+            models: models to be fitted to the readings.
         """
         self.tangents, self.models = tangents, models
         self._about: dict[object, list[Element] | None] = {}
@@ -49,7 +49,7 @@ class Relinearisation:
         return state
 
     def _again(self, state: State) -> tuple[Element, ...] | None:
-        """Return the elements linearised at the estimates, or None if unchanged."""
+        """Return the effects linearised at the estimates, or None if unchanged."""
         own = [
             (k, e)
             for k, e in enumerate(state.elements)
@@ -90,10 +90,10 @@ class Relinearisation:
     def again(
         self, elements: Sequence[Element], xs: Sequence[NDArray]
     ) -> list[Element]:
-        """Return elements that are linearised together at given values.
+        """Return effects that are linearised together at given values.
 
-        Their sum is exact at these values.  If the model has no solution at these
-        values, the given elements are returned.
+        The sum of the linearised effects is exact at these values. If the machine has
+        no solution at these values, the effects are returned unchanged.
         """
         robot = self.tangents.campaign.robot
         middle = self.combined(elements, xs)
@@ -104,7 +104,7 @@ class Relinearisation:
                 return list(elements)
             middle = middle - signature.columns @ x
             made.append(replace(signature, offset=np.zeros_like(middle)))
-        # The first element stores the sum of all offsets.
+        # The offset of the first effect is the sum of all offsets.
         made[0] = replace(made[0], offset=middle)
         return [
             replace(effect_element(s, robot, e.log_prior, x), first=e.origin)

@@ -28,7 +28,8 @@ _ASSUMED = (
     "Effects that are missing in the library appear as learned functions or as outside "
     "the library. Effects that the design cannot distinguish are listed together.",
 )
-# Verdicts without a confirmed result.  None if additional rows could give a result.
+# Verdicts without a confirmed result. The value is None if additional rows could lead
+# to a result, and False otherwise.
 _GOOD = {AMBIGUOUS: None, NOT_ENOUGH_ROWS: None, OUTSIDE_LIBRARY: False}
 NOWHERE = Provenance()
 Table = dict[str, Any]
@@ -112,7 +113,7 @@ def report_page(
 
 
 def _section(title: str, content: str) -> list[str]:
-    """Return a section, or no section if the content is empty."""
+    """Return a section of the page, or an empty text if the section has no content."""
     return [section(title, content)] if content else []
 
 

@@ -1,8 +1,8 @@
-"""Compute joint wrenches and the response of the readings to small screws.
+"""Compute joint wrenches and the change of the readings per unit screw at a frame.
 
-Both are computed with the linear model in the declared state.  A geometric error
-changes the readings by J times its screw.  A spring changes the readings by J times its
-compliance times its wrench w.
+Both are computed with the linear model of the robot in the file.  A geometric error at
+a frame changes the readings by J times its screw.  A spring at a frame changes the
+readings by J times its compliance times its wrench w.
 
 ======  =============  ============  =================================================
 symbol  code           shape         meaning
@@ -38,7 +38,7 @@ _AT_ONCE = 50  # number of postures that are computed together, to limit memory
 
 @dataclass(frozen=True, eq=False)
 class Responses:
-    """Responses of R rows of readings of a robot with n frames.
+    """Changes of the readings of a robot with n frames due to small screws, for R rows.
 
     Attributes:
         reading: (R, 6, 6) change of the readings per unit platform screw.
@@ -52,10 +52,10 @@ class Responses:
 
 
 def responses(conditions: Conditions) -> Responses:
-    """Return the responses of R rows to small screws at frames.
+    """Return the changes of the readings of R rows due to small screws at frames.
 
-    Joints are at rest positions within their clearances.  The responses are zero in
-    rows without a solution.
+    Joints are at rest positions within their clearances.  The changes are zero in rows
+    without a solution.
     """
     tight = _without_clearance(conditions)
     distinct, which = tight.postures.distinct
@@ -93,7 +93,7 @@ def _without_clearance(conditions: Conditions) -> Conditions:
 
 
 def _some(postures: Posture, rows: slice) -> Posture:
-    """Return selected postures."""
+    """Return the postures with given indices."""
     return replace(
         postures,
         coordinates=postures.coordinates[rows],

@@ -19,7 +19,7 @@ from forcefit.validation.diagnosis.sequence import LEARNED
 
 # Verdicts for which effects are listed.
 LISTED = {statuses.EXPLAINED, statuses.AMBIGUOUS, statuses.LEARNED}
-_HARDLY = 0.05  # smallest number of determined unknowns of a listed frame
+_HARDLY = 0.05  # smallest sum of the determined fractions of a listed frame
 # Half width of the 90 % interval of a normal distribution, in standard deviations.
 _INTERVAL = 1.645
 _UNITS = {GEOMETRY: ("rad", "m"), SPRINGS: ("rad/(N m)", "m/N")}
@@ -128,8 +128,9 @@ def small(diagnosis: Diagnosis, name: str) -> dict[str, Any] | None:
         name: ``"geometry"`` or ``"springs"``.
 
     Returns:
-        Values, standard deviations and determined fractions of all unknowns, with their
-        prior standard deviations.  None if the fit contains none of these unknowns.
+        Values, posterior and prior standard deviations of all unknowns, and the
+        fractions of the prior variances that the readings remove.  None if the fit
+        contains none of these unknowns.
     """
     fit = diagnosis.fit
     part = next((part for part in fit.unknowns.small if part.name == name), None)
@@ -178,7 +179,7 @@ def effects(diagnosis: Diagnosis) -> list[dict[str, Any]]:
         shown.append({
             "name": name,
             **({} if one.session is None else {"session": one.session}),
-            # Frames without an identified parameter are not listed.
+            # Only frames with an identified parameter are listed.
             "where": [frame for frame in one.hypothesis.where if frame in acting],
             "probability": diagnosis.probability.get(name, 0.0),
             "parameters": [

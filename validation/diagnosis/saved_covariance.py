@@ -2,8 +2,8 @@
 
 Parameters are geometric errors, joint compliances, effect parameters and function
 coefficients.  Their posterior covariance C determines the uncertainty of predicted
-readings.  The covariance of the readings is J C J', where J contains their derivatives
-with respect to the parameters.
+readings.  The covariance of the readings is J C J', where J contains the derivatives of
+the readings with respect to the parameters.
 """
 
 import io
@@ -33,7 +33,7 @@ from forcefit.validation.diagnosis.unknowns import (
 ERROR, COMPLIANCE, EFFECT, FUNCTION = (
     "geometric_error", "joint_compliance", "effect", "function",
 )  # fmt: skip
-# Smallest compliance of a joint, relative to the declared compliance.
+# Lower bound on the compliance of a joint, relative to the declared compliance.
 _STAYS = 1e-3
 
 
@@ -57,7 +57,8 @@ class Number:
     def of(self, robot: Robot) -> float:
         """Return the value of the parameter in a robot.
 
-        Joint compliances are relative to this robot and therefore 0.
+        For a joint compliance, the value is 0, because compliances are differences from
+        this robot.
         """
         if self.kind == ERROR:
             return float(
@@ -71,7 +72,7 @@ class Number:
         return 0.0
 
     def moved(self, robot: Robot, by: float) -> Robot:
-        """Return the robot with an increased parameter."""
+        """Return the robot after increasing the parameter."""
         if self.kind == ERROR:
             row, axis = robot.index(self.owner), READING.index(self.name)
             return with_error(robot, *map(np.atleast_1d, (row, axis, by)))
@@ -143,10 +144,10 @@ def covariance_of(fit: MachineFit, robot: Robot) -> SavedCovariance:
 
 
 def _value(number: Number, robot: Robot, saved: Robot) -> float:
-    """Return the value of a parameter in a changed robot, or 0 if it is absent."""
+    """Return the value of a parameter in a modified robot, or 0 if it is absent."""
     if number.kind != FUNCTION:
         return number.of(robot)
-    # The changed robot may lack a function.  Its functions can also have other indices.
+    # A function may be absent from the modified robot, or may have a different index.
     own = saved.functions[int(number.owner)]
     alike = [f for f in saved.functions if _names(f) == _names(own)]
     there = [f for f in robot.functions if _names(f) == _names(own)]
@@ -162,7 +163,7 @@ def _names(function: Function) -> tuple[object, ...]:
 
 
 def _numbers(fit: MachineFit, robot: Robot) -> list[Number]:
-    """Return the parameters of a saved robot that depend on the fitted unknowns."""
+    """Return the identifiers of the parameters that depend on the fitted unknowns."""
     numbers = [n for part in fit.unknowns.small for n in _of_frames(part, robot)]
     for one in fit.unknowns.effects:
         effect = one.hypothesis.effect

@@ -65,7 +65,7 @@ def functions_of(diagnosis: "Diagnosis") -> list[list[Function]]:
 
 
 def _named(one: Function, units: Mapping[str, str]) -> Function:
-    """Label a function that describes a measured motion of a frame."""
+    """Add a name to a function that describes a measured motion of a frame."""
     name = one.variables[0].removeprefix("cov.")
     kinds = {"rad" if component[0] == "r" else "m" for component in one.components}
     straight = one.form == "powers" and one.kind == "screw" and one.where != "load"
@@ -86,8 +86,8 @@ def _with_tolerances(fit: MachineFit) -> Robot:
     for part, own in fit.unknowns.places:
         if not isinstance(part, Small) or part.name != GEOMETRY:
             continue
-        # If no reading depends on a component, its standard deviation is that of the
-        # prior.
+        # If no reading depends on a screw component, the prior standard deviation is
+        # stored.
         unseen = np.repeat(
             [part.std[part.axis // 3 == kind].max(initial=0.0) for kind in (0, 1)], 3
         )

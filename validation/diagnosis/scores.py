@@ -1,4 +1,4 @@
-"""Score candidate elements at given prior standard deviations."""
+"""Score candidate effects and functions for given prior standard deviations."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -17,9 +17,9 @@ from forcefit.validation.diagnosis.states import MORE, State
 from forcefit.validation.diagnosis.weighted_readings import WeightedReadings
 from forcefit.validation.diagnosis.whitening import Whitening
 
-BEAM = 6  # number of candidate elements that are tried for a model
+BEAM = 6  # number of candidate effects and functions that are added to a model
 OF_NAME = 2  # largest number of tried candidates with the same name
-_VARIABLES = 4  # number of variables whose products with other variables are scored
+_VARIABLES = 4  # number of variables that are combined with other variables
 # Largest number of columns of a function at several locations, to limit memory.
 _WIDEST = 600
 # Number of halvings of the step of a shape parameter.
@@ -37,7 +37,7 @@ class Scores:
 
     @cached_property
     def _whiten_sample(self) -> tuple[NDArray, Whitening]:
-        """Mask (N,) of the sampled cells, and their whitening transformation."""
+        """Mask (N,) of the sampled readings, and their whitening transformation."""
         cells, some = self.readings.cells.copy(), self.readings.sampled
         cells[cells] = some
         root, common = self.readings.root[some], self.readings.common
@@ -45,7 +45,7 @@ class Scores:
 
     @cached_property
     def weighted(self) -> Weighted:
-        """Responses at all locations in the sampled cells."""
+        """Weighted changes of the sampled readings for all locations."""
         return self.functions.places.weighted(*self._whiten_sample)
 
     @cached_property
@@ -55,22 +55,22 @@ class Scores:
 
     @cached_property
     def _explicit(self) -> Dense:
-        """Functions at several locations in the sampled cells, prepared for scoring."""
+        """Functions that act at several locations, prepared for scoring."""
         own = self.readings.cells[self.columns.sampled]
         return Dense(self.columns.explicit, own, self._whiten_sample[1])
 
     def _dense(self, elements: list[Element]) -> Dense:
-        """Prepare elements for scoring in the fitted cells."""
+        """Prepare linear models of effects or functions for scoring."""
         return Dense(elements, self.readings.cells, self.readings.whiten)
 
     def _gain(self, e: Element, base: State) -> float:
-        """Return the log evidence ratio of adding an element to a model."""
+        """Return the log evidence ratio of adding an effect or function to a model."""
         return float(self._dense([e]).gains(base.marginal)[0])
 
     def best_to_add(
         self, state: State, *, functions: bool, products: bool = False
     ) -> list[tuple[float, Element]]:
-        """Return the best elements to add to a model, with estimated log posteriors."""
+        """Return the best additions to a model, with estimated log posteriors."""
         listed = [*self._library.elements, *self._explicit.elements]
         some = self._explicit.gains(state.sample_marginal)
         gains = [self._library.gains(state.marginal), self._more * some]
@@ -101,7 +101,7 @@ class Scores:
         return [(begin + w, e) for w, e in best[: BEAM + 2]]
 
     def _products(self, found: Sequence[ScoredFunction]) -> list[Request]:
-        """Return products to score, formed from the variables of the best functions."""
+        """Return functions of two variables to score next."""
         names = list(dict.fromkeys(f.candidate.parts[0].variable for f in found))
         names = names[:_VARIABLES]
         if "approach" in self.functions.variables:
@@ -127,13 +127,13 @@ class Scores:
         return len(self.readings.sampled) / max(int(self.readings.sampled.sum()), 1)
 
     def _element(self, one: Candidate, log_prior: float) -> Element | None:
-        """Return the element of a function for all cells."""
+        """Return the linear model of a function for all readings."""
         if one not in self._made:
             self._made[one] = self.functions.element(one, log_prior)
         return self._made[one]
 
     def forms_of(self, last: Element, base: State) -> list[Element | None]:
-        """Return functions with other forms at the same location, best first."""
+        """Return functions at the same location with other forms, best first."""
         one = last.candidate
         variables = one.parts[0].variables
         priors = self.functions.shapes_of(variables)

@@ -1,12 +1,14 @@
-"""Find the best model by a beam search and by exchanging elements.
+"""Find the best model by a beam search and by exchanging effects and functions.
 
 Steps:
 
 1. Score the addition of every library effect and function to each model of the beam.
 2. Add the best candidates, and optimise the prior standard deviations.
-3. Try all forms of an added function, and linearise effects at their estimates.
-4. Repeat until no added element increases the log posterior.
-5. Exchange elements of the best model until the model no longer improves.
+3. Try all functional forms of an added function, and linearise effects at their
+   estimates.
+4. Repeat until no additional effect or function increases the log posterior.
+5. Exchange effects and functions of the best model until the log posterior no longer
+   increases.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -18,13 +20,13 @@ from forcefit.validation.diagnosis.states import Models, State
 from forcefit.validation.diagnosis.weighted_readings import WeightedReadings
 
 Update = Callable[[str, int, int], None]
-# Elements to fit, and the model whose estimates are start values.
+# Effects and functions to fit, and the model whose estimates are the start values.
 Tried = tuple[tuple[Element, ...], State]
-_MOST = 5  # largest number of elements in a model (docs/diagnosis.md)
+_MOST = 5  # largest number of effects and functions in a model
 _KEPT = 3  # width of the beam
 _LOOKED = 2  # number of models for which functions are scored
-_FORMS = 4  # number of models for which all forms of the last function are tried
-# Largest accepted decrease of the log posterior when an element is added.
+_FORMS = 4  # number of models whose last function is tried in all functional forms
+# Largest accepted decrease of the log posterior when an effect or function is added.
 _DROP = 1.0
 # Maximum number of rounds of exchanges.
 _ROUNDS = 3
@@ -64,13 +66,13 @@ class Search:
         return sorted(self.seen.values(), key=lambda s: -s.score)
 
     def _keep(self, states: Iterable[State]) -> None:
-        """Store the models in which no effect is at a bound."""
+        """Store all models except those with effects at their bounds."""
         for state in states:
             if state.supported:
                 self.seen[frozenset(origins(state.elements)), state.mode] = state
 
     def _grow(self, sources: Sequence[State], *, products: bool) -> list[State]:
-        """Add one element to models and return the best results, best first."""
+        """Add one effect or function to each model, and return the best results."""
         tried: dict[object, tuple[float, tuple[Element, ...], State]] = {}
         for state in self._without_nuisance(sources):
             looked, first = state in sources[:_LOOKED], state is sources[0]
@@ -98,7 +100,7 @@ class Search:
         return kept
 
     def _without_nuisance(self, states: Sequence[State]) -> list[State]:
-        """Return the models and their variants with fewer nuisance parameters."""
+        """Return models, and the same models with fewer nuisance parameters."""
         less = [
             self.models.state(s.elements, mode, s)
             for s in states
@@ -108,7 +110,7 @@ class Search:
         return [*states, *less]
 
     def _reformed(self, state: State) -> list[State]:
-        """Return the model with other forms of its last function."""
+        """Return models in which the last function has a different functional form."""
         last = state.elements[-1]
         if last.name:
             return []
@@ -122,7 +124,7 @@ class Search:
         return [s for s in new if s.elements != state.elements]
 
     def _with_one_removed(self, state: State) -> list[State]:
-        """Return variants of the model with one element removed."""
+        """Return models with one effect or function removed."""
         if len(state.elements) < 2:
             return []
         own = origins(state.elements)
@@ -137,7 +139,7 @@ class Search:
         return max(self.seen.values(), key=lambda s: s.score)
 
     def _exchange(self, best: State) -> None:
-        """Try to improve a model by removing or exchanging each of its elements."""
+        """Try to improve a model by removing or exchanging each effect or function."""
         own = origins(best.elements)
         self._keep(self._with_one_removed(best))
         curved = any(e.first for e in best.elements)
@@ -170,7 +172,7 @@ class Search:
 
 
 def origins(elements: Iterable[Element]) -> tuple[Element, ...]:
-    """Return the elements linearised at their start values."""
+    """Return the effects and functions linearised at their start values."""
     return tuple(e.origin for e in elements)
 
 

@@ -1,6 +1,6 @@
 """Select the library effects and functions that explain the deviations.
 
-A model is a set of elements, with or without geometric errors and springs
+A model is a set of effects and functions, with or without geometric errors and springs
 (:mod:`.states`). The search (:mod:`.search`) computes the posterior weights of many
 models, and the best model is selected.  The probability of an effect is the sum of the
 weights of all models that contain the effect.
@@ -34,9 +34,10 @@ from forcefit.validation.diagnosis.states import State, prediction_gain
 from forcefit.validation.diagnosis.unknowns import Small
 from forcefit.validation.diagnosis.weighted_readings import NONE, WeightedReadings
 
-# Smallest relevant difference between two log posteriors, which is odds of 20.
+# Smallest relevant difference of two log posteriors, equivalent to odds of 20 to 1.
 _EQUAL = 3.0
-# Probability of functions above which the selected model must contain a function.
+# If the total probability of all models with functions exceeds this value, the selected
+# model must contain a function.
 _CLAIMED = 0.9
 # Squared whitened difference below which two predictions are treated as equal.
 _SAME = 1.0
@@ -57,13 +58,13 @@ def select(
     """Select the effects and functions that the declared model lacks.
 
     Args:
-        columns: columns of all N measured cells.
-        z: (n,) whitened residual of the fitted cells.
-        cells: (N,) mask of the fitted cells.
+        columns: design matrices for all N readings.
+        z: (n,) whitened residual of the readings used in the fit.
+        cells: (N,) mask of the readings used in the fit.
         update: function called with the stage, the number of finished steps and the
             number of all steps.
-        common: [rad, m] standard deviations of the noise that is common to the cells of
-            a measurement, divided by tau.  None if they are unknown.
+        common: [rad, m] standard deviations of the noise that is common to all readings
+            of a measurement, divided by tau.  None if they are unknown.
 
     Returns:
         The best model and the posterior probabilities.
@@ -94,13 +95,14 @@ def select(
 
 
 def _selected(search: Search, states: list[State], good: NDArray) -> Selected:
-    """Return the best model and the probabilities from all visited models."""
+    """Return the best model, and the probabilities of effects and functions."""
     states = _confirmed(search, _merged(states))
     weights = np.array([s.score for s in states])
     weights = np.exp(weights - logsumexp(weights))
     learned = np.array([_functions(s) > 0 for s in states])
     if learned[0] and not learned.all() and weights[learned].sum() < _CLAIMED:
-        # A model without functions is preferred if functions are not probable enough.
+        # If functions are not sufficiently probable, the best model without functions
+        # is selected.
         first = int(np.argmin(learned))
         order = [first, *(k for k in range(len(states)) if k != first)]
         states, weights = [states[k] for k in order], weights[order]
@@ -142,7 +144,7 @@ def _small(search: Search, best: State, tau: float) -> tuple[Small, ...]:
 
 
 def _noise(search: Search, best: State, good: NDArray) -> Noise:
-    """Return the noise with sentences about its scale, repeatability and memory."""
+    """Return the estimated noise, with sentences about it for the user."""
     campaign, readings = search.columns.campaign, search.readings
     row, component = (axis[readings.cells] for axis in np.nonzero(campaign.cells))
     point = np.zeros(len(row), dtype=int)
@@ -162,7 +164,8 @@ def _noise(search: Search, best: State, good: NDArray) -> Noise:
 def _probability(name: str, states: Sequence[State], weights: NDArray) -> float:
     """Return the probability of an effect.
 
-    Models with finite motions contribute only if they contain no other effect.
+    For an effect with finite motions, only models without other effects contribute to
+    the probability.
     """
     has = [
         any(e.name == name for e in s.elements)
@@ -173,7 +176,7 @@ def _probability(name: str, states: Sequence[State], weights: NDArray) -> float:
 
 
 def _confirmed(search: Search, states: list[State]) -> list[State]:
-    """Remove the best model while its functions fail cross-validation."""
+    """Remove the best model as long as its functions fail cross-validation."""
     blocks, models = search.columns.block[search.readings.cells], search.models
     while len(np.unique(blocks)) >= _FEWEST and len(states) > 1:
         best = states[0]
@@ -199,7 +202,7 @@ def _merged(states: Sequence[State]) -> list[State]:
     """Return models with distinct predictions, best first.
 
     Of several models with equal predictions, the model with the fewest functions is
-    returned.  Effects of the measuring device have less preference than functions.
+    returned. Effects of the measuring device rank behind functions.
     """
     every = _best_first(states)
     # Models without functions are needed if no function is confirmed.
@@ -218,7 +221,7 @@ def _merged(states: Sequence[State]) -> list[State]:
 
 
 def _without_refinements(states: Sequence[State]) -> list[State]:
-    """Merge models with a refined effect into models with the simpler effect."""
+    """Merge each model with a refined effect into a model with the simpler effect."""
     kept: list[State] = []
     for state in sorted(_best_first(states), key=_is_refined):
         plain = sorted(_refined(e) or e.name for e in state.elements)
@@ -248,12 +251,12 @@ def _is_refined(state: State) -> bool:
 
 
 def _refined(e: Element) -> str:
-    """Return the simpler effect that an element refines, or an empty text."""
+    """Return the name of the simpler effect that an effect refines, or ``""``."""
     return LIBRARY[e.name].refines if e.name else ""
 
 
 def _rank(state: State) -> int:
-    """Return a number that is smaller for a preferred model with equal predictions."""
+    """Return the rank of a model among models with equal predictions."""
     own = [e.name for e in state.elements if e.name]
     return _functions(state) + 2 * sum(LIBRARY[name].device_alone for name in own)
 
@@ -271,7 +274,7 @@ def _same(one: State, other: State) -> bool:
 
 
 def _models(states: Sequence[State], weights: NDArray) -> tuple[Model, ...]:
-    """Return the models as effect names with probabilities, best first."""
+    """Return the effects, functions and probability of each model, best first."""
     total: dict[tuple[tuple[str, ...], tuple[str, ...]], float] = {}
     for state, weight in zip(states, weights, strict=True):
         effects = tuple(sorted(e.name for e in state.elements if e.name))
@@ -284,7 +287,7 @@ def _models(states: Sequence[State], weights: NDArray) -> tuple[Model, ...]:
 def _learned(
     search: Search, states: Sequence[State], weights: NDArray, k: int
 ) -> Learned:
-    """Return a function of the best model and the locations of equivalent functions."""
+    """Return the k-th function of the best model, with its equivalent locations."""
     best, e = states[0], states[0].elements[k]
     rest = best.without([e])
     equal = list(search.columns.functions.equivalents(e.candidate))

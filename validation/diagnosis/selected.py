@@ -17,7 +17,7 @@ class Learned:
     """A learned function and its probability.
 
     Attributes:
-        candidate: locations, variables and form of the function.
+        candidate: locations, variables and functional form.
         equivalent: other locations and variables with the same predictions.
         std: (m,) prior standard deviations of the unknowns.
         probability: probability that there is a function of these variables.
@@ -55,12 +55,12 @@ class Selected:
             measuring frame.
         values: (k,) estimates of the unknowns of the hypotheses.
         functions: functions of the best model.
-        small: geometric errors and springs of the best model.
+        small: geometric errors and springs in the best model.
         noise: estimated noise.
-        weights: (n,) probability that a cell is not a blunder.
+        weights: (n,) probability that a reading is not a blunder.
         models: all models, best first.
         probability: probability of each library effect.
-        unknowns: [-] number of well-determined unknowns.
+        unknowns: [-] number of unknowns that the readings determine.
         states: the visited models, best first.
     """
 

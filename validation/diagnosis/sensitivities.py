@@ -3,13 +3,13 @@
 ======  ===============  =========  ==================================================
 symbol  code             shape      meaning
 ======  ===============  =========  ==================================================
-a       ``sensitivity``  (R, 6)     change of the reading per unit of a component
-P       ``basis``        (R, p)     columns of a form
-T       ``mixed``        (p, q)     coefficients of the form per unknown
+a       ``sensitivity``  (R, 6)     change of the reading per unit of a screw component
+P       ``basis``        (R, p)     basis functions of a functional form
+T       ``mixed``        (p, q)     coefficients of the basis functions per unknown
 ======  ===============  =========  ==================================================
 
-In row r, a component of a candidate contributes a_r (P T)_r x to the readings, where x
-are the unknowns.
+In row r, a screw component of a candidate function contributes a_r (P T)_r x to the
+readings, where x are the unknowns.
 """
 
 from collections.abc import Iterator
@@ -37,22 +37,23 @@ from forcefit.validation.diagnosis.candidates import (
 from forcefit.validation.diagnosis.function_forms import CandidateShape
 from forcefit.validation.diagnosis.responses import Responses
 
-# Weight of the values of a spline in its prior, relative to the roughness.
+# Weight of the squared spline values in the prior, relative to the roughness.
 _STIFF = 0.1
-# Smallest part of a power that lower powers cannot represent, relative to the power.
+# A power of a variable is omitted if the relative norm of its component orthogonal to
+# all lower powers is smaller than this value.
 _RANK = 1e-8
 # Step of numerical derivatives, relative to the largest load or to a shape parameter.
 _STEP = 1e-3
-_BENT = 64  # number of forms whose columns are cached
+_BENT = 64  # number of functional forms whose basis functions are cached
 # Unknowns below this fraction of the largest unknown are treated as zero.
 _NOTHING = 1e-9
 
 
 class Sensitivities:
-    """Derivatives of the readings with respect to functions at any location."""
+    """Derivatives of the readings with respect to unknowns of functions."""
 
     def __init__(self, conditions: Conditions, response: Responses) -> None:
-        """Store the conditions of R rows and the responses of their readings."""
+        """Store the conditions of R rows and their responses to unit screws."""
         self.conditions, self._response = conditions, response
         self.rows = np.arange(len(conditions))
         self._origin = conditions.postures.platform[:, :3, 3]
@@ -62,7 +63,7 @@ class Sensitivities:
     def take(self, rows: NDArray) -> "Sensitivities":
         """Return the sensitivities of selected rows.
 
-        The normalisation of the forms does not change.
+        The normalisation of the functional forms does not change.
         """
         other = copy(self)
         other.rows, other._origin = self.rows[rows], self._origin[rows]
@@ -73,7 +74,7 @@ class Sensitivities:
     def about(self, conditions: Conditions, response: Responses) -> "Sensitivities":
         """Return the sensitivities for changed conditions.
 
-        The normalisation of the forms does not change.
+        The normalisation of the functional forms does not change.
         """
         other = copy(self)
         other.conditions, other._response = conditions, response
@@ -86,7 +87,7 @@ class Sensitivities:
 
     @cached_property
     def under_load(self) -> NDArray:
-        """Change (all, 6, 6) of every reading per unit of each load component."""
+        """Change of every reading per unit of each load component, (all, 6, 6)."""
         change = np.zeros((len(self.conditions), 6, 6))
         still = predict(self.conditions).deviation
         size = max(float(np.abs(self.conditions.load).max()), 1.0)
@@ -97,7 +98,7 @@ class Sensitivities:
         return change
 
     def sensitivity(self, where: str, component: str, kind: str) -> NDArray:
-        """Return the changes (R, 6) of the readings per unit of a component."""
+        """Return the changes (R, 6) of the readings per unit of a screw component."""
         if where == "load":
             return self.under_load[self.rows, :, LOADS.index(component)]
         robot, response = self.conditions.robot, self._response
@@ -106,14 +107,15 @@ class Sensitivities:
     def _basis(
         self, variables: tuple[str, ...], shape: CandidateShape
     ) -> tuple[NDArray, NDArray]:
-        """Return the normalised columns P T (R, q) of a form, and T (p, q)."""
+        """Return the normalised basis functions P T (R, q), and T (p, q)."""
         raw = self._unmixed(variables, shape)
         size = np.sqrt(np.mean(raw**2, axis=0))
         mixed = np.diag(1 / np.where(size > 0, size, 1.0))
         if shape.form == "powers" and len(shape.names) > 1:
             # The QR decomposition makes each power orthogonal to the lower powers.
             Q, R = np.linalg.qr(raw * np.diag(mixed))
-            # At most as many powers can be determined as there are rows.
+            # The number of powers that can be determined is limited by the number of
+            # rows.
             good = np.flatnonzero(np.abs(np.diag(R)) > _RANK * np.sqrt(len(raw)))
             mixed = mixed[:, good] @ np.linalg.inv(R[np.ix_(good, good)])
             mixed *= np.sqrt(len(raw))
@@ -127,7 +129,7 @@ class Sensitivities:
         return raw @ mixed, mixed
 
     def _unmixed(self, variables: tuple[str, ...], shape: CandidateShape) -> NDArray:
-        """Return the columns P (R, p) of a form."""
+        """Return the basis functions P (R, p) of a functional form."""
         if variables[0].startswith("wrench."):
             wrench = [self._wrench(*variables)]
             return FORMS[shape.form].basis(shape.names, wrench, dict(shape.given))
@@ -177,7 +179,7 @@ class Sensitivities:
         return total
 
     def axes(self, one: Candidate) -> NDArray:
-        """Return the screw component (m,) that each unknown of a candidate changes."""
+        """Return the screw component of each unknown of a candidate, (m,)."""
         counts = [columns.shape[1] for _, columns in self._factors(one)]
         components = [c for part in one.parts for c in part.components]
         kinds = [0 if is_turn(c) else 3 for c in components]
@@ -190,7 +192,7 @@ class Sensitivities:
     def _factors(
         self, one: Candidate, by: float = 0.0
     ) -> Iterator[tuple[NDArray, NDArray]]:
-        """Yield the sensitivity (R, 6) and the columns (R, q) for each component."""
+        """Yield the sensitivity (R, 6) and basis functions (R, q) of each component."""
         for part in one.parts:
             columns, mixed = self.basis(part.variables, one.shape)
             if by:
@@ -208,8 +210,8 @@ class Sensitivities:
             std: standard deviations of the unknowns.
 
         Returns:
-            One function for each location that affects the readings.  If a variable is
-            unknown in some sessions, one function for each other session.
+            One function for each location that affects the readings. If a variable is
+            unknown in some sessions, one function for each session with known values.
         """
         functions, at = [], 0
         m, given, sure = len(self.axes(one)), dict(one.shape.given), {}
@@ -221,7 +223,7 @@ class Sensitivities:
         for part, function in zip(one.parts, one.functions(), strict=True):
             _, mixed = self.basis(part.variables, one.shape)
             numbers, spread = dict(given), dict(sure)
-            shown = []  # components that affect the readings
+            shown = []  # screw components that affect the readings
             alone = len(part.components) == 1
             for component in part.components:
                 own = slice(at, at + mixed.shape[1])
@@ -263,14 +265,14 @@ def sensitivity_at(
     where: str, component: str, kind: str,
     robot: Robot, response: Responses, origin: NDArray,
 ) -> NDArray:  # fmt: skip
-    """Return the changes (R, 6) of the readings per unit of a component.
+    """Return the changes (R, 6) of the readings per unit of a screw component.
 
     Args:
         where: a frame, ``"base"`` or ``"reading"``.
         component: screw component.
         kind: ``"screw"`` or ``"compliance"``.
         robot: the robot.
-        response: responses of the readings.
+        response: changes of the readings per unit screw at the frames.
         origin: (R, 3) [m] position of the platform.
     """
     unit = unit_screw(robot, where, component)
@@ -291,7 +293,7 @@ def sensitivity_at(
 def in_cells(
     sensitivities: Sensitivities, one: Candidate, campaign: Campaign
 ) -> NDArray:
-    """Return the changes (N, m) of the measured cells per unknown, over sigma."""
+    """Return the changes (N, m) of the readings per unknown, divided by sigma."""
     changes = np.moveaxis(sensitivities.changes(one), 2, 0) / campaign.sigma
     columns = changes.reshape(len(changes), -1)
     if not campaign.cells.all():

@@ -112,7 +112,7 @@ def open_text(open_: NDArray) -> str:
 
 
 def formula(function: Function) -> str:
-    """Format a function as a sum of coefficients times columns, for each component."""
+    """Format a function as a sum of basis functions, for each screw component."""
     names = [name.rpartition(".")[2] for name in function.variables]
     words = []
     for component in function.components:
@@ -127,7 +127,7 @@ def formula(function: Function) -> str:
 
 
 def _column_text(function: Function, key: str, names: Sequence[str]) -> str:
-    """Format one column of a function."""
+    """Format one basis function of a function."""
     form, given = function.form, function.parameters
     head, _, word = key.rpartition(".")
     if form == "knee":

@@ -1,10 +1,10 @@
 """Determine which effects can be distinguished with the design of a campaign.
 
-An effect changes the readings by a linear combination of the columns A of its
-signature.  Nuisance parameters, such as an unknown device pose, can imitate part of
-this change.  Their columns are therefore projected out first.  With the projection P_f
-onto the signature of effect f, the fraction of effect e that f can imitate is |P_f A_e|
-/ |A_e|.
+The signature A of an effect is the matrix of derivatives of the readings with respect
+to its unknowns. Nuisance parameters, such as an unknown device pose, can cause similar
+changes of the readings. The derivatives with respect to nuisance parameters are
+therefore projected out of A.  With the projection P_f onto the signature of effect f,
+the fraction of effect e that f can imitate is |P_f A_e| / |A_e|.
 
 Sources:
     Bjoerck, Golub (1973), Numerical methods for computing angles between linear
@@ -22,25 +22,25 @@ from forcefit.validation.diagnosis.signatures import UNSEEN
 
 LIKE = 0.98  # cosine above which a design cannot distinguish two signatures
 SEEN = 3.0  # [sigma] smallest norm of a detectable signature
-# Relative singular value below which a column is linearly dependent.
+# Relative singular value below which columns are treated as linearly dependent.
 ROUNDING = 1e-9
-# Relative singular value below which a direction of a signature is treated as zero.  It
-# exceeds round-off, because signatures are finite differences.
+# Relative singular value of a signature that is treated as zero. This tolerance exceeds
+# round-off errors, because signatures are computed by finite differences.
 _RANK = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
 class Separability:
-    """Visibility of each effect and its similarity to other effects.
+    """Size of the change of the readings by each effect, and similarity of the effects.
 
     Attributes:
         names: names of the m effects.
-        strength: (m,) [sigma] norm of the signature of each effect with plausible
-            unknowns.
-        left: (m,) fraction of this norm that remains after nuisance parameters are
+        strength: (m,) [sigma] norm of the change of the readings by each effect with
+            plausible parameters.
+        left: (m,) fraction of ``strength`` that remains after nuisance parameters are
             projected out.
-        unknowns: (m,) number of unknowns.
-        rank: (m,) number of unknowns that the design can distinguish.
+        unknowns: (m,) number of unknowns of each effect.
+        rank: (m,) number of unknowns of each effect that the design can distinguish.
         cosine: (m, m) cosine of the smallest angle between the spans of two signatures.
         shared: (m, m) fraction of effect i that effect j can imitate, in element [i,
             j].
@@ -56,7 +56,7 @@ class Separability:
 
     @property
     def visible(self) -> NDArray:
-        """Mask (m,) of effects that exceed the noise for plausible parameters."""
+        """Mask (m,) of effects that change the readings by more than the noise."""
         return self.strength * self.left >= SEEN
 
     @property
@@ -66,9 +66,9 @@ class Separability:
 
     @property
     def shows_at(self) -> NDArray:
-        """Factors (m,) on plausible parameters for effects that equal the noise.
+        """Factors (m,) on plausible parameters at which each effect equals the noise.
 
-        The factor of an undetectable effect is infinite.
+        The factor is infinite for an effect that cannot be detected.
         """
         size = np.where(self.traced, self.strength * self.left, 0.0)
         return np.divide(SEEN, size, out=np.full(len(size), np.inf), where=size > 0)
@@ -91,13 +91,13 @@ class Separability:
         return groups
 
     def imitated(self) -> list[tuple[str, str]]:
-        """Return pairs (a, b) for which b can imitate a, but not vice versa."""
+        """Return pairs (a, b) of effects: b can imitate a, but not vice versa."""
         one_way = (self.shared > LIKE) & (self.shared.T <= LIKE)
         one_way &= np.outer(self.traced, self.traced)
         return [(self.names[i], self.names[j]) for i, j in np.argwhere(one_way)]
 
     def overlapping(self) -> list[tuple[str, str]]:
-        """Return pairs of effects that can partly imitate each other."""
+        """Return pairs of effects with partly similar changes of the readings."""
         part = (self.cosine > LIKE) & (self.shared <= LIKE) & (self.shared.T <= LIKE)
         part &= np.outer(self.visible, self.visible)
         return [(self.names[i], self.names[j]) for i, j in np.argwhere(part) if i < j]
@@ -109,9 +109,10 @@ def compare_signatures(
     """Return a comparison of the signatures of effects.
 
     Args:
-        columns: mapping from each effect to the changes (N, k) of the readings caused
-            by plausible unknowns, divided by sigma.
-        nuisance: (N, p) columns of nuisance parameters, divided by sigma.
+        columns: signature (N, k) of each effect, scaled to plausible unknowns and
+            divided by sigma.
+        nuisance: (N, p) derivatives with respect to nuisance parameters, divided by
+            sigma.
     """
     names, left = tuple(columns), dict(columns)
     if nuisance is not None:
@@ -139,7 +140,7 @@ def compare_signatures(
 def _basis(columns: NDArray, whole: float) -> NDArray:
     """Return an orthonormal basis (N, r) of the columns of a signature.
 
-    ``whole`` is the norm of the signature.
+    ``whole`` is the norm of the signature before nuisance parameters are projected out.
     """
     return orthonormal_basis(columns, _RANK, _RANK * whole)
 
@@ -147,7 +148,7 @@ def _basis(columns: NDArray, whole: float) -> NDArray:
 def orthonormal_basis(
     columns: NDArray, rank: float = ROUNDING, floor: ArrayLike = 0.0
 ) -> NDArray:
-    """Return an orthonormal basis (N, r) of columns, independent of their units.
+    """Return an orthonormal basis (N, r) of columns, which are normalised first.
 
     Args:
         columns: (N, k) columns.

@@ -22,10 +22,10 @@ LEARNED = "learned effects"
 _TERMS = (
     "declared", "registration", GEOMETRY, SPRINGS, "library effects", LEARNED,
 )  # fmt: skip
-# Indices in the list of terms.
+# Indices in the list of the terms of the sequence.
 _DECLARED, _REGISTRATION, _LIBRARY, _LEARNED = 0, 1, 4, 5
-# Position of a model in the sequence, given by the index of its last term and its
-# number of learned functions.
+# A model in the sequence is identified by the index of its last term and its number of
+# learned functions.
 Place = tuple[int, int]
 
 
@@ -96,8 +96,9 @@ def stages(
         held: (R,) mask of the held-out rows.
 
     Returns:
-        Mapping from the position of each model to the number of added unknowns and the
-        residual (R, 6) [rad, m], which is NaN in rows that are not held out.
+        Mapping from the position of each model in the sequence to two values: the
+        number of added unknowns, and the residual (R, 6) [rad, m]. The residual is NaN
+        in rows that are not held out.
     """
     shown, known = dict[Place, tuple[float, NDArray]](), 0.0
     finite = _has_finite_motions(fit.unknowns)
@@ -149,7 +150,7 @@ def _start(unknowns: Unknowns, fit: MachineFit) -> NDArray:
 def pooled(
     campaign: Campaign, folds: list[dict[Place, tuple[float, NDArray]]], rows: NDArray
 ) -> list[Step]:
-    """Return the models of the sequence with errors on the rows (R,) of all folds.
+    """Return the models of the sequence with errors on the held-out rows of all folds.
 
     If a model is missing in a fold, the preceding model is used.
     """
@@ -167,7 +168,7 @@ def pooled(
 
 
 def joined(residuals: Sequence[NDArray]) -> NDArray:
-    """Combine the residuals (R, 6) [rad, m] of one model from all folds."""
+    """Combine the residuals of one model in all folds, (R, 6) [rad, m]."""
     residual = residuals[0]
     for other in residuals[1:]:
         residual = np.where(np.isnan(other), residual, other)

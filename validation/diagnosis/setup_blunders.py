@@ -1,8 +1,8 @@
 """Detect blunders in the set-up of a campaign, such as wrong signs or units.
 
-Blunders are searched for before any effects.  They change readings much more than
-effects do.  The declared model is therefore sufficient to identify blunders.  Several
-blunders may occur together.
+Blunders are searched for before any effects. Blunders change readings much more than
+effects do, so the declared model is sufficient to identify them. Several blunders may
+occur together.
 """
 
 from collections.abc import Sequence
@@ -26,19 +26,19 @@ from forcefit.validation.diagnosis.setup_corrections import (
 )
 
 _ROWS = 40  # largest number of rows used to compare corrections
-# Fraction of cells that is used.  The cells with the largest residuals are omitted.
+# Fraction of the readings that is used. The readings with the largest residuals are
+# omitted.
 _TRIMMED = 0.9
 _MOST = 3  # largest number of simultaneous blunders
 _BEAM = 4  # width of the beam search
 # If a set of corrections reduces the residual below this fraction of the initial
-# residual, only this set is extended.
+# residual, further corrections are added only to this set.
 _CLEAR = 0.1
-# An additional correction must reduce the residual below this fraction of its value
-# without the correction.
+# Largest accepted ratio of the residuals with and without an additional correction.
 _LESS = 0.9
 # Largest residual with which blunders are reported, relative to the initial residual.
 _DECISIVE = 0.5
-# Smallest factor by which the residual increases without a necessary correction.
+# Smallest accepted ratio of the residuals without and with a reported correction.
 _NEEDED = 1.5
 # Largest standard deviation of corrected positions, relative to that of the readings.
 _FAR = 10.0
@@ -56,8 +56,8 @@ class SetupBlunder:
         kind: ``sign``, ``quarter_turn``, ``exchanged``, ``unit``, ``transposed`` or
             ``quaternion``.
         columns: names of the table columns that contain the blunder.
-        before: [sigma] residual with all corrections except this one.
-        after: [sigma] residual with all corrections.
+        before: [sigma] residual with the corrections of all other blunders.
+        after: [sigma] residual with the corrections of all blunders.
         sentence: sentence about what the user should check.
     """
 
@@ -71,7 +71,7 @@ class SetupBlunder:
 def setup_blunders(
     campaign: Campaign, conditions: Conditions
 ) -> tuple[SetupBlunder, ...]:
-    """Return the set-up blunders whose correction reduces the residual strongly.
+    """Return the set-up blunders whose correction strongly reduces the residual.
 
     Args:
         campaign: measured deviations.
@@ -142,7 +142,7 @@ def _needed(
         fewer = _without(chosen, one)
         without = judge.residual(fewer)
         rivals = [without]
-        # A correction of loads must also be better than omitting the loads.
+        # A correction of loads must reduce the residual more than omitting all loads.
 
         if one.array == "loads":
             rivals.append(judge.residual(fewer, loads=0.0))
@@ -152,7 +152,7 @@ def _needed(
 
 
 def _without(chosen: Sequence[Correction], one: Correction) -> Corrections:
-    """Return a set of corrections without one of them."""
+    """Return a set of corrections with one correction removed."""
     return tuple(other for other in chosen if other is not one)
 
 
@@ -166,7 +166,7 @@ def _sample(campaign: Campaign) -> NDArray:
 
 
 class _Judge:
-    """Computes the residuals of assumed set-ups in selected rows."""
+    """Computes the residuals of selected rows for assumed set-ups."""
 
     def __init__(self, campaign: Campaign, conditions: Conditions) -> None:
         self.campaign, self.given = campaign, as_given(campaign)
@@ -182,9 +182,9 @@ class _Judge:
 
         Args:
             made: corrections that are applied to the campaign.
-            loads: factor on all loads.
-            stated: whether to use the declared sigma although a correction scales
-                lengths.
+            loads: factor by which all loads are multiplied.
+            stated: whether to divide by the declared sigma, even if a correction
+                changes the unit of length.
 
         Returns:
             The residual, inf if a command is unreachable.

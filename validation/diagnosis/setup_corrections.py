@@ -2,8 +2,8 @@
 
 The readings of a campaign are deviations from the commanded pose, but a device measures
 absolute poses.  Most corrections therefore change the absolute readings, which are the
-commanded poses plus the deviations.  If the attribute ``deviation`` is true, a
-correction changes only the deviations.
+commanded poses plus the deviations. A correction with ``deviation=True`` changes only
+the deviations.
 """
 
 from collections.abc import Callable, Iterator
@@ -40,8 +40,8 @@ _MISREAD = (
     ("quaternion", "with the quaternion's w taken first, not last",
      partial(_rolled, by=-1)),
 )  # fmt: skip
-# Columns, array of SetUp, description of the correction, and whether only the deviation
-# changes.
+# Prefix of the column names, array of SetUp, description of the correction, and whether
+# only the deviation changes.
 _LENGTHS = (
     ("pose.t", "places", "", False),
     ("meas.t", "points", ", as positions", False),
@@ -65,7 +65,7 @@ class SetUp:
         loads: (R, 6) [N m, N] loads on the platform.
         points: (R, 3) [m] measured positions, base axes, NaN if not measured.
         turns: (R, 3, 3) measured axes of the platform, NaN if not measured.
-        nominal: uncorrected commanded positions and axes.
+        nominal: commanded positions and axes before corrections.
         sigma: (R, 6) [rad, m] standard deviations of the readings.
     """
 
@@ -88,9 +88,10 @@ class Correction:
         columns: table columns that the correction changes.
         what: description of the correction as part of a sentence.
         array: name of the :class:`SetUp` array to change.
-        change: function that changes this array, or its deviation from the command.
-        deviation: whether the deviation is changed instead of the absolute readings.
-        sigma: factor on the standard deviations of positions.
+        change: function that returns the corrected array, or its corrected deviation.
+        deviation: whether ``change`` is applied to the deviation from the command
+            instead of the absolute readings.
+        sigma: factor by which the standard deviations of positions are multiplied.
     """
 
     kind: str
@@ -144,7 +145,7 @@ def corrections(campaign: Campaign) -> list[Correction]:
     tried += _of_loads(campaign)
     for stem, array, how, deviation in _LENGTHS:
         for factor, what in _factors("length") if there[stem] else ():
-            # If sigma increased with the lengths, any large factor would improve the
+            # Sigma is not increased, because any large factor would then improve the
             # fit.
 
             sigma = min(factor, 1.0) if array == "points" else 1.0

@@ -1,9 +1,9 @@
-"""Compute signatures, which are first-order changes of the readings by effects.
+"""Compute signatures, which are first-order changes of the readings due to effects.
 
 ======  ============  ======  ========================================================
 symbol  code          shape   meaning
 ======  ============  ======  ========================================================
-z       ``residual``  (N,)    (reading - model) / sigma in the measured cells
+z       ``residual``    (N,)    (measured - predicted reading) / sigma
 A       ``columns``   (N, k)  derivatives of the model by the unknowns / sigma
 o       ``offset``    (N,)    change of the model / sigma if all unknowns are zero
 ======  ============  ======  ========================================================
@@ -32,8 +32,8 @@ from forcefit.validation.diagnosis.hypotheses import (
     sessions_of,
 )
 
-_PROBES = 3  # number of random projections used to find equal columns
-_DIGITS = 6  # number of equal decimal places in projections of equal columns
+_PROBES = 3  # number of random projections used to find parallel columns
+_DIGITS = 6  # number of decimal places of the projections that are compared
 # Number of tested rows with the largest loads, and with the largest rotations.
 _PROBED = 4
 # Smallest visible change, as a sum of squares over all whitened readings.
@@ -50,7 +50,7 @@ class Signature:
     Attributes:
         hypothesis: the contributing hypothesis.
         offset: (N,) contribution if all unknowns are zero.
-        columns: (N, k) contribution per unit of each unknown.
+        columns: (N, k) contribution per unit of each of the k unknowns.
     """
 
     hypothesis: Hypothesis
@@ -107,13 +107,13 @@ def loaded_components(campaign: Campaign) -> list[str]:
 
 
 def whiten(campaign: Campaign, deviation: NDArray) -> NDArray:
-    """Divide the deviations (N, ...) of the measured cells by sigma."""
+    """Return the measured values of an array over rows, divided by sigma, (N, ...)."""
     some = deviation[campaign.cells]
     return some / campaign.sigma[campaign.cells].reshape(-1, *[1] * (some.ndim - 1))
 
 
 def fingerprints(columns: NDArray) -> list[tuple[float, ...]]:
-    """Return a key for each column of (n, k), which is equal for parallel columns."""
+    """Return a key for each column of a matrix; parallel columns have equal keys."""
     probes = np.random.default_rng(0).normal(size=(_PROBES, len(columns)))
     seen = probes @ columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
     seen *= np.sign(seen[0])
@@ -124,13 +124,13 @@ class Tangents:
     """First derivatives of the readings with respect to the unknowns of effects.
 
     Attributes:
-        campaign: campaign of R rows with N measured cells.
+        campaign: campaign of R rows with N readings.
         derivatives: derivatives of the readings in these rows.
         declared: (N,) whitened readings of the declared model.
     """
 
     def __init__(self, campaign: Campaign, derivatives: Derivatives) -> None:
-        """Compute the readings of the declared model in the measured cells."""
+        """Compute the readings that the declared model predicts."""
         self.campaign, self.derivatives = campaign, derivatives
         self.declared = whiten(campaign, derivatives.declared)
 
@@ -142,7 +142,7 @@ class Tangents:
         return whiten(self.campaign, self.derivatives.model(effects, finite=finite))
 
     def rows_of(self, session: str | None) -> NDArray:
-        """Return a column (N, 1) that is 1 for the cells of a session, otherwise 0.
+        """Return an array (N, 1) that is 1 for the readings of a session, otherwise 0.
 
         If the session is None, all values are 1.
         """
@@ -180,8 +180,8 @@ class Tangents:
         return Signature(hypothesis, -columns @ begin, columns)
 
     def _invisible(self, hypothesis: Hypothesis) -> bool:
-        """Return whether an effect is invisible in the most sensitive rows."""
-        # The exact model is slow, so it is evaluated only in a few rows.
+        """Return whether an effect is invisible even in the most sensitive rows."""
+        # The finite model is slow, so it is evaluated only in a few rows.
         conditions = self.derivatives.conditions
         load = np.linalg.norm(conditions.load, axis=1)
         size = np.linalg.norm(self.derivatives.declared[:, :3], axis=1)
@@ -205,7 +205,7 @@ class Tangents:
     def about(
         self, hypothesis: Hypothesis, x: NDArray, others: Mapping[str, Values]
     ) -> Signature:
-        """Return the contribution of a hypothesis at x (k,) and with other effects."""
+        """Return the contribution of a hypothesis, linearised at x (k,)."""
         robot = self.derivatives.conditions.robot
 
         def model(values: NDArray) -> NDArray:
@@ -225,6 +225,6 @@ class Tangents:
 
 
 def _seen(column: NDArray, slot: Slot) -> NDArray:
-    """Return a derivative (N,), or zeros if a plausible unknown is invisible."""
+    """Return a derivative (N,), set to zero if its unknown has no visible effect."""
     size = np.linalg.norm(column) * slot.unknown.scale
     return np.zeros_like(column) if size < UNSEEN else column

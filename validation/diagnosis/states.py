@@ -1,7 +1,7 @@
 """Define the models of the search and compute their log posteriors.
 
-A model consists of elements (effects and functions) and may also contain geometric
-errors of frames, joint springs, or both.  Its score is the log posterior:
+A model consists of effects and functions. It may also contain geometric errors of
+frames, joint springs, or both. Its score is the log posterior:
 
     score = ln p(z) - cost of optimised standard deviations + bounds + ln prior
 """
@@ -27,9 +27,10 @@ from forcefit.validation.diagnosis.gaussian import (
 from forcefit.validation.diagnosis.prior_sizes import Grouped, Sizes, best_sizes
 from forcefit.validation.diagnosis.weighted_readings import NARROW, WeightedReadings
 
-# Whether geometric errors and whether springs are included in a model.
+# Two booleans: whether a model includes geometric errors, and whether it includes
+# springs.
 Mode = tuple[bool, bool]
-MORE = math.log(2.0)  # decrease of the log prior for each additional element
+MORE = math.log(2.0)  # decrease of the log prior for each additional effect or function
 # Decrease of the log prior for including geometric errors, and for including springs.
 IN_USE = math.log(10.0)
 _GROUPS = 4  # number of groups of nuisance parameters
@@ -37,16 +38,17 @@ _GROUPS = 4  # number of groups of nuisance parameters
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """A model with optimised prior standard deviations.
+    """Model of the readings with optimised prior standard deviations.
 
     Attributes:
         elements: effects and functions.
-        mode: whether geometric errors are included, and whether springs are included.
+        mode: two booleans, whether geometric errors are included, and whether springs
+            are included.
         used: (k,) mask of the included nuisance parameters.
         sizes: standard deviations and posterior of all unknowns.
         score: log posterior, up to a constant.
         tau: ratio of the true to the declared sigma.
-        readings: the modelled readings.
+        readings: the readings to which the model is fitted.
     """
 
     elements: tuple[Element, ...]
@@ -58,23 +60,23 @@ class State:
     readings: WeightedReadings
 
     def _columns(self) -> NDArray:
-        """Return the columns (n, k) of all unknowns, which are not cached."""
+        """Return the design matrix (n, k) of all unknowns. The result is not cached."""
         r = self.readings
         return np.hstack([r.small[:, self.used], *(r.own(e) for e in self.elements)])
 
     def _z(self) -> NDArray:
-        """Return the readings (n,) minus the offsets of all elements."""
+        """Return the readings (n,) minus the offsets of all effects."""
         return self.readings.without_offsets(self.elements)
 
     @cached_property
     def marginal(self) -> Marginal:
-        """Model of the fitted cells, with marginalised unknowns."""
+        """Linear model of the fitted readings with its unknowns integrated out."""
         flat = self.readings.flat
         return marginalise(self._columns(), self.sizes.std, self._z(), flat)
 
     @cached_property
     def sample_marginal(self) -> Marginal:
-        """Model of the sampled cells, with marginalised unknowns."""
+        """Linear model of the sampled readings with its unknowns integrated out."""
         some = self.readings.sampled
         if some.all():
             return self.marginal
@@ -84,22 +86,22 @@ class State:
         return marginalise(X, self.sizes.std, z, flat)
 
     def forget(self) -> None:
-        """Release the memory of the marginalised models."""
+        """Release the memory of the cached linear models."""
         for name in ("marginal", "sample_marginal"):
             self.__dict__.pop(name, None)
 
     @cached_property
     def fitted(self) -> NDArray:
-        """Whitened and weighted contribution (n,) of the model to the readings."""
+        """Readings (n,) that the model predicts, whitened and weighted."""
         return self._columns() @ self.sizes.mean + (self.readings.z - self._z())
 
     @cached_property
     def left(self) -> NDArray:
-        """Whitened residual (n,) without weights."""
+        """Whitened residual (n,) before weighting."""
         return (self.readings.z - self.fitted) / self.readings.root
 
     def own(self, k: int) -> slice:
-        """Return the slice of the k-th element in the vector of unknowns."""
+        """Return the slice of the k-th effect or function in the vector of unknowns."""
         counts = [e.columns.shape[1] for e in self.elements]
         begin = int(self.used.sum()) + sum(counts[:k])
         return slice(begin, begin + counts[k])
@@ -115,12 +117,12 @@ class State:
         return errors
 
     def without(self, some: Sequence[Element]) -> tuple[Element, ...]:
-        """Return the elements of the model without the given elements."""
+        """Return the effects and functions of the model, except the given ones."""
         return tuple(e for e in self.elements if e not in some)
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Sorted names of the effects and descriptions of the functions."""
+        """Sorted list of the effect names and of the descriptions of functions."""
         names = [
             e.name or "of " + ", ".join(e.candidate.parts[0].variables)
             for e in self.elements
@@ -134,7 +136,7 @@ class State:
         return not any(map(_at_bounds, self.elements, means))
 
     def sizes_for(self, elements: Sequence[Element]) -> dict[int, float]:
-        """Return standard deviations by group, as start values for other elements."""
+        """Return prior standard deviations as start values for another model."""
         own = self.sizes.of_group
         found = {g: s for g, s in own.items() if g < _GROUPS}
         for k, e in enumerate(self.elements):
@@ -150,9 +152,10 @@ class State:
 
 
 def _at_bounds(e: Element, mean: NDArray) -> bool:
-    """Return whether an effect is at a bound.
+    """Return whether parameters of an effect are at a bound.
 
-    This is the case if all its values or one of its shape parameters are at a bound.
+    The result is true if all its parameters, or one of its shape parameters, are at
+    a bound.
     """
     if not e.name or not e.columns.shape[1]:
         return False
@@ -170,9 +173,9 @@ def prediction_gain(one: State, other: State, blocks: NDArray) -> float:
     """Return how much better a model predicts than another model, in standard errors.
 
     Each block (n,) of readings is predicted by a fit to all other blocks.  The gain is
-    computed from the mean difference of the log predictive densities and from
-    Wilcoxon's signed-rank statistic (1945). The larger value is returned.  The gain is
-    0 for a single block.
+    the mean difference of the log predictive densities over its standard error, or
+    Wilcoxon's signed-rank statistic (1945) if it is larger.  The gain is 0 for a single
+    block.
     """
     densities = []
     for state in (one, other):
@@ -189,7 +192,7 @@ def prediction_gain(one: State, other: State, blocks: NDArray) -> float:
 
 
 class Models:
-    """Models of weighted readings, fitted and cached."""
+    """Fits models to weighted readings and caches the results."""
 
     def __init__(self, readings: WeightedReadings) -> None:
         """Create an empty cache."""
@@ -226,7 +229,8 @@ class Models:
     def best(self, elements: tuple[Element, ...], start: State) -> State:
         """Return the best model, with or without geometric errors or springs.
 
-        The choice between these options may differ from ``start`` in only one of them.
+        Compared with ``start``, either the use of geometric errors or the use of
+        springs may change, but not both.
         """
         g, s = start.mode
         near = [m for m in self.modes() if m in {(g, s), (not g, s), (g, not s)}]
@@ -261,7 +265,7 @@ class Models:
         return State(elements, mode, used, sizes, score, tau, self.readings)
 
     def _linear(self, elements: tuple[Element, ...], used: NDArray) -> Grouped:
-        """Return the linear model of nuisance parameters and elements."""
+        """Return the linear model of nuisance parameters, effects and functions."""
         readings, small = self.readings, self._small
         z = readings.without_offsets(elements)
         with_small, inner = readings.products(elements)

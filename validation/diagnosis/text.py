@@ -1,4 +1,4 @@
-"""Format the plain values of a diagnosis as text for a terminal."""
+"""Format the results of a diagnosis as text for a terminal."""
 
 import math
 from typing import Any

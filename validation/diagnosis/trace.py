@@ -49,7 +49,7 @@ FINITE = next(name for name, effect in LIBRARY.items() if effect.finite)
 _SEARCHED = 2000
 # Maximum number of searches, each of which excludes further blunders.
 _TURNS = 6
-_BENDS = 1  # maximum number of updates of second-order terms
+_BENDS = 1  # maximum number of updates of the second-order terms
 _GROSS = 30.0  # smallest rms of a gross blunder, relative to the median rms of all rows
 # Required predictive gain of functions of time, in standard errors.
 _CLEARLY = 2.0
@@ -69,7 +69,7 @@ class Traced:
         used: (R,) mask of the fitted rows.
         outliers: (R,) mask of the rows that were excluded because of a blunder.
         selected: models with their probabilities.
-        columns: regression columns of the campaign.
+        columns: design matrices of all candidate effects.
     """
 
     campaign: Campaign
@@ -144,7 +144,7 @@ class Traced:
 
 
 def _acting(hypothesis: Hypothesis, values: NDArray) -> list[Acting]:
-    """Return the effects of a hypothesis, one for each session with parameters."""
+    """Return the effects of a hypothesis, one for each session."""
     own = [(in_one_session(hypothesis, s), s) for s in sessions_of(hypothesis)]
     return [Acting(there, values[places], s) for (there, places), s in own]
 
@@ -212,7 +212,7 @@ def _searched_rows(campaign: Campaign, fitted: NDArray) -> NDArray:
 
 
 def _without_outlying(traced: Traced, fit: MachineFit) -> tuple[Traced, MachineFit]:
-    """Find outliers outside the sample, and refit the machine without them."""
+    """Find outliers in the remaining rows, and refit the machine without them."""
     others = traced.used & ~np.isin(np.arange(len(traced.used)), traced.columns.row)
     if not others.any():
         return traced, fit
@@ -228,7 +228,7 @@ def _without_outlying(traced: Traced, fit: MachineFit) -> tuple[Traced, MachineF
 def _with_its_errors(
     campaign: Campaign, declared: Declared, derivatives: Derivatives, fitted: NDArray
 ) -> Derivatives:
-    """Return derivatives with the second-order terms of geometric errors."""
+    """Return the derivatives, including second-order terms of geometric errors."""
     conditions, seen = derivatives.conditions, hidden(campaign, ~fitted)
     alone = dict.fromkeys([*LIBRARY, FUNCTION], 0.0)
     columns = Columns(campaign, derivatives, odds=alone)
@@ -237,7 +237,7 @@ def _with_its_errors(
         z = whiten(campaign, campaign.measured - predict(conditions).deviation)
         known = cells & np.isfinite(z)
         selected = select(columns, z[known], known, common=NONE)
-        # Fits are slow, so the linear estimate of the errors is tested first.
+        # A fit is slow, so the linear estimate of the geometric errors is tested first.
         near = selected.states[0].errors
         if declared.bent(seen, conditions, near, _BENT / 3) is None:
             break
@@ -266,14 +266,14 @@ def _gross(campaign: Campaign, fit: MachineFit, used: NDArray) -> NDArray:
 
 
 def _searched(columns: Columns, z: NDArray, cells: NDArray, update: Update) -> Selected:
-    """Select a model.  Functions of time must clearly improve the predictions."""
-    # Time is correlated with all slow changes.  A function of time is accepted only if
-    # it clearly improves predictions.  Without candidates, common noise is not
-    # estimated, because it could absorb effects.
+    """Select a model; functions of time must clearly improve predictions."""
+    # A function of time can describe every slow change. It is therefore accepted only
+    # if it clearly improves predictions. If there are no candidates, common noise is
+    # not estimated, because it would include the change due to absent effects.
     whole = select(columns, z, cells, update, None if columns.candidates else NONE)
     if not columns.has_clocks:
         return whole
-    common = whole.states[0].readings.common  # both models need the same noise
+    common = whole.states[0].readings.common  # both models must use the same noise
     timeless = select(columns.without_clocks(), z, cells, update, common)
     blocks = columns.block[cells]
     sure = prediction_gain(whole.states[0], timeless.states[0], blocks)
@@ -284,7 +284,7 @@ def _traced(
     campaign: Campaign, conditions: Conditions, fitted: NDArray, cells: NDArray,
     selected: Selected, columns: Columns,
 ) -> Traced:  # fmt: skip
-    """Return the search result with estimated noise and outliers."""
+    """Return the search result, including the estimated noise and outliers."""
     weights = np.ones(len(columns.row))
     weights[cells] = cell_weights(selected.weights)
     sigma = campaign.sigma.copy()
@@ -315,8 +315,8 @@ def _fitted(traced: Traced) -> MachineFit:
         weak = [one for one in fit.unknowns.effects if not supported(fit, one)]
         if not weak:
             return fit
-        # Effects are removed one by one, because two similar effects both have a large
-        # uncertainty.
+        # Effects are removed one by one, because if two effects are similar, both have
+        # a large uncertainty.
 
         one = min(weak, key=lambda e: _size(fit, e))
         fit = fit_machine(traced.campaign, fit.unknowns.without(one), traced.used)

@@ -25,10 +25,10 @@ from forcefit.validation.diagnosis.responses import responses
 from forcefit.validation.diagnosis.sensitivities import Sensitivities
 from forcefit.validation.diagnosis.signatures import conditions_of
 
-# Prior standard deviation of an unknown of an effect, relative to a plausible value.
+# Prior standard deviation of an effect parameter, relative to a plausible value.
 _WIDE = 1e3
-# Largest change of a shape parameter and its prior standard deviation, both relative to
-# its value.
+# Largest change of a shape parameter, and its prior standard deviation, relative to the
+# value of the parameter.
 _BEND = 0.5
 # Prior standard deviation of a fixed unknown, relative to a plausible value.
 _HELD = 1e-12
@@ -43,8 +43,8 @@ class Small:
         name: ``"geometry"`` or ``"springs"``.
         frame: (k,) index of the frame in the robot.
         axis: (k,) screw component at the frame, 0 to 5.
-        std: (k,) [rad, m] or [rad/(N m), m/N] prior standard deviations about the
-            declared values.
+        std: (k,) prior standard deviations about the declared values, [rad, m] for
+            geometric errors or [rad/(N m), m/N] for compliances.
     """
 
     name: str
@@ -86,7 +86,7 @@ class Acting:
 
     @property
     def std(self) -> NDArray:
-        """Prior standard deviations (k,), which are very large."""
+        """Prior standard deviations (k,), much larger than plausible values."""
         unknowns = [slot.unknown for slot in self.hypothesis.slots]
         wide = [(_HELD if u.upper == u.lower else _WIDE) * u.scale for u in unknowns]
         return np.array(wide)
@@ -114,12 +114,12 @@ class LearnedFunction:
 
     @property
     def std(self) -> NDArray:
-        """Prior standard deviations, (m,) or (m + 1,) with a shape parameter."""
+        """Prior standard deviations (m,), or (m + 1,) with a shape parameter."""
         return np.concatenate([self.coefficients, _BEND * self.candidate.shape.bends])
 
     @property
     def bounds(self) -> tuple[NDArray, NDArray]:
-        """Lower and upper bounds, each (m,) or (m + 1,) with a shape parameter."""
+        """Lower and upper bounds, each (m,), or (m + 1,) with a shape parameter."""
         upper = np.full(len(self), np.inf)
         upper[len(self.coefficients) :] = self.std[len(self.coefficients) :]
         return -upper, upper
@@ -137,8 +137,8 @@ class Unknowns:
         effects: library effects, including the pose of the measuring device.
         small: geometric errors and joint compliances.
         functions: learned functions.
-        sensitivities: derivatives with respect to functions.  None if there are no
-            functions.
+        sensitivities: derivatives of the readings with respect to the functions.  None
+            if there are no functions.
     """
 
     robot: Robot
@@ -152,7 +152,7 @@ class Unknowns:
 
     @cached_property
     def places(self) -> list[tuple[Part, slice]]:
-        """Parts of the parameter vector x with their slices in x."""
+        """Effects, nuisance parameters and functions, with their slices of x."""
         parts: list[Part] = [*self.effects, *self.small, *self.functions]
         ends = np.cumsum([len(part) for part in parts]).tolist()
         return [
@@ -160,7 +160,7 @@ class Unknowns:
         ]
 
     def place(self, part: Part) -> slice:
-        """Return the slice of a part in the parameter vector x."""
+        """Return the slice of an effect, function or other group of parameters in x."""
         return next(own for one, own in self.places if one is part)
 
     @property
@@ -251,7 +251,7 @@ class Unknowns:
         return np.nan_to_num(J, nan=0.0, posinf=0.0, neginf=0.0)
 
     def without(self, effect: Acting) -> "Unknowns":
-        """Return the unknowns without those of one effect."""
+        """Return a copy without the unknown parameters of one effect."""
         kept = tuple(one for one in self.effects if one is not effect)
         return replace(self, effects=kept)
 
@@ -269,7 +269,7 @@ def effects_in(robot: Robot, session: str | None) -> Mapping[str, Values]:
 def with_effects_in(
     robot: Robot, session: str | None, effects: Mapping[str, Values]
 ) -> Robot:
-    """Return a robot with other effects in one session.
+    """Return a robot with replaced effects in one session.
 
     If the session is None, the effects act in all sessions.
     """
@@ -280,7 +280,7 @@ def with_effects_in(
 
 
 def _linear(conditions: Conditions) -> Conditions:
-    """Return conditions for the linear model, with fixed rest positions of joints."""
+    """Return conditions for the linear model, with joints fixed at rest positions."""
     conditions = replace(conditions, exact=False)
     loose = virtual_joints(conditions.robot).cones.shape[1]
     if loose and conditions.robot.closures and conditions.rest is None:

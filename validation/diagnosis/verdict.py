@@ -42,7 +42,7 @@ def verdict(
         selected: models with their probabilities.
         names: names of the library effects of the fitted machine.
         functions: whether the model contains functions.
-        small: whether the model contains geometric errors or springs.
+        small: whether the model contains geometric errors or joint springs.
         more_than_noise: whether the residual of the model exceeds the noise.
 
     Returns:

@@ -1,4 +1,4 @@
-"""Store the weighted readings and columns of the fitted cells."""
+"""Store the weighted readings and design matrices for a linear fit."""
 
 from collections.abc import Sequence
 
@@ -9,29 +9,29 @@ from forcefit.validation.diagnosis.columns import Columns
 from forcefit.validation.diagnosis.elements import Element
 from forcefit.validation.diagnosis.prior_sizes import Eigen
 
-NARROW = 50  # largest number of columns of an element that are cached
-_RANK = 1e-9  # relative singular value below which a column is linearly dependent
+NARROW = 50  # design matrices with at most this number of columns are cached
+_RANK = 1e-9  # relative singular value that is treated as zero
 NONE = (0.0, 0.0)  # standard deviations without common noise
 
 
 class WeightedReadings:
-    """Weighted readings of the fitted cells, with the device pose projected out.
+    """Weighted readings for a linear fit, with the device pose projected out.
 
     Attributes:
-        columns: regression columns of all N cells.
-        given: (n,) whitened residual of the fitted cells.
-        cells: (N,) mask of the fitted cells.
+        columns: design matrices for all N readings.
+        given: (n,) whitened residual of the readings used in the fit.
+        cells: (N,) mask of the readings used in the fit.
         weights: (n,) relative precisions, 1 for a reading that is not a blunder.
         common: [rad, m] standard deviations of the platform motion that is common to
-            the cells of a measurement, divided by tau.
-        sampled: (n,) mask of the cells on which functions are scored first.
-        whiten: transformation of the fitted cells to independent noise.
-        flat: (n, f) orthonormal columns for the pose of the measuring frame.
-        z: (n,) whitened residual after projecting out the measuring frame.
-        small: (n, k) columns of the nuisance parameters after projecting out the
-            measuring frame.
-        gram: (k, k) inner products of the columns ``small``.
-        count: number of independent readings.
+            all readings of a measurement, divided by tau.
+        sampled: (n,) mask of the readings on which functions are scored first.
+        whiten: transformation of the fitted readings to independent noise.
+        flat: (n, f) orthonormal design matrix for the pose of the measuring frame.
+        z: (n,) whitened residual after projecting out the pose of the measuring frame.
+        small: (n, k) design matrix of the nuisance parameters after projecting out the
+            pose of the measuring frame.
+        gram: (k, k) inner products of the columns of ``small``.
+        count: number of readings, minus the number of projected-out columns.
     """
 
     def __init__(
@@ -48,7 +48,7 @@ class WeightedReadings:
         norm = np.maximum(np.linalg.norm(flat, axis=0), 1e-300)
         left, size, _ = np.linalg.svd(flat / norm, full_matrices=False)
         self.flat = left[:, size > _RANK * size.max(initial=0.0)]
-        # Log determinant of the noise covariance, including the projection.
+        # The log determinant of the noise covariance includes the projection.
 
         seen = np.append(norm, size[: self.flat.shape[1]])
         self.log_det = self.whiten.log_det + 2 * float(np.log(seen).sum())
@@ -64,7 +64,7 @@ class WeightedReadings:
         return columns - self.flat @ (self.flat.T @ columns)
 
     def sample(self, common: tuple[float, float]) -> "WeightedReadings":
-        """Return the readings of the sampled rows for given common noise."""
+        """Return the sampled readings, weighted for given common noise."""
         cells, some = self.cells.copy(), self.sampled
         cells[cells] = some
         return WeightedReadings(
@@ -72,7 +72,7 @@ class WeightedReadings:
         )
 
     def own(self, e: Element) -> NDArray:
-        """Return the columns (n, m) of an element in the fitted cells."""
+        """Return the design matrix (n, m) of an effect or function for the fit."""
         if e in self._own:
             return self._own[e]
         B = self._without_flat(self.whiten(e.columns[self.cells]))
@@ -81,7 +81,10 @@ class WeightedReadings:
         return B
 
     def products(self, elements: Sequence[Element]) -> tuple[NDArray, NDArray]:
-        """Return inner products of elements with nuisance columns and themselves."""
+        """Return inner products of the design matrices of effects and functions.
+
+        The first array contains the products with the nuisance parameters.
+        """
         for i, e in enumerate(elements):
             missing = [o for o in (None, *elements[: i + 1])
                        if (e, o) not in self._inner]  # fmt: skip
@@ -97,13 +100,13 @@ class WeightedReadings:
         return np.hstack(with_small), np.block(blocks or [[np.zeros((0, 0))]])
 
     def eigen(self, e: Element) -> Eigen:
-        """Return eigenvalues and eigenvectors of the inner products of an element."""
+        """Return the eigendecomposition of B'B for the design matrix B of an effect."""
         if e not in self._eigen:
             self._eigen[e] = np.linalg.eigh(self._inner[e, e])
         return self._eigen[e]
 
     def without_offsets(self, elements: Sequence[Element]) -> NDArray:
-        """Return the readings (n,) minus the offsets of the elements."""
+        """Return the readings (n,) minus the offsets of the effects."""
         z = self.z
         for e in elements:
             if e.offset is not None:
@@ -111,6 +114,6 @@ class WeightedReadings:
         return z
 
     def forget(self) -> None:
-        """Release cached columns and inner products."""
+        """Release cached design matrices and inner products."""
         for one in (self._own, self._inner, self._eigen):
             one.clear()

@@ -1,15 +1,15 @@
 r"""Whiten noise that is common to the points of a measurement.
 
-One measurement may contain several points of the platform.  The noise of its cells,
+One measurement may contain several points of the platform.  The noise of its readings,
 divided by the declared sigma, is e + L n.  Here e is independent noise with variance
-1/w, and n contains k standard normal variables that are common to all cells of the
+1/w, and n contains k standard normal variables that are common to all readings of the
 measurement.
 
 ======  ===============  =======  ====================================================
 symbol  code             shape    meaning
 ======  ===============  =======  ====================================================
 w       ``root`` ** 2    (n,)     relative precisions
-L       ``loadings``     (n, k)   change of the cells over sigma per common variable
+L       ``loadings``     (n, k)   change of the readings / sigma per common variable
 W       ``matrix``       (n, n)   block-diagonal, W (w^-1 + L L') W' = 1
 ======  ===============  =======  ====================================================
 
@@ -30,7 +30,7 @@ from forcefit.validation.campaign.campaign import Campaign
 
 @dataclass(frozen=True, eq=False)
 class Whitening:
-    """Linear map of n cells to cells with independent noise of unit variance.
+    """Linear map of n readings to values with independent noise of unit variance.
 
     Attributes:
         root: (n,) square roots of the relative precisions.
@@ -56,13 +56,13 @@ class Whitening:
 
 
 def whitening(root: NDArray, loadings: NDArray | None, visit: NDArray) -> Whitening:
-    """Return the whitening transformation of n cells.
+    """Return the whitening transformation of n readings.
 
     Args:
         root: (n,) square roots of the relative precisions.
-        loadings: (n, k) changes of the cells, divided by sigma, per common variable.
+        loadings: (n, k) changes of the readings, divided by sigma, per common variable.
             None without common noise.
-        visit: (n,) number of the measurement of each cell.
+        visit: (n,) index of the measurement of each reading.
     """
     if loadings is None or not loadings.any():
         return Whitening(root)
@@ -83,7 +83,7 @@ def whitening(root: NDArray, loadings: NDArray | None, visit: NDArray) -> Whiten
 
 
 def _of_one_size(visit: NDArray) -> Iterator[NDArray]:
-    """Yield arrays (V, m) of the cells of all measurements with m cells, for each m."""
+    """Yield the indices of the readings of all measurements with m readings, (V, m)."""
     order = np.argsort(visit, kind="stable")
     _, start, count = np.unique(visit[order], return_index=True, return_counts=True)
     for size in np.unique(count).tolist():
@@ -92,7 +92,7 @@ def _of_one_size(visit: NDArray) -> Iterator[NDArray]:
 
 
 def whitening_of(campaign: Campaign, cells: NDArray) -> Whitening:
-    """Return the whitening transformation of selected cells (R, 6) of a campaign."""
+    """Return the whitening transformation of readings selected by a mask (R, 6)."""
     row, _ = np.nonzero(cells)
     loadings = None
     if campaign.common is not None:
@@ -119,7 +119,7 @@ def size_of_noise(campaign: Campaign) -> NDArray:
 
 
 def platform_motions(campaign: Campaign, reading: NDArray) -> NDArray | None:
-    """Return the change of the readings by small motions of the platform.
+    """Return the change of the readings due to small motions of the platform.
 
     Args:
         campaign: campaign of R rows.
@@ -136,7 +136,7 @@ def platform_motions(campaign: Campaign, reading: NDArray) -> NDArray | None:
         return None
     centre = np.unique(campaign.targets, axis=0).mean(axis=0)
     place = campaign.transforms[:, campaign.robot.index(campaign.robot.platform)]
-    # In these matrices, rows are screws and columns are motions.
+    # Rows of these matrices are screw components, and columns are motions.
     screws = np.tile(np.eye(6), (len(campaign), 1, 1))
     arm = place[:, :3, :3] @ centre
     screws[:, 3:, :3] = np.swapaxes(np.cross(np.eye(3), -arm[:, None]), 1, 2)
