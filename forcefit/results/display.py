@@ -19,7 +19,8 @@ from numpy.typing import ArrayLike, NDArray
 Figures = dict[str, str]
 
 _LONGEST = 72  # [characters] maximum length of the text of a value
-# largest number of elements shown; for a longer array, the shape is shown instead
+# Largest number of array elements that are shown. For a longer array, the shape is
+# shown.
 _FEW = 6
 
 
@@ -148,8 +149,8 @@ def largest(screws: ArrayLike) -> str:
 def largest_row(sizes: ArrayLike) -> int:
     """Return the index of the largest number.
 
-    Among numbers that agree within a relative tolerance of 1e-9, the first one is
-    chosen, so that the result does not depend on the processor.
+    Among numbers that agree within a relative tolerance of 1e-9, the first number is
+    chosen. The result therefore does not depend on round-off errors.
 
     Args:
         sizes: nonnegative numbers (k,), with k > 0.
@@ -168,7 +169,7 @@ def bracket(bounds: Sequence[float] | NDArray, unit: str) -> str:
 
 
 def _figures(thing: Any) -> Figures:
-    """Return the values that represent an object, from ``_figures`` or its fields."""
+    """Return the displayed values of an object, from ``_figures`` or its fields."""
     if hasattr(thing, "_figures"):
         return thing._figures()
     shown = [one.name for one in fields(thing) if one.repr and one.name != "name"]

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 Kind = Literal["number", "integer", "string", "boolean"]
-# labels along dimensions that are shared by several quantities
+# labels of the entries along dimensions that several quantities have
 LABELS: dict[str, tuple[str, ...]] = {
     "screw": ("RX", "RY", "RZ", "TX", "TY", "TZ"),
     "wrench_component": ("MX", "MY", "MZ", "FX", "FY", "FZ"),
@@ -27,11 +27,12 @@ class Quantity:
 
     Attributes:
         words: name of the quantity in reports and texts, without an article.
-        unit: SI unit.  ``"1"`` denotes a dimensionless number, and ``"rad, m"`` the two
-            halves of a screw.  The unit is empty if the result itself states it.
+        unit: SI unit.  ``"1"`` denotes a dimensionless number, and ``"rad, m"`` the
+            rotations and translations of a screw. The unit is empty if the result
+            contains the unit as a separate value.
         dims: names of the dimensions; those in :data:`LABELS` have a fixed length.
         meaning: definition of the quantity, if its name is not sufficient.
-        symbol: symbol in the paper; empty if the paper does not define one.
+        symbol: symbol in the paper; empty if the paper contains no symbol.
         kind: type of the values.
         shown: display unit in texts, if it differs from the SI unit.
         digits: number of significant digits in texts.
@@ -162,7 +163,7 @@ QUANTITIES: Mapping[str, Quantity] = {
         "condition number",
         meaning="condition number of the map from drive rates to platform velocity"
     ),
-    # forced assembly, problems (21), (22) and (27)
+    # quantities of forced assembly, problems (21), (22) and (27) of the paper
     "assemblable": flag("assembles, compliant joints rigid"),
     "assemblable_free": flag("assembles, compliant joints free"),
     "margin": Quantity(
@@ -379,7 +380,7 @@ QUANTITIES: Mapping[str, Quantity] = {
     "moment": Quantity(
         "largest moment", "N m", meaning="largest moment through any body"
     ),
-    # stiffness of links and of the platform
+    # quantities of the stiffness of links and of the platform
     "compliance": Quantity(
         "compliance", "rad/(N m) .. m/N", _MATRIX,
         "compliance of the platform in base axes", "C",
@@ -456,7 +457,7 @@ QUANTITIES: Mapping[str, Quantity] = {
     "elements": count("elements"),
     "unknowns": count("unknowns"),
     "meshes": count("meshes"),
-    # random errors and tolerances
+    # quantities of random errors and tolerances
     "draws": count("draws"),
     "assembled": count("draws that assemble"),
     "seed": count("seed"),
@@ -537,7 +538,7 @@ QUANTITIES: Mapping[str, Quantity] = {
         "path time in periods",
         meaning="path time multiplied by the first natural frequency",
     ),
-    # measured data and comparisons
+    # quantities of measured data and comparisons
     "campaign": text("campaign"),
     "rows": count("rows"),
     "verdict": text("verdict"),

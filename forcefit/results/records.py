@@ -1,4 +1,4 @@
-"""Declarations of the structure of JSON results."""
+"""Declare the structure of JSON results."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -21,10 +21,10 @@ Content = Union[
 
 @dataclass(frozen=True)
 class Record:
-    """JSON object with declared keys.
+    """JSON object with a declared list of keys.
 
     Attributes:
-        content: declared content of each key.
+        content: declared type of the value of each key.
         optional: keys that may be absent.
         closed: whether undeclared keys are forbidden.
     """
@@ -38,7 +38,7 @@ class Record:
 class Each:
     """JSON object whose keys are arbitrary names, for example of frames.
 
-    All values have the same declared content.
+    All values have the same declared type.
     """
 
     content: Content
@@ -46,14 +46,14 @@ class Each:
 
 @dataclass(frozen=True)
 class Listed:
-    """JSON list whose items all have the same declared content."""
+    """JSON list whose items all have the same declared type."""
 
     content: Content
 
 
 @dataclass(frozen=True)
 class Either:
-    """Value that matches one of several declared contents."""
+    """Value of one of several declared types."""
 
     contents: tuple[Content, ...]
 
@@ -81,11 +81,11 @@ def record(names: str = "", /, *merged: Record, **content: Content) -> Record:
     """Compose a record of quantities, other records and additional keys.
 
     Args:
-        names: names of quantities, separated by blanks; a trailing question mark marks
+        names: names of quantities, separated by blanks. A trailing question mark marks
             an optional quantity.
         merged: records whose keys are included.
-        content: additional keys and their contents; a trailing underscore, which is not
-            part of the key, marks an optional key.
+        content: additional keys and their declared types. A trailing underscore marks
+            an optional key and is not part of the key.
 
     Returns:
         Record with its keys in the order of the arguments.

@@ -25,9 +25,9 @@ def schema_of(content: Content, title: str = "", file: bool = False) -> dict[str
     """Return the JSON Schema of a record.
 
     Args:
-        content: declared content, usually a record.
+        content: declared type, usually a record.
         title: title of the schema.
-        file: whether the content is a TOML input file, in which null does not exist.
+        file: whether the schema is for a TOML input file, which cannot contain null.
 
     Returns:
         Schema as plain values.
@@ -51,7 +51,7 @@ def _without_null(schema: Any) -> Any:
 
 
 def _schema(content: Content) -> dict[str, Any]:
-    """Return the schema of a declared content."""
+    """Return the schema of a declared type."""
     match content:
         case str():
             return _schema(QUANTITIES[content])

@@ -81,8 +81,9 @@ def lines_of(results: Mapping[str, Any], names: str) -> dict[str, str]:
 
     Args:
         results: plain values of a command.
-        names: names of quantities, separated by blanks; a dot separates a record from
-            its key.  Absent quantities and the status ``ok`` are omitted.
+        names: names of quantities, separated by blanks. A dot separates the name of a
+            record from a key of the record.  Absent quantities and the status ``ok``
+            are omitted.
 
     Returns:
         Values as text; the keys are the names of the quantities in words.
@@ -118,8 +119,8 @@ def table_lines(
     Args:
         head: heading of the row names, followed by the heading of each column with its
             unit.
-        rows: numbers or texts in each row, by row name; a number that is not finite is
-            printed as a dash.
+        rows: mapping from row name to the numbers or texts in the row. A number that is
+            not finite is printed as a dash.
         digits: number of significant digits.
 
     Returns:

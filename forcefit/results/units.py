@@ -1,4 +1,4 @@
-"""Display units, chosen by magnitude on pages and by quantity in texts."""
+"""Display units of results, which depend on the magnitude or on the quantity."""
 
 import math
 from dataclasses import dataclass
@@ -47,8 +47,8 @@ def shown_in(unit: str, size: float = 1.0) -> Shown:
         size: largest absolute value of the numbers [unit].
 
     Returns:
-        Display unit and conversion factor; the SI unit itself if the table has no
-        display unit for it.
+        Display unit and conversion factor. If no display unit is defined, the SI unit
+        is returned.
     """
     if unit in {"", "1", "-"}:
         return Shown("", "", 1.0)
@@ -66,5 +66,5 @@ def number_text(value: float, unit: str = "", digits: int = 4) -> str:
         return "none"
     if math.isinf(value):
         return "unbounded"
-    # minus zero is printed as zero
+    # adding 0.0 converts minus zero to zero
     return f"{value + 0.0:.{digits}g} {unit}".rstrip()
