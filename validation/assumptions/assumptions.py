@@ -50,8 +50,7 @@ def assumption_costs(
         load: (6,) [N m, N] load on the platform at its origin, in base axes, or a
             mapping from component to value such as ``{"fz": -50}``.
         gravity: (3,) [m/s^2] gravity in base axes; None for no gravity.
-        solids: whether to compare beams with meshed solids.  Meshing takes a few
-            seconds per cross-section.
+        solids: whether to compare beams with solid finite elements.
 
     Returns:
         Mapping from each assumption to its error, or to the reason why it is unknown.

@@ -6,11 +6,11 @@ the position of the pin's axis is bounded in each bush:
 
     |(TX + h RY, TY - h RX)| <= c   and   |(TX - h RY, TY + h RX)| <= c
 
-A motion that satisfies these bounds also satisfies the paper's bounds.  A motion that
-satisfies the paper's bounds with half the clearances satisfies these bounds.  Therefore
+A motion that satisfies these bounds also satisfies the paper's bounds. A motion that
+satisfies the paper's bounds with half the clearances satisfies these bounds. Therefore,
 the energy with bushes is at least the energy with the paper's bounds, and at most the
-energy with half the clearances.  The zone margin with bushes is at most twice the
-margin with the paper's bounds.
+energy with the paper's bounds and half the clearances. The margin of the assembly zone
+with bushes is at most twice the margin with the paper's bounds.
 """
 
 from dataclasses import replace
@@ -35,7 +35,7 @@ def bush_joints(joints: VirtualJoints) -> VirtualJoints:
         The virtual joints with the bounds of bushes.
     """
     cones = joints.cones.copy()
-    # Each column contains a single nonzero entry, the inverse of a bound.
+    # Each column of the matrix contains a single nonzero entry, the inverse of a bound.
     rows = np.abs(joints.cones).argmax(axis=0)
     column = {int(row): k for k, row in enumerate(rows)}
     for i in range(len(joints.robot.frames)):

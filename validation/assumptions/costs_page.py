@@ -59,7 +59,7 @@ def costs_page(
 
 
 def _known(costs: CostsOverPoses) -> dict[str, list[tuple[Mapping[str, float], Cost]]]:
-    """Return the poses and known errors of each assumption."""
+    """Return the known errors of each assumption, with their poses."""
     pairs = {
         name: [
             (pose, cost)

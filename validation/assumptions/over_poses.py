@@ -26,7 +26,7 @@ class CostsOverPoses:
 
     Attributes:
         robot: robot with its geometric errors.
-        asked: prescribed components [m or rad] of each requested pose.
+        asked: prescribed pose components [m or rad] of each requested pose.
         unreached: reason why each requested pose is unreachable; empty if it is
             reachable.
         costs: error of each assumption at each reachable pose, or the reason why it is
@@ -45,7 +45,7 @@ class CostsOverPoses:
 
     @property
     def reached(self) -> tuple[Mapping[str, float], ...]:
-        """Prescribed components of each reachable pose."""
+        """Prescribed pose components of each reachable pose."""
         return tuple(
             asked
             for asked, why in zip(self.asked, self.unreached, strict=True)

@@ -13,10 +13,10 @@ spread          virtual joints with K_E of the same mesh and distributed wrenche
 ==============  ==================================================================
 
 The models ``meshed`` and ``solids`` must agree up to round-off, because static
-condensation is exact for rigid ends.  The stiffness of a real interface is between
-those of ``meshed`` and ``spread``.  Each difference is the largest relative difference
-of the compliance over all wrenches, which does not depend on reference point and
-reference length.
+condensation is exact for rigid ends.  The platform stiffness with real interfaces is
+between the stiffness of ``meshed`` and of ``spread``. Two models are compared by the
+largest relative difference of their compliances over all wrenches. This value does not
+depend on the reference point or on a reference length.
 """
 
 from collections.abc import Mapping, Sequence
@@ -54,8 +54,8 @@ class PlatformCosts:
         ends: (k,) [-] difference between the models ``meshed`` and ``spread``.
         by_link: mapping from link to the difference (k,) [-] caused by modelling only
             this link as a beam.  The link with the largest difference is first.
-        left: names of links without a known shape.  Their declared stiffness is used in
-            all models.
+        left: names of the links without a known shape, for which all models use the
+            declared stiffness.
         mesh_error: [-] estimated largest error of the entries of a solid's K_E, divided
             by sqrt(K_ii K_jj).
     """
@@ -171,7 +171,8 @@ def solid_compliance(posture: Posture, solids: Mapping[str, SolidLink]) -> NDArr
     other = np.ones(joints.elastic.shape[1], dtype=bool)
     owner = np.abs(joints.elastic).argmax(axis=0) // 6
     other[joints.links & np.isin(owner, rows)] = False
-    # The columns are other springs, free joints and ends of solids, in this order.
+    # The columns belong to other springs, to free joints and to the ends of solids, in
+    # this order.
     columns = np.hstack([joints.elastic[:, other], joints.free])
     steps = columns.reshape(count, 6, columns.shape[1])
     first = steps.shape[2]
@@ -188,7 +189,7 @@ def solid_compliance(posture: Posture, solids: Mapping[str, SolidLink]) -> NDArr
     springs = int(other.sum())
     K[:springs, :springs] = np.eye(springs)
     for i, solid in zip(rows, solids.values(), strict=True):
-        # The joint of the frame follows the tip of the solid in the chain.
+        # In the chain, the joint of the frame comes after the tip of the solid.
         own = steps[i].copy()
         own[:, :first] = 0.0
         turn = T[i, :3, :3] @ solid.turn

@@ -22,7 +22,7 @@ def platform_cost_figure(
 
     Args:
         costs: errors at k poses.
-        asked: prescribed components [m or rad] of each pose.
+        asked: prescribed pose components [m or rad] of each pose.
         robot: name of the robot.
 
     Returns:

@@ -2,9 +2,9 @@
 
 The solid of a beam is a straight bar with the cross-section of the beam.  The stiffness
 of a bar of unit length and unit modulus depends only on the proportions of the
-cross-section and on Poisson's ratio, so links of equal proportions are solved once.
-K_E is computed with rigid ends, as for virtual joints, and with wrenches distributed
-over the ends.
+cross-section and on Poisson's ratio, so the equations are solved only once for links of
+equal proportions. K_E is computed with rigid ends, as for virtual joints, and with
+wrenches distributed over the ends.
 """
 
 from collections.abc import Mapping
@@ -128,8 +128,8 @@ def solid_links(robot: Robot) -> Mapping[str, SolidLink]:
 
 def _mesh_error(solved: MeshedLink) -> float:
     """Return the estimated largest error [-] of the mesh's K_E."""
-    # link.stiffness is the middle of an error interval, and K_E of the mesh is the
-    # upper end of this interval.
+    # The K_E of the mesh is the upper end of the error interval, and ``link.stiffness``
+    # is the middle of the interval.
     K = solved.link.stiffness
     above = np.abs(scaled(solved.level.solution.stiffness - K, K))
     return float((above + solved.link.relative_errors).max())

@@ -17,8 +17,8 @@ relative difference of the elastic energy.  It is significant if the energy diff
 more than 1 % or the position by more than 20 um, the required accuracy of the IRSBot-2.
 The error is unknown if neither model has deformations or platform motions.
 
-Poses are those of the minimum-energy solutions.  They are not unique if a joint with
-clearance carries no load; see ``docs/validity.md``.
+Poses are those of the minimum-energy solutions.  These poses are not unique if a joint
+with clearance is not loaded; see ``docs/validity.md``.
 """
 
 import math
@@ -42,15 +42,15 @@ ENERGY_LIMIT = 0.01  # [-] smallest significant relative error of the energy
 
 @dataclass(frozen=True)
 class Cost:
-    """Error of an assumption; NaN for a difference that is only round-off.
+    """Error caused by an assumption. A difference due to round-off is NaN.
 
     Attributes:
         rotation: [rad] error of the platform's orientation.
         position: [m] error of the position of the platform's origin.
         energy: [-] error of the elastic energy, relative to the energy of the more
             accurate model.
-        pieces: number of elements per beam for errors below the limits; None for other
-            assumptions.
+        pieces: number of elements per beam with which the errors are not significant.
+            None if the assumption does not concern the division of beams.
     """
 
     rotation: float
@@ -77,11 +77,12 @@ def cost_between(
     Args:
         model: solution with the assumption.
         better: solution without the assumption.
-        missing: [J] energy of the more accurate model that neither solution contains.
+        missing: [J] energy of the more accurate model that is not included in its
+            solution.
 
     Returns:
-        The error.  Without loads, energies below 1e-6 of the energy without clearances
-        are replaced by this value, because they are round-off.
+        The error. Without loads, an energy of less than 1e-6 times the energy without
+        clearances is round-off, and is replaced by this limit.
     """
     energy = better.energy + missing
     least = 0.0 if model.frame_loads else 1e-6 * model.energy_without_clearance
@@ -189,9 +190,9 @@ def pieces_cost(
 ) -> Cost:
     """Return the error of modelling a beam as a single spring.
 
-    The error of n elements is proportional to 1 / n^2 (``docs/proofs.md``).  The
-    solution for infinitely many elements is therefore extrapolated from the solutions
-    with one and two elements.
+    The error of a beam divided into n elements is proportional to 1 / n^2
+    (``docs/proofs.md``).  The solution for infinitely many elements is therefore
+    extrapolated from the solutions with one and two elements.
 
     Args:
         posture: the robot's configuration.

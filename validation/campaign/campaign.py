@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-# Names of the six components of a pose deviation, rotations first.
+# Names of the six components of a pose deviation, with rotations first.
 READING = ("rx", "ry", "rz", "tx", "ty", "tz")
 LOAD = ("mx", "my", "mz", "fx", "fy", "fz")
 
@@ -34,8 +34,8 @@ class Campaign:
         coordinates: (R, n) [rad or m] joint coordinates of the nominal robot.
         transforms: (R, n, 4, 4) poses of the frames in the base frame, without
             imperfections.
-        mismatch: (R,) [rad, m] error with which the nominal loops are closed, caused by
-            rounded numbers in robot files.
+        mismatch: (R,) [rad, m] closure error of the nominal loops, due to rounded
+            numbers in robot files.
         commanded: how the file specifies commands, ``"joints"`` or ``"pose"``.
         loads: (R, 6) [N m, N] loads on the platform at the reference point, base axes.
         measured: (R, 6) [rad, m] measured deviations rx ry rz tx ty tz at the reference
@@ -48,8 +48,8 @@ class Campaign:
         registration: ``"known"``, or ``"unknown"`` if the pose of the measuring device
             is unknown.
         configuration: (R,) index of the commanded configuration, from 0.
-        repeat: (R,) index of the configuration and load, from 0. Rows with the same
-            index are repeats.
+        repeat: (R,) index of the combination of configuration and load, from 0. Rows
+            with the same index are repeated measurements.
         session: (R,) name of the session of each row.  None without sessions.
         motion_units: mapping from each covariate that is a measured motion to its unit,
             ``rad`` or ``m``.
@@ -61,10 +61,10 @@ class Campaign:
         point: (R,) name of the measured point, ``""`` for the reference point.  None if
             only the reference point was measured.  If a row of the file contains
             several points, the campaign contains a row for each of them.
-        common: (R, 6, k) [rad, m] factors of additional noise that is common to the
-            readings in one row of the file.  The noise is ``common`` times k standard
-            normal variables, which are the same for all readings in the row.  None
-            without common noise.
+        common: (R, 6, k) [rad, m] additional noise that is common to the readings in
+            one row of the file. This noise is ``common`` times k standard normal
+            variables, which are the same for all readings in the row. None if there is
+            no such noise.
     """
 
     name: str
@@ -230,7 +230,7 @@ def number_rows(*columns: ArrayLike, step: float = 1e-9) -> NDArray:
 
     Args:
         columns: (R,) or (R, k) arrays to compare.  NaN is equal to NaN.
-        step: difference below which values are treated as equal.
+        step: values that differ by less than this are treated as equal.
 
     Returns:
         (R,) number of each row, in order of first occurrence.

@@ -42,7 +42,7 @@ from forcefit.validation.campaign.measurement_table import (
     read_table,
 )
 
-# [rad, m] Largest accepted error with which loops are closed.
+# [rad, m] Largest accepted closure error of the loops.
 _CLOSED = 1e-6
 
 
@@ -170,7 +170,7 @@ def _table_names(root: Table) -> list[str]:
 
 
 def _campaign(declared: _Declared, robot: Robot, *, measured: bool = True) -> Campaign:
-    """Return the campaign that ``campaign.toml`` describes.
+    """Create the campaign that ``campaign.toml`` describes.
 
     Args:
         declared: content of ``campaign.toml``.
@@ -277,14 +277,16 @@ def _rows_of_points(
         measured: whether to omit rows without a reading.
 
     Returns:
-        Index (C,) of the row in the file, and index (C,) of the point.
+        For each row of the campaign, the index of its row in the file, (C,), and the
+        index of its point, (C,).
     """
     taken = np.column_stack([
         np.isfinite(readings).any(axis=1) for readings, _ in every.values()
     ])
     if not measured:
-        # Without readings, each row is used for all additional points.  If there are no
-        # additional points, it is used for the reference point.
+        # If there are no readings, the campaign contains a row for each additional
+        # point. If there are no additional points, it contains a row for the reference
+        # point.
         alone = not taken.any() and len(every) > 1
         taken[~taken.any(axis=1)] = taken.any(axis=0) if taken.any() else True
         taken[:, 0] &= not alone

@@ -17,8 +17,8 @@ from forcefit.validation.campaign.measurement_table import MeasurementTable
 # [rad] Largest accepted command of a revolute joint.
 _TURNS = 8 * np.pi
 _FORCE = 1e7  # [N, N m] largest accepted load
-# [K] Largest accepted difference from the calibration temperature, which excludes
-# absolute temperatures.
+# [K] Largest accepted difference from the calibration temperature. Absolute
+# temperatures are therefore rejected.
 _WARMEST = 250.0
 _LATEST = 3e8  # [s] largest accepted time
 _ROOM = 1000.0  # [m] largest accepted distance between machine and measuring device

@@ -1,6 +1,6 @@
 """Read the format of a measurement table: delimiter, decimal mark and units.
 
-The format is declared in ``campaign.toml``. By default, cells are separated by commas,
+The format is declared in ``campaign.toml``. By default, values are separated by commas,
 numbers have a decimal point, and units are SI units.
 """
 
@@ -37,7 +37,7 @@ class Dialect:
     """Format of a measurement table.
 
     Attributes:
-        delimiter: character between cells.
+        delimiter: character between two values.
         decimal: the decimal mark.
         units: mapping from each key of ``[units]`` to its unit.
         motions: mapping from each covariate that is a measured motion to its unit.
@@ -53,7 +53,7 @@ class Dialect:
         return self.units.get(key) or next(iter(UNITS[key]))
 
     def factor(self, key: str) -> float:
-        """Return the factor from the unit of a key to the SI unit."""
+        """Return the factor that converts the unit of a key to the SI unit."""
         return UNITS[key][self.unit(key)]
 
     @property
@@ -99,7 +99,7 @@ def read_dialect(root: Table) -> Dialect:
 
 
 def parse_number(cell: str, decimal: str) -> float:
-    """Return the number in a cell, or NaN if the cell contains no valid number."""
+    """Convert the text in a table cell to a number, or to NaN if it is not valid."""
     if decimal != ".":
         cell = cell.replace(".", "?").replace(decimal, ".")
     return float(cell) if _NUMBER.fullmatch(cell) else math.nan

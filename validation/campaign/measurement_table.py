@@ -43,7 +43,7 @@ class MeasurementTable:
     Attributes:
         file: path of the file.
         ids: unique label of each row.
-        lines: line number at which each row ends in the file.
+        lines: number of the last line of each row in the file.
         columns: mapping from the name of each numeric column to its (R,) values, NaN
             for an empty cell.
         dialect: format of the table.
@@ -63,14 +63,14 @@ class MeasurementTable:
         return len(self.ids)
 
     def bad(self, row: int, column: str, message: str) -> BadInput:
-        """Return an error about a cell."""
+        """Return an error about a cell of the table."""
         place = f"line {self.lines[row]} (id {quoted(self.ids[row])})"
         where = f"{place}, {column}" if column else place
         file = self.files[row] if self.files else self.file
         return BadInput(f"{file}: {where}: {message}")
 
     def stack(self, prefix: str, names: tuple[str, ...], absent: float) -> NDArray:
-        """Return the columns ``prefix.name`` as an array (R, k).
+        """Return the table columns ``prefix.name`` for k names as an array (R, k).
 
         Missing columns are filled with ``absent``.
         """
@@ -124,7 +124,7 @@ def read_table(
     for k, name in enumerate(header):
         if name not in _TEXTS:
             table.columns[name] = _numbers(table, robot, name, [row[k] for row in rows])
-    _check_labels(table)  # after checking the format
+    _check_labels(table)  # errors in the format are reported first
     return table
 
 
@@ -132,8 +132,8 @@ def join_tables(tables: Sequence[MeasurementTable]) -> MeasurementTable:
     """Concatenate measurement tables.
 
     Args:
-        tables: tables of one campaign.  A table without the column ``session`` is one
-            session.
+        tables: tables of one campaign.  The rows of a table without the column
+            ``session`` belong to one session.
 
     Returns:
         The joined table.  Each label is prefixed with the name of its file.  Missing
@@ -174,7 +174,7 @@ def join_tables(tables: Sequence[MeasurementTable]) -> MeasurementTable:
 
 
 def _cells(path: Path, dialect: Dialect) -> tuple[list[int], list[list[str]]]:
-    """Return the line number at which each row ends, and the cells of each row."""
+    """Return the number of the last line of each row, and the cells of each row."""
     lines, rows = [], []
     text = io.StringIO(read_text(path), newline="")
     reader = csv.reader(text, delimiter=dialect.delimiter, strict=True)
@@ -240,7 +240,7 @@ def _header(
 
 
 def _passive(name: str, robot: Robot) -> str:
-    """Return why a joint cannot be commanded, or an empty text."""
+    """Return the reason why a joint cannot be commanded, or an empty text."""
     frames = {f"q.{f.name}": f for f in robot.frames}
     if name not in frames:
         return ""
@@ -318,7 +318,7 @@ def _number_hint(name: str, cell: str, dialect: Dialect) -> str:
     if other in cell and math.isfinite(parse_number(cell, other)):
         written = quoted(cell.replace(other, dialect.decimal))
         setting = f'decimal = "{other}" in campaign.toml'
-        # The delimiter is also a comma.
+        # The delimiter must be changed too, because it is also a comma.
         if other == dialect.delimiter:
             setting = f'delimiter = ";", {setting} and separate cells by ";"'
         return (

@@ -42,7 +42,7 @@ def save(carried: CarriedRobot, path: Path | str) -> None:
 
 
 def covariance_of(carried: CarriedRobot, robot: Robot) -> SavedCovariance:
-    """Return the covariance of the parameters fitted to the set-up rows.
+    """Return the covariance of the robot parameters after the fit to the set-up rows.
 
     Args:
         carried: the robot, fitted to the new sessions.
@@ -68,7 +68,7 @@ def covariance_of(carried: CarriedRobot, robot: Robot) -> SavedCovariance:
 
 
 def _with_std(robot: Robot, known: SavedCovariance) -> Robot:
-    """Return the robot with the standard deviations of its functions in ``known``."""
+    """Return the robot with standard deviations of function coefficients."""
     functions = list(robot.functions)
     for number, sigma in zip(known.numbers, known.std.tolist(), strict=True):
         if number.kind == FUNCTION:

@@ -8,7 +8,8 @@ parameters are fitted to the set-up rows of all sessions (:mod:`.session_fit`) a
 tested on the other rows.
 
 The uncertainty of the fit is propagated to the other rows.  The set-up rows are
-insufficient if this uncertainty exceeds their residual with the saved robot.
+insufficient if this uncertainty exceeds the residual of the saved robot in the set-up
+rows.
 """
 
 import math
@@ -47,16 +48,17 @@ class Carried:
         unknowns: the k fitted parameters.
         values: (k,) [rad, m] fitted values.
         std: (k,) standard deviations of the values.
-        rows: number of set-up rows, and number of other rows.
+        rows: number of set-up rows, and number of all other rows.
         error: prediction error on the other rows.
         declared: prediction error of the declared robot, fitted to the same set-up
             rows.
         uncertainty: [m] rms uncertainty of the predicted points of the other rows.
         left: [m] rms residual of the set-up rows.
-        held: [m] rms residual of the set-up rows with the saved robot parameters.
+        held: [m] rms residual of the set-up rows if the robot parameters keep their
+            saved values.
         open_: names of the most uncertain parameters; empty if the set-up rows suffice.
-        left_behind: changes with time in the original session that cannot be fitted,
-            because the new session has no column ``cov.time``.
+        left_behind: names of the changes with time that cannot be fitted, because the
+            new session has no column ``cov.time``.
     """
 
     session: str | None
@@ -76,7 +78,7 @@ class Carried:
 
     @property
     def suffices(self) -> bool:
-        """Whether the set-up rows determine the fitted parameters accurately enough."""
+        """Whether the set-up rows determine the parameters accurately enough."""
         return not self.open_
 
     @property
@@ -160,14 +162,14 @@ def _of(campaign: Campaign, session: str | None, setup: NDArray) -> NDArray:
 
 
 def _left_behind(robot: Robot, unknowns: SessionUnknowns) -> tuple[str, ...]:
-    """Return the titles of changes with time that cannot be fitted in a session."""
+    """Return the names of changes with time that cannot be fitted in a session."""
     drift, functions = of_one_session(robot)
     whole = [DRIFT] if drift and unknowns.constant is None else []
     return (*whole, *(f.title for f in functions if f not in unknowns.functions))
 
 
 def _judged(fit: SessionsFit, other: SessionsFit, number: int) -> Carried:
-    """Return the result of a session on the rows that were not fitted."""
+    """Return the result of a session, with errors on the rows that were not fitted."""
     one, alike = fit.sessions[number], other.sessions[number]
     campaign, setup, values = one.campaign, one.rows, fit.values(number)
     read = one.read(fit.robot, values)
@@ -221,7 +223,7 @@ def carried_robot(carried: CarriedRobot) -> Robot:
 
 
 def _added(before: Any, more: dict[str, dict[str, float]]) -> dict[str, Any]:
-    """Return effects with ``more`` added to their parameters and with a new drift."""
+    """Return effects with changes added to their parameters, and with a new drift."""
     merged = {name: dict(values) for name, values in before.items()}
     for effect, values in more.items():
         own = merged.setdefault(effect, {})

@@ -1,8 +1,9 @@
 r"""Compute commands with which a corrected robot reaches the nominal poses.
 
 The controller computes commands q for which the nominal robot has the target pose.  The
-machine deviates from this pose by d(q), which the corrected model predicts.  Commands
-with which the machine has the target pose are computed by the Gauss-Newton method:
+machine deviates from this pose by d(q), which is predicted by the model with the
+identified effects.  Commands with which the machine has the target pose are computed by
+the Gauss-Newton method:
 
  nominal pose(q) changed by the deviation d(q) = target pose
 
@@ -48,7 +49,7 @@ _STEPS = 25
 _HALVINGS = 8
 _STILL = 1e-10  # [rad or m] largest change of a command at convergence
 _TURN = np.pi  # [rad] largest accepted correction of a revolute drive
-# Factor on the weight of rotations if the drives cannot correct all six components.
+# Factor on the weight of rotation errors if the robot has fewer than six drives.
 _LOW = 1e-4
 
 
@@ -59,8 +60,8 @@ class Compensation:
     Attributes:
         targets: commands at which the nominal robot has the target poses.
         drives: names of the d actuated joints.
-        commands: (R, d) [rad or m] corrected commands.  Rows without a solution contain
-            the given command.
+        commands: (R, d) [rad or m] corrected commands. In rows without a solution, they
+            equal the given commands.
         transforms: (R, n, 4, 4) nominal poses of the frames at the commands.
         coordinates: (R, n) [rad or m] coordinate of every joint at the commands.
         before: (R, 6) [rad, m] deviation from the target pose for the given commands,
@@ -70,7 +71,7 @@ class Compensation:
         spread: (R, 6) [rad, m] standard deviation of ``after`` due to the uncertainty
             in the robot file.
         limited: (R,) bool, whether a joint limit prevents the correction.
-        reason: (R,) reason why a row has no solution; empty if it has one.
+        reason: (R,) reason why a row has no solution; empty for rows with a solution.
     """
 
     targets: Campaign
@@ -111,8 +112,8 @@ def compensate(targets: Campaign, *, as_read: bool = False) -> Compensation:
 
     Args:
         targets: commands for the corrected robot.
-        as_read: whether effects of the measuring device are corrected, too, so that the
-            readings become zero.
+        as_read: whether effects of the measuring device are also corrected. The
+            predicted readings are then zero.
 
     Returns:
         The corrected commands.
@@ -159,7 +160,7 @@ def _corrected(
     machine: "_Machine", standing: "_Standing", q: NDArray, weights: NDArray,
     limits: tuple[NDArray, NDArray], going: NDArray,
 ) -> tuple[NDArray, "_Standing"]:  # fmt: skip
-    """Return the commands (R, d) of smallest error, and the state of the machine.
+    """Return the commands (R, d) of smallest pose error, and the state of the machine.
 
     Only the rows in ``going`` are corrected, by damped Gauss-Newton steps.
     """
@@ -177,7 +178,7 @@ def _corrected(
             if not worse.any():
                 break
             share = np.where(worse, share / 2, share)
-        # Rows without progress have errors due to round-off or joint limits.
+        # The iteration ends in a row if the error no longer decreases.
         going = going & moving & ~worse
         q = np.where(going[:, None], tried, q)
         standing = next_ if going[moving].all() else machine.at(q)[0]
@@ -185,7 +186,7 @@ def _corrected(
 
 
 def _each_once(targets: Campaign) -> Campaign:
-    """Return the commands without the repeats for several measured points."""
+    """Return the commands, each of which is listed once for all measured points."""
     if targets.point is None:
         return targets
     labels = tuple(dict.fromkeys(targets.labels))
@@ -229,7 +230,7 @@ def _too_far(
 
 
 def _astray(robot: Robot, error: NDArray, reason: NDArray) -> NDArray:
-    """Return reasons (R,), with those of rows with errors larger than the robot."""
+    """Add a reason for each row whose pose error is larger than the robot."""
     size, reason = size_of(robot), reason.copy()
     off = np.linalg.norm(error[:, 3:], axis=1)
     for row in np.flatnonzero((off > size) & (reason == "")):
@@ -274,7 +275,7 @@ class _Machine:
     Attributes:
         targets: the given commands.
         goal: (R, 4, 4) target platform poses.
-        as_read: whether effects of the measuring device are corrected too.
+        as_read: whether effects of the measuring device are also corrected.
     """
 
     targets: Campaign
@@ -305,7 +306,7 @@ class _Machine:
 
 
 def _commanded(targets: Campaign, q: NDArray) -> tuple[Campaign, NDArray]:
-    """Return a campaign with new commands, except for unreachable rows."""
+    """Return a campaign with new commands. Unreachable commands are not changed."""
     robot = targets.robot
     driven = _driven(robot)
     wanted = np.full((len(q), len(robot.frames)), np.nan)
@@ -327,7 +328,7 @@ def _commanded(targets: Campaign, q: NDArray) -> tuple[Campaign, NDArray]:
 
 
 def _between(conditions: Conditions, deviation: NDArray, goal: NDArray) -> NDArray:
-    """Return the motion from the present to the target pose, base axes, (R, 6)."""
+    """Return the motion from the current to the target pose, base axes, (R, 6)."""
     nominal = conditions.postures.platform
     arm = nominal[:, :3, :3] @ conditions.point
     R = rotation_matrix(deviation[:, :3]) @ nominal[:, :3, :3]

@@ -55,9 +55,9 @@ def offset_table(compensation: "Compensation") -> str:
 
     Returns:
         CSV with ``id`` and the offsets ``offset.<drive>`` [rad or m].  The columns
-        ``before`` and ``after`` contain the position [m] and rotation [rad] errors
-        before and after correction.  The column ``spread`` is the standard deviation
-        [m] of the position after correction.
+        ``before`` and ``after`` contain the position errors [m] and rotation errors
+        [rad] before and after the correction.  The column ``spread`` is the standard
+        deviation [m] of the position after correction.
     """
     columns: dict[str, Any] = {
         f"offset.{n}": x
@@ -120,8 +120,8 @@ def summary(
 
     Args:
         compensation: result of :func:`.compensation.compensate`.
-        diagnosed: ``position`` [m] and ``rotation`` [rad] rms error on held-out rows;
-            None for the values in the robot file.
+        diagnosed: rms errors ``position`` [m] and ``rotation`` [rad] on the held-out
+            rows of the diagnosis. If it is None, they are read from the robot file.
 
     Returns:
         Plain values.  ``expected`` combines the error after correction, the parameter
@@ -173,7 +173,7 @@ def _unexplained(
 
 
 def _sizes(error: NDArray) -> dict[str, float | None]:
-    """Return the rms of positions and rotations; None if there are no values."""
+    """Return the rms position and the rms rotation, None if there are no values."""
 
     def rms(part: NDArray) -> float | None:
         known = part[np.isfinite(part).all(axis=1)]

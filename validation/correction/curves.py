@@ -1,8 +1,9 @@
 """Plot the functions in a robot file with their uncertainty.
 
-Functions describe deviations that depend on temperature, time, load or position.  For a
-function with memory, the response to a unit step is plotted over time.  If a function
-depends on the direction of motion, the approach is from below.
+Functions describe deviations that depend on temperature, time, load or position.  If a
+function depends on previous values of its variable, the response to a unit step is
+plotted over time. If a function depends on the direction of motion, it is plotted for
+increasing values.
 """
 
 from collections.abc import Mapping
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
 
 _POINTS = 181
 _SHOWN = 13  # number of points of each curve in the text
-_LATE = 4.0  # [time constants or periods] plotted duration of a response in time
+_LATE = 4.0  # [time constants or periods] plotted duration of a step response
 # Half of the plotted range of each variable, in the unit of the variable.
 _RANGES = {"temperature": 10.0, "approach": 1.0}
 _LOAD = 100.0  # [N, N m] half of the plotted range of a load component
@@ -46,14 +47,14 @@ class Curve:
 
     Attributes:
         function: the function.
-        component: component of the screw or compliance that the function returns.
+        component: plotted component of the screw or compliance.
         variable: variable on the horizontal axis.
-        constant: name and value of the second variable; None for a function of one
-            variable.
+        constant: name and constant value of the second variable. None if the function
+            has one variable.
         x: (k,) values of the variable, in its unit.
         values: (k,) values of the component [rad, m, N m, N], divided by N or N m for a
             compliance.
-        std: (k,) standard deviations; 0 if the file contains none.
+        std: (k,) standard deviations; 0 if the robot file contains no uncertainty.
         units: unit of ``x``, and unit of ``values``.
     """
 
@@ -80,8 +81,9 @@ def curves_of(
             default is a full turn, the range of a spline's knots, or a typical range.
 
     Returns:
-        One curve per component, or three curves per component for a function of two
-        variables, with different values of the second variable.
+        One curve for each component of a function of one variable. Three curves for
+        each component of a function of two variables, with different values of the
+        second variable.
     """
     curves = []
     for function in robot.functions:

@@ -1,10 +1,10 @@
-r"""Compute the prior of machine parameters in a new session.
+r"""Compute the prior distribution of machine parameters in a new session.
 
 The file of a saved robot contains its geometric errors, compliances, effects and
-functions, and the covariance C of their fit.  Before the new session, the machine may
-have changed by more than this uncertainty.  The prior therefore has the mean of the
-saved values and the covariance k C, where k is chosen by cross-validation on the set-up
-rows (:mod:`.session_fit`).
+functions, and the covariance C of their fit.  The machine may have changed since this
+fit by more than its uncertainty.  The prior therefore has the mean of the saved values
+and the covariance k C, where k is chosen by cross-validation on the set-up rows
+(:mod:`.session_fit`).
 
 ======  =============  =========  ====================================================
 symbol  code           shape      meaning
@@ -29,8 +29,8 @@ from forcefit.validation.diagnosis.saved_covariance import (
     known_covariance,
 )
 
-# Fraction of the largest eigenvalue of the correlations below which an eigenvalue is
-# regarded as round-off.
+# Eigenvalue of the correlation matrix that is treated as zero, relative to the largest
+# eigenvalue.
 _RANK = 1e-10
 
 
@@ -41,7 +41,7 @@ class MachineNumbers:
     Attributes:
         robot: the saved robot.
         numbers: the m parameters.
-        root: (m, r) factor L of their covariance L L'.
+        root: (m, r) factor L of the parameter covariance L L'.
     """
 
     robot: Robot
@@ -57,14 +57,14 @@ class MachineNumbers:
         return np.sqrt(np.einsum("mr,mr->m", self.root, self.root))
 
     def robot_at(self, u: NDArray) -> Robot:
-        """Return the robot with its parameters changed by L u, within bounds.
+        """Return the robot with its parameters changed by L u, limited to their bounds.
 
         Args:
             u: (r,) independent variables.
 
         Returns:
-            The robot.  A parameter that cannot be negative is multiplied by a positive
-            factor instead of adding the change.
+            The robot. A parameter that cannot be negative is multiplied by a positive
+            factor instead.
         """
         robot = self.robot
         if not np.any(u):
@@ -76,14 +76,14 @@ class MachineNumbers:
 
 
 def machine_numbers(robot: Robot) -> MachineNumbers:
-    """Return the parameters of a saved robot that all sessions share.
+    """Return the parameters of a saved robot that are common to all sessions.
 
     Args:
         robot: robot with a covariance, or with ``tolerance`` and ``std``, in its file.
 
     Returns:
-        Parameters with a known uncertainty, except those of a single session and of a
-        measuring device's pose.
+        Parameters with a known uncertainty. Parameters of a single session and of the
+        pose of a measuring device are excluded.
 
     Raises:
         BadInput: the file of the covariance cannot be read.
@@ -120,12 +120,12 @@ def _possible(number: Number, robot: Robot, by: float) -> float:
 
 
 def unchanging(robot: Robot) -> MachineNumbers:
-    """Return an empty set of parameters, for a robot that is known exactly."""
+    """Return an empty set of parameters, for a robot without uncertainty."""
     return MachineNumbers(robot, (), np.zeros((0, 0)))
 
 
 def renumbered(machine: MachineNumbers) -> list[Number]:
-    """Return the parameters with new function numbers, without functions of time.
+    """Return the parameters after functions of time are removed from the robot.
 
     Args:
         machine: parameters of a saved robot.

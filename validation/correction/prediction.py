@@ -28,7 +28,9 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-_MOVED = 3.0  # ratio of residuals, saved to fitted pose, above which a device was moved
+# Smallest ratio of the residuals for the saved device pose and for a fitted pose that
+# shows that the device was moved.
+_MOVED = 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,14 +44,14 @@ class PredictedReadings:
             not measured.
         spread: (R, 6) [rad, m] standard deviation of the prediction due to the
             uncertainty in the robot file.
-        noise: (R, 6) [rad, m] standard deviation of a reading from the true deviation
-            of the machine; NaN if it is unknown.
+        noise: (R, 6) [rad, m] standard deviation of the measurement noise; NaN if it is
+            unknown.
         extrapolated: (R,) names of the variables with values outside the range in which
             the robot was identified; empty if there are none.
         registration: source of the pose of the measuring device: ``"known"``, ``"of the
             robot file"``, ``"fitted to these rows"`` or ``"none"``.
-        point: measured point for which the robot was identified, if the readings belong
-            to a different point.
+        point: position [m] of the measured point with which the robot was identified.
+            None if the predicted readings are of the same point.
     """
 
     commands: Campaign
@@ -115,9 +117,10 @@ def _both(values: NDArray) -> dict[str, float]:
 def predict(commands: Campaign) -> PredictedReadings:
     """Return the predicted readings of a campaign's robot for its commands.
 
-    The registration is the pose of the measuring device.  An unknown registration is
-    read from the robot file.  It is fitted to the measured rows if the file contains
-    none, or if the residuals show that the device was moved.
+    The registration is the pose of the measuring device. If the campaign does not
+    contain the registration, it is read from the robot file. If the file does not
+    contain it either, or if the residuals show that the device was moved, it is fitted
+    to the measured rows.
 
     Args:
         commands: campaign with the robot, its effects and its rows.
@@ -156,7 +159,7 @@ _FITTED = "fitted to these rows"
 
 
 def _registered(commands: Campaign, conditions: Conditions) -> tuple[Conditions, str]:
-    """Return the conditions with the device pose, and the source of this pose."""
+    """Return the conditions with the device pose, and the source of that pose."""
     if commands.registration == "known":
         return conditions, "known"
     carried = np.broadcast_to(conditions.base, (len(commands), 6)).any(axis=1).all()
@@ -190,7 +193,7 @@ def _unplaced(robot: Robot) -> Robot:
 
 
 def _noise(commands: Campaign) -> NDArray:
-    """Return the noise, which is sigma or the scatter of held-out rows, (R, 6)."""
+    """Return the standard deviations of the noise, (R, 6) [rad, m]."""
     record = commands.robot.diagnosis
     known = [record.get("noise_rotation"), record.get("noise_position")]
     sizes = [x if isinstance(x, float) else np.nan for x in known]
@@ -201,7 +204,7 @@ def _noise(commands: Campaign) -> NDArray:
 
 
 def reading_names(commands: Campaign) -> list[tuple[str, str, int]]:
-    """Return the column, point and component of each reading in a table of readings.
+    """Return the column name, point and component of each reading in a table.
 
     Args:
         commands: the rows of the table.  Components without a measurement are omitted,
@@ -263,8 +266,9 @@ def csv_text(rows: Mapping[str, Mapping[str, object]], columns: Sequence[str]) -
     """Return a table with labelled rows as CSV.
 
     Args:
-        rows: mapping from label to a row, which is a mapping from column to cell.
-        columns: names of the columns after ``id``, in order.
+        rows: mapping from row label to row; each row is a mapping from column name to
+            value.
+        columns: names of the columns after the column ``id``, in order.
 
     Returns:
         CSV with a header; missing values and NaN are empty cells.
@@ -276,7 +280,7 @@ def csv_text(rows: Mapping[str, Mapping[str, object]], columns: Sequence[str]) -
 
 
 def _cell(value: object) -> str:
-    """Format a number with ten digits, or return a text."""
+    """Format a number with ten digits; return a text unchanged."""
     if not isinstance(value, float):
         return str(value)
     return "" if np.isnan(value) else f"{value:.10g}"

@@ -11,14 +11,14 @@ C       ``covariance``  (k, k)        covariance of x
 
 The parameters of each session (:mod:`.session_unknowns`) have a flat or a Gaussian
 prior.  The parameters u of the machine (:mod:`.machine_numbers`) are common to all
-sessions, with the prior N(0, k).  The ratio tau of the scatter to sigma is known from
-the diagnosis, with a prior of 20 degrees of freedom.  All rows of a configuration
-together have the weight of a single row.
+sessions, with the prior N(0, k).  The ratio tau of the scatter of the readings to sigma
+has the prior mean estimated by the diagnosis, with 20 degrees of freedom. All rows of a
+configuration together have the weight of a single row.
 
 The factor k is chosen by cross-validation, in which each configuration of the set-up
-rows is predicted by a fit to the other configurations.  A larger k is chosen only if it
-reduces the prediction error by more than a standard error and by a relevant fraction of
-the noise.
+rows is predicted by a fit to the other configurations.  A larger k is chosen only if
+the decrease of the squared prediction error exceeds its standard error and 3 % of the
+noise variance.
 """
 
 from collections.abc import Sequence
@@ -47,8 +47,9 @@ from forcefit.validation.diagnosis.separability import orthonormal_basis
 _STEPS = 8
 _SETTLED = 1e-3  # largest step of x at convergence, in standard deviations
 _WIDENED = 4.0 ** np.arange(8)  # candidate values of k, the factor on the covariance
-_SURE = 1.0  # smallest improvement for a larger k, in standard errors
-_MATTERS = 0.03  # [-] smallest improvement for a larger k, over the noise variance
+_SURE = 1.0  # smallest decrease of the squared prediction error, in standard errors
+# [-] Smallest decrease of the squared prediction error, over the noise variance.
+_MATTERS = 0.03
 _AT_ONCE = 1000  # number of rows processed together, which limits memory
 
 
@@ -78,7 +79,7 @@ class SetUp:
 
     @property
     def told(self) -> float:
-        """Ratio of a reading's prior variance to sigma^2, including repeats."""
+        """Prior variance of a reading divided by sigma^2, including repeats."""
         left = self.campaign.robot.diagnosis.get("normalised")
         level = max(1.0, left) if isinstance(left, float) else 1.0
         return level**2 * self.repeated
@@ -93,7 +94,7 @@ class SetUp:
         return x
 
     def _still(self, robot: Robot, rows: NDArray) -> Conditions:
-        """Return the conditions of selected rows without the session's effects."""
+        """Return the conditions of selected rows without the effects of the session."""
         bare = replace(self.campaign, robot=without_session(robot))
         return finite_conditions(bare, rows)
 
@@ -138,7 +139,7 @@ class SetUp:
     def whitened(
         self, machine: MachineNumbers, values: NDArray, u: NDArray
     ) -> tuple[NDArray, NDArray]:
-        """Return residuals / sigma (n,) of set-up rows and derivatives (n, p + r)."""
+        """Return residuals (n,) and derivatives (n, p + r), divided by sigma."""
         own = self.own
         read, slopes = self.tangent(machine, values, u, self.rows)
         A = (slopes / own.sigma[:, :, None])[own.cells]
@@ -154,8 +155,9 @@ class SessionsFit:
         machine: parameters of the robot.
         x: (k,) parameters of all sessions, followed by u of the machine.
         covariance: (k, k) covariance of x.
-        widened: factor on the covariance of the machine's parameters.
-        held: parameters of the sessions for a machine with its saved parameters.
+        widened: factor k by which the covariance of the machine's parameters is
+            multiplied.
+        held: session parameters that are fitted with the machine's saved parameters.
     """
 
     sessions: tuple[SetUp, ...]
@@ -188,7 +190,7 @@ class SessionsFit:
 
         Args:
             number: index of the session.
-            cells: (R, 6) mask of the readings.
+            cells: (R, 6) mask of the readings to average over.
 
         Returns:
             The mean variance, and the contributions of each session parameter and of u,
@@ -265,7 +267,7 @@ def _settled(
 
 
 def _inverse(H: NDArray) -> NDArray:
-    """Return the inverse of the information matrix H, also if H is singular."""
+    """Return the (pseudo-)inverse of the information matrix H."""
     size = np.sqrt(np.diag(H))
     unit = np.where(size > 0, size, 1.0)
     scaled = H / np.outer(unit, unit) + 1e-14 * np.eye(len(H))
@@ -276,7 +278,7 @@ def _widened(
     sessions: Sequence[SetUp], machine: MachineNumbers, x: NDArray,
     told: Sequence[float],
 ) -> tuple[float, float]:  # fmt: skip
-    """Return the factor k on the robot's covariance, and the noise scale tau."""
+    """Return the factor k of the prior covariance, and the noise scale tau."""
     values = sum(len(one.unknowns) for one in sessions)
     zs, rows = [], []
     for k, one in enumerate(sessions):
@@ -312,13 +314,13 @@ def _widened(
 
 
 def _matters(more: NDArray, count: int) -> bool:
-    """Return whether an increase of the squared errors is significant."""
+    """Return whether an increase of the squared prediction errors is significant."""
     error = float(more.std(ddof=1)) * np.sqrt(len(more)) if len(more) > 1 else 0.0
     return bool(more.sum() > max(_SURE * error, _MATTERS * count))
 
 
 def _blocks(sessions: Sequence[SetUp], number: int) -> NDArray:
-    """Return the configuration numbers of set-up readings over all sessions, (n,)."""
+    """Return the configuration index of each set-up reading in all sessions, (n,)."""
     before = sum(len(np.unique(s.own.configuration)) for s in sessions[:number])
     own = sessions[number].own
     rows = np.nonzero(own.cells)[0]

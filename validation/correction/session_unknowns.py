@@ -2,10 +2,10 @@
 
 These are the pose of the measuring device, the effect ``drift``, the functions of time
 and, if requested, the measured point and the zeros of the joints.  A slow wave or a
-step of one day is not expected to repeat, so the prior mean of its coefficients is 0,
-and the prior standard deviation is their previous size.  A lag or creep starts with
-every session, so the prior mean of its coefficients is their previous values.  No drift
-is fitted without a column ``cov.time``.
+step in one session is not expected to repeat. The prior mean of its coefficients is
+therefore 0, and their prior standard deviation is their previous size. A lag or creep
+starts again in every session, so the prior means of its coefficients are the previous
+values.  No drift is fitted without a column ``cov.time``.
 """
 
 from collections.abc import Sequence
@@ -30,8 +30,8 @@ from forcefit.assembly.model.robot import Robot
 
 OF_A_SESSION = ("registration", "tool", "zeros")
 DRIFT = "drift"
-_ZERO = 1e-3  # [rad, m] prior standard deviation of a joint's new zero
-_SETTLING = ("lag", "creep")  # forms of functions that start with the session
+_ZERO = 1e-3  # [rad, m] prior standard deviation of the change of a joint's zero
+_SETTLING = ("lag", "creep")  # functional forms that start again in every session
 _STEP = 1e-6  # [rad, m] step of numerical derivatives, except for drift
 _CONSTANT = "time_constant"
 
@@ -46,7 +46,7 @@ def of_one_session(robot: Robot) -> tuple[dict[str, float], tuple[Function, ...]
 
 
 def without_session(robot: Robot) -> Robot:
-    """Return the robot without device pose and changes with time."""
+    """Return the robot without the pose of the device and without changes with time."""
     effects = {name: dict(values) for name, values in robot.effects.items()}
     effects.pop(DRIFT, None)
     tool = {k: v for k, v in effects.pop("registration", {}).items() if k in TOOL}
@@ -62,7 +62,7 @@ class SessionUnknowns:
     """Prior of the k parameters that are fitted in a session.
 
     Attributes:
-        names: pairs of an effect or function title and the name of a parameter.
+        names: for each parameter, the title of its effect or function, and its name.
         mean: (k,) prior means.
         prior: (k,) prior precisions, 1 / variance; 0 for a flat prior.
         step: (k,) step of the numerical derivative.
@@ -125,8 +125,8 @@ def session_unknowns(
     Args:
         robot: saved robot, including the parameters of its original session.
         fitted: names of parameters in :data:`OF_A_SESSION`.
-        clock: whether the rows of the session contain a time.  Otherwise, no changes
-            with time are fitted.
+        clock: whether the time of each row was recorded. Otherwise, no changes with
+            time are fitted.
 
     Returns:
         The parameters.
@@ -145,7 +145,7 @@ def session_unknowns(
     step, mean = [_STEP] * len(names), [0.0] * len(names)
     drift, functions = of_one_session(robot) if clock else ({}, ())
     constant = drift.pop(_CONSTANT, None)
-    # A formula is not linear in its parameters and is therefore not fitted.
+    # A formula is not fitted, because it is not linear in its parameters.
     functions = tuple(f for f in functions if f.form != FORMULA)
     alone = {name: (name[-2], value) for name, value in drift.items()}
     owned = [(DRIFT, True, alone)]

@@ -38,7 +38,7 @@ _STEP = 0.1  # step of the numerical derivative, in standard deviations
 def deviation_spread(
     robot: Robot, conditions_for: Callable[[Robot], Conditions]
 ) -> NDArray:
-    """Return the standard deviation of the deviations at the measured points.
+    """Return the standard deviations of the predicted deviations at measured points.
 
     Args:
         robot: robot with its effects.
@@ -60,14 +60,14 @@ def number_slopes(
     robot: Robot, conditions: Conditions, numbers: tuple[Number, ...], std: NDArray,
     conditions_for: Callable[[Robot], Conditions],
 ) -> NDArray:  # fmt: skip
-    """Return the derivatives of the deviations by parameters of a robot file.
+    """Return the derivatives of the deviations with respect to robot parameters.
 
     Args:
         robot: robot with its effects.
         conditions: conditions of R rows for the robot.
         numbers: k parameters of the file.
-        std: (k,) standard deviations of the parameters, to which steps are
-            proportional.
+        std: (k,) standard deviations of the parameters. The steps of the numerical
+            derivatives are proportional to them.
         conditions_for: function that returns the conditions of the same rows for
             another robot.
 
@@ -94,7 +94,7 @@ def number_slopes(
 
 
 def _is_direct(robot: Robot, number: Number) -> bool:
-    """Return whether the motion of a function does not affect its variables."""
+    """Return whether the variables of a function do not depend on its own motion."""
     function = robot.functions[int(number.owner)]
     wrench = any(name.startswith("wrench.") for name in function.variables)
     alone = function.where not in PLACES and function.kind == "compliance"

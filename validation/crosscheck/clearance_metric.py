@@ -1,15 +1,16 @@
 """Compare two models with clearances by their energies and spring deformations.
 
-If a joint with clearance carries no load, the minimum-energy pose is not unique.
+If a joint with clearance is not loaded, the minimum-energy pose is not unique.
 Therefore the minimum energy and the deformations and wrenches of the springs are
 compared, but not the poses.  In addition, the linear model is evaluated at the
-simulated motions within the clearances.  The difference of its energy from the minimum
-is the optimality gap.  If links are springs in the simulation, its energy must also
-equal the energy of the exact virtual-joint model at full scale.
+simulated motions within the clearances.  The difference between the energy at these
+motions and the minimum energy is called the optimality gap.  If links are springs in
+the simulation, its energy must also equal the energy of the exact virtual-joint model
+at full scale.
 
-Errors, clearances and load are multiplied by the same scale s.  The linear energy is
-proportional to s^2, and so is the relative optimality gap until the compliance of the
-contacts dominates.
+Errors, clearances and load are multiplied by the same scale s.  The energy of the
+linear model is proportional to s^2. The relative optimality gap is also proportional to
+s^2, until the compliance of the contacts dominates.
 """
 
 import math
@@ -73,8 +74,9 @@ class ClearanceMetric:
     def signal(self) -> bool:
         """Whether motions within clearances or spring deformations exceed the noise.
 
-        If the robot assembles without force, both energies are zero.  This agreement is
-        significant only if assembly without clearances would require energy.
+        If the robot assembles without force, the energies of both models are zero. This
+        agreement is significant only if the assembly without clearances requires
+        energy.
         """
         linear, s = self.pairs[0].linear, self.pairs[0].scale
         return (
@@ -83,7 +85,7 @@ class ClearanceMetric:
 
     @cached_property
     def limits(self) -> dict[str, Check]:
-        """Relative difference of both models by quantity, extrapolated to scale 0."""
+        """Relative difference of each quantity, extrapolated to scale 0."""
         ours = np.array([pair.linear_energy for pair in self.pairs])
         theirs = np.array([pair.simulated.rigid_energy for pair in self.pairs])
         gap = limit_of(self.scales**2, self.gaps)

@@ -99,7 +99,7 @@ class Crosscheck:
         links: model of links in the simulation: ``"beam"``, ``"spring"`` or ``"fem"``.
         gravity: (3,) [m/s^2] gravity at scale 1, base axes.
         pairs: solutions at each scale, largest first.
-        asked: number of requested scales, without those that were added.
+        asked: number of requested scales. Scales that were added are not counted.
         metric: comparison of the solutions.
     """
 
@@ -264,7 +264,7 @@ def crosscheck(
         )  # fmt: skip
         if simulated.held:
             held.append(s)
-        # The linear model then contains the same springs as the simulation.
+        # The linear model must contain the same springs as the simulation.
         if simulated.held and holding is not None:
             linear = holding
         exact = exact_solution(linear, s * g)

@@ -8,8 +8,9 @@ slope   ``difference_slope`` slope of log difference over log scale, as s goes t
 limit   ``limit_difference`` difference / s^p extrapolated to s = 0, relative
 ======  ===================  ==========================================================
 
-The uncertainty of a limit is twice the change of the limit if the largest scale is
-omitted.  Differences below :data:`FLOOR` are regarded as noise of the simulation.
+The uncertainty of a limit is estimated by omitting the largest scale. It is twice the
+resulting change of the limit.  Differences below :data:`FLOOR` are regarded as noise of
+the simulation.
 """
 
 import math
@@ -29,7 +30,8 @@ FLOOR = {
     "rotation": 1e-10,
     "translation": 1e-11,
 }  # resolution of a simulation [rad], [m]
-# Multiple of the effect of weak springs below which changes are regarded as noise.
+# Changes are regarded as noise if they are smaller than this multiple of the effect of
+# weak springs.
 _NOISE = 3.0
 HALVES = {"rotation": slice(0, 3), "translation": slice(3, 6)}
 
@@ -43,7 +45,7 @@ def spring_limits(
         robot: robot with the compared links and joint springs.
         pairs: both solutions at several scales.
         spread: whether loads act between the ends of links.  Link wrenches are then not
-            compared, because the linear model lacks such loads.
+            compared, because the linear model contains no such loads.
 
     Returns:
         Mapping from quantity to its check; see :func:`limit_difference`.  Differences
@@ -101,8 +103,8 @@ def limit_difference(
         least_size: smallest divisor of the difference, in the unit of the values.
 
     Returns:
-        The check of the largest relative difference.  It has a signal if the bound
-        times the largest value of ``ours`` exceeds the noise.
+        The check of the largest relative difference. It has a signal if the noise is
+        smaller than the bound times the largest value of ``ours``.
     """
     weight = scales.reshape(-1, *[1] * (ours.ndim - 1)) ** -float(power)
     limit, change = limit_of(scales, (theirs - ours) * weight)
@@ -141,10 +143,10 @@ def difference_slope(scales: ArrayLike, differences: ArrayLike, floor: float) ->
     """Return the slope of log difference over log scale as the scale goes to 0.
 
     In a difference of second order, ``c2 s^2 + c3 s^3 + ..``, the terms may partly
-    cancel.  A straight line through the logarithms would then have a wrong slope.
-    Therefore the first-order term ``c1 s`` is extrapolated from ``difference / s``.  At
-    the smallest scale, the slope follows from the ratio between this term and the terms
-    of higher order.
+    cancel.  The slope of a straight line through the logarithms would then be wrong.
+    Therefore, the first-order term ``c1 s`` is extrapolated from ``difference / s``.
+    The slope at the smallest scale is computed from the ratio of this term and the
+    terms of higher order.
 
     Args:
         scales: (k,) positive scales, largest first.

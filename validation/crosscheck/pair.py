@@ -26,8 +26,8 @@ class Pair:
         simulated: result of the simulation.
         exact: result of the virtual-joint model with finite rotations; None if no
             solution was found.
-        between: [J] energy of distributed weights in the beams of the simulation.  The
-            linear model lacks this energy.
+        between: [J] energy of distributed weights in the beams of the simulation. The
+            linear model does not include this energy.
         holding: solution of the linear model with the springs of
             :func:`hold_free_motions`, used to estimate the effect of weaker springs in
             the simulation.  None if the simulation contains no such springs.
@@ -62,7 +62,7 @@ class Pair:
 
     @property
     def linear_energy(self) -> float:
-        """Energy [J] of the linear model with that of distributed weights.
+        """Energy [J] of the linear model, plus the energy of distributed weights.
 
         The energy of weak springs on free motions is not included.
         """
@@ -135,7 +135,7 @@ def sprung(robot: Robot) -> NDArray:
 
 
 def _named(robot: Robot, part: str, rows: NDArray) -> dict[str, NDArray]:
-    """Return a mapping from frames with a link or joint (``part``) to rows."""
+    """Return the values of an array for each frame with a link or joint."""
     return {
         frame.name: row
         for frame, row in zip(robot.frames, rows, strict=True)
@@ -216,7 +216,8 @@ def scaled(posture: Posture, scale: float) -> Posture:
 
     Args:
         posture: the posture at scale 1.
-        scale: factor on geometric errors, clearances and forces of drives.
+        scale: factor by which geometric errors, clearances and drive forces are
+            multiplied.
 
     Returns:
         The posture of the scaled robot.

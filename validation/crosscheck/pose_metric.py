@@ -2,9 +2,10 @@
 
 The virtual-joint model is linear in the errors, whereas the simulation is nonlinear.
 If the linear model is correct, the difference between the models is of second order.
-If errors and load are multiplied by s, it is proportional to s^2, which is a slope of
-2 in a log-log plot.  Each quantity of the simulation is divided by its power of s and
-extrapolated to s = 0.  The limit must equal the quantity of the linear model.
+If errors and load are multiplied by s, this difference is proportional to s^2. Its
+slope in a log-log plot is 2. Each quantity of the simulation is divided by the power of
+s to which the quantity is proportional in the linear model, and extrapolated to s = 0.
+The limit must equal the quantity of the linear model.
 
 Passive joints move freely about or along their z axis in both models.
 
@@ -39,8 +40,8 @@ from forcefit.validation.crosscheck.verdict import Check
 
 # Largest accepted deviation of the slope from 2.
 SLOPE_TOLERANCE = 0.1
-# [-] Largest accepted fraction of the pose difference that the exact model does not
-# explain if links are springs.
+# [-] Largest accepted ratio of the pose differences from the exact and the linear
+# model, if links are springs.
 EXPLAINED_TOLERANCE = 0.02
 # [-] Relative first-order pose difference between K_E of a mesh and the simulated
 # solid, due to round-off.

@@ -1,9 +1,10 @@
 """Compute the smallest change in each robot parameter that a cross-check detects.
 
 Each parameter in turn is changed by one per cent, and the linear model is solved again.
-The solution replaces that of the simulation in the cross-check.  The smallest
-detectable change is the relative change for which a check reaches its bound, computed
-by proportion.  A parameter is unproved if a change by its full value is not detected.
+This solution replaces the simulation in the cross-check. The smallest detectable change
+is the relative change at which a check exceeds its bound. It is extrapolated from the
+values of the check for the change of one per cent. A parameter is called unproved if a
+change by its full value is not detected.
 """
 
 from collections.abc import Iterator, Sequence
@@ -39,9 +40,9 @@ from forcefit.validation.crosscheck.pair import (
 from forcefit.validation.crosscheck.pose_metric import PoseMetric
 
 _CHANGE = 1e-2  # [-] relative change of a parameter
-# Name of the check with a value proportional to the square of a change.
+# Name of the check whose value is proportional to the square of a parameter change.
 _QUADRATIC = "optimality gap"
-# [-] Relative change above which a parameter is unproved.
+# [-] A parameter is unproved if its smallest detectable relative change is larger.
 UNPROVED = 1.0
 _NAMED = 4  # largest number of parameter names in a line of text
 _KINDS = ("link", "joint stiffness", "clearance", "error")

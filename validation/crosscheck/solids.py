@@ -17,8 +17,9 @@ def mesh_bodies(robot: Robot) -> dict[str, MeshBody]:
         robot: robot of the virtual-joint model.
 
     Returns:
-        Mapping from frame to the solid of the finest mesh, from which K_E of the linear
-        model is computed, too.  Links of the same shape and material share a solid.
+        Mapping from frame to the solid of the finest mesh. The K_E of the linear model
+        is computed from the same mesh.  Links of the same shape and material share a
+        solid.
 
     Raises:
         BadInput: K_E of a mesh was not computed when the robot was loaded, or an

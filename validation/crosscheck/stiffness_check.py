@@ -5,10 +5,10 @@ linearised method differentiates the residual of the simulation.  The load-step 
 applies small loads to the platform along each axis.  A method is not used for the
 verdict if its estimated uncertainty exceeds the tolerance.
 
-Clearances are zero in both models unless they are requested.  With clearances, only the
-linearised method is used, with smoothed contacts.  The force of a load has a constant
-direction.  Its moment is a couple of such forces, because a moment about fixed axes has
-no potential (``docs/exact.md``).
+Both models are without clearances unless clearances are requested.  With clearances,
+only the linearised method is used, with smoothed contacts.  The force of a load has a
+constant direction.  Its moment is a couple of such forces, because a moment about fixed
+axes has no potential (``docs/exact.md``).
 """
 
 from dataclasses import dataclass, replace
@@ -103,13 +103,13 @@ class StiffnessCheck:
 
     @property
     def tolerance(self) -> float:
-        """Largest accepted difference between entries of two compliances [-]."""
+        """Largest accepted difference of entries, divided by sqrt(C_ii C_jj)."""
         own = TOLERANCE[self.links]
         return max(own, CONTACT_TOLERANCE) if self.clearances else own
 
     @cached_property
     def mixed(self) -> tuple[str, ...]:
-        """Names of deformed joints that the two models define differently.
+        """Names of joints whose deformations are defined differently in the two models.
 
         Such joints are locked in some components and elastic in several others,
         including a rotation.  In the exact model, locked components are components of
@@ -144,7 +144,7 @@ class StiffnessCheck:
 
     @property
     def passed(self) -> bool:
-        """Whether all methods of sufficient accuracy agree; False without one."""
+        """Whether all sufficiently accurate methods agree; False if there is none."""
         return not self.mixed and bool(self._decided) and all(self._decided)
 
     @property

@@ -1,8 +1,8 @@
 """Decide whether two models agree, adding scales until every check is decided.
 
-With large errors and few scales, higher-order terms can imitate or cancel a first-order
-error, so a check may be undecided.  Smaller scales are then added, each half of the
-previous one.  A check can fail only if at least four scales were solved.
+With large errors and few scales, terms of higher order can imitate or cancel a
+first-order error. A check may then be undecided.  Smaller scales are then added, each
+half of the previous one.  A check can fail only if at least four scales were solved.
 
 A quantity below the noise of a model is not compared, for example if the robot has
 neither errors nor loads.  Such a check has no signal and has not passed.
@@ -34,7 +34,7 @@ _FEWEST, _MOST = 4, 6
 
 @dataclass(frozen=True)
 class Check:
-    """A check whether a value is within a bound.
+    """Comparison of a value with its bound.
 
     Attributes:
         value: best estimate of the value, >= 0.

@@ -103,7 +103,7 @@ def variables_of(conditions: Conditions) -> list[str]:
 
 
 def _kind(name: str) -> str:
-    """Return the name of the vector to which a component belongs."""
+    """Return the vector to which a variable belongs, or its own name."""
     vectors = "position.", "load.m", "load.f"
     return next((v for v in vectors if name.startswith(v)), name)
 

@@ -61,7 +61,7 @@ class ScoredFunction:
 
 
 def _by_kind(turns: NDArray, gram: NDArray) -> NDArray:
-    """Return the rms norm of each column's kind, rotation or translation, (f, c, m)."""
+    """Return rms norms (f, c, m), separately for rotations and translations."""
     diagonal = np.einsum("...kk->...k", gram)
     squares = np.zeros_like(diagonal)
     for kind in (turns, ~turns):

@@ -113,7 +113,7 @@ def report_page(
 
 
 def _section(title: str, content: str) -> list[str]:
-    """Return a section of the page, or an empty text if the section has no content."""
+    """Return a section of the page in a list, or an empty list without content."""
     return [section(title, content)] if content else []
 
 

@@ -66,7 +66,7 @@ class Separability:
 
     @property
     def shows_at(self) -> NDArray:
-        """Factors (m,) on plausible parameters at which each effect equals the noise.
+        """Factors (m,) by which plausible parameters become just detectable.
 
         The factor is infinite for an effect that cannot be detected.
         """

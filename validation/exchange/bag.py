@@ -88,7 +88,7 @@ def _places(message: Any) -> Iterator[tuple[str, Any, Any, Any]]:
 def _reading(
     path: str, number: int, names: tuple[str, ...], header: Any, place: Any, turn: Any
 ) -> Reading:
-    """Return a reading of a bag, with the message number as its ``line``."""
+    """Return a reading of a bag, whose ``line`` is the index of the message."""
     position = np.array([place.x, place.y, place.z], dtype=float)
     if np.isnan(position).any():
         position[:] = np.nan  # the device did not detect the target

@@ -13,7 +13,8 @@ from forcefit.validation.exchange.device_frame import DeviceFrame
 from forcefit.validation.exchange.reading import Reading
 from forcefit.validation.exchange.targets_file import TargetsFile
 
-# Rows of the campaign: the index of the command, and a mapping from target to reading.
+# Rows of the campaign, each with the index of its command and a mapping from target to
+# reading.
 Rows = Sequence[tuple[int, Mapping[str, Reading]]]
 
 
@@ -25,7 +26,8 @@ def columns_of(
 
     Args:
         commands: the commands.
-        rows: rows of the campaign: index of the command, and readings by target.
+        rows: rows of the campaign, each with the index of its command and a mapping
+            from target to reading.
         gaps: (R, T, 3) [m] deviation of each target; NaN if the target was not
             measured.
         turns: (R, 3) [rad] rotation of the platform; NaN if the rotation was not
@@ -78,14 +80,14 @@ def spreads(rows: Rows, frame: DeviceFrame, names: Sequence[str]) -> NDArray:
 
 
 def labels_of(commands: Commands, rows: Rows) -> list[str]:
-    """Return unique labels of rows: the command's id, with a number for a repeat.
+    """Return a unique label for each row.
 
     Args:
         commands: the commands.
         rows: rows of the campaign.
 
     Returns:
-        A label for each row.
+        The id of the command of each row. If a command is repeated, a number is added.
     """
     seen: dict[int, int] = {}
     labels = []

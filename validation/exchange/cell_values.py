@@ -25,7 +25,8 @@ class CellValues:
     Attributes:
         sheet: the table.
         header: columns of the table.
-        writing: declared format, used for properties that are not in the table.
+        writing: declared format of the export, used if the table does not contain a
+            unit.
     """
 
     sheet: Sheet
@@ -38,7 +39,7 @@ class CellValues:
         return self.number(line, name, cell) * self.unit(self.header.columns[k].unit)
 
     def unit(self, stated: str) -> float:
-        """Return the factor that converts the lengths of a column to metres."""
+        """Return the factor that converts lengths in a column to metres."""
         path, declared, found = self.sheet.file, self.writing.unit, self.header.unit
         if not stated and declared and found:
             if LENGTHS[found] != LENGTHS[declared]:

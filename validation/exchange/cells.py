@@ -1,4 +1,4 @@
-"""Read the cells of a device table, in the encodings of common programs."""
+"""Read the cells of a device table in one of several text encodings."""
 
 import codecs
 import csv
@@ -16,8 +16,8 @@ _BLANK = " "
 _QUOTED = re.compile(
     r"[-+]?\d*,\d+(?:[eE][-+]?\d+)?"
 )  # matches a number with a decimal comma
-# Largest number of characters in a cell, because the search for units takes quadratic
-# time.
+# Largest accepted number of characters in a cell. The time for the search for units is
+# proportional to its square.
 _LONGEST = 1000
 _SAMPLE = 2000  # number of lines from which the separator is determined
 
@@ -29,8 +29,8 @@ class Sheet:
     Attributes:
         file: path of the file, for messages.
         decimal: decimal mark of the table.
-        rows: number and cells of each line.  Quotes and surrounding blanks are removed
-            from cells.  Comments and blank lines are omitted.
+        rows: line number and cells of each line of the table.  Quotes and surrounding
+            blanks are removed from cells.  Comments and blank lines are omitted.
     """
 
     file: str
@@ -92,7 +92,8 @@ def _text(path: Path | str) -> str:
     content = read_bytes(path)
     if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         encodings = ["utf-16"]
-    elif content[1:40:2].count(0) > 10:  # ASCII in UTF-16 without byte order mark
+    # The encoding is UTF-16 without byte order mark.
+    elif content[1:40:2].count(0) > 10:
         encodings = ["utf-16-le"]
     elif content[0:40:2].count(0) > 10:
         encodings = ["utf-16-be"]

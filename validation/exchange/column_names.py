@@ -37,7 +37,7 @@ class Column:
     Attributes:
         kind: ``"axis"``, ``"sigma"``, ``"U"``, ``"quaternion"``, ``"angle"``,
             ``"name"``, ``"time"``, or ``""`` for an ignored column.
-        axis: x, y, z, or w of a quaternion.
+        axis: ``x``, ``y`` or ``z``, or ``w`` for the scalar part of a quaternion.
         unit: unit in the name of the column; empty if there is none.
         target: name of the target; empty if the column names none.
     """
@@ -49,7 +49,7 @@ class Column:
 
 
 def column_of(cell: str) -> Column:
-    """Return the meaning of a column from its name.
+    """Return the meaning of a column, determined from its name.
 
     Args:
         cell: cell of the header.

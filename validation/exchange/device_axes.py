@@ -1,8 +1,8 @@
 """Check the length unit and the axes of a device export.
 
 A wrong unit multiplies all distances by the same factor, and left-handed axes mirror
-the readings.  Such files are rejected.  They are not corrected, because a wrong device
-setting may also affect data that cannot be checked here.
+the readings.  Such files are rejected.  They are not corrected, because a wrong setting
+of the device may also affect data that cannot be checked.
 
 Sources:
     Umeyama (1991), Least-squares estimation of transformation parameters between two
@@ -21,17 +21,19 @@ from forcefit.validation.exchange.device_frame import robust_frame, scatter_of
 from forcefit.validation.exchange.reading import LENGTHS
 
 _UNITS = {**LENGTHS, "ft": 0.3048}
-# A correction is accepted if it reduces the scatter below this fraction.
+# The axes or units are regarded as wrong if a correction reduces the scatter below this
+# fraction of its value.
 _FAR_BETTER = 0.25
 _SCALED = 0.02  # largest relative scatter of distance ratios for a wrong unit
-# Accepted relative error of the factor between two units.
+# Accepted relative error of the estimated ratio of two units.
 _UNIT = 0.05
 # Number of following readings to which the distances from a reading are computed.
 _PAIRED = 10
 # Largest accepted difference between measured and declared distance of two targets,
 # relative to the declared distance.
 _APART = 0.1
-# Reversal of the y axis.  Reversing another axis differs from it only by a rotation.
+# Reversal of the y axis. The reversal of a different axis would differ only by a
+# rotation.
 _MIRRORED = np.array([1.0, -1.0, 1.0])
 
 
@@ -44,7 +46,7 @@ def check_axes(
         file: the targets file, for messages.
         measured: (N, 3) [m] readings, device axes.
         nominal: (N, 3) [m] nominal positions, base axes.
-        known: whether the device axes equal the base axes.
+        known: whether the device axes are declared equal to the base axes.
 
     Raises:
         BadInput: the readings fit much better with another unit or other axes.
@@ -131,7 +133,7 @@ def _units_of(factor: float) -> tuple[float, str]:
 
 
 def _factor(measured: NDArray, nominal: NDArray, known: bool) -> float:
-    """Return the ratio of nominal to measured distances, insensitive to outliers."""
+    """Return a robust estimate of the ratio of nominal to measured distances."""
     if known:
         pairs = [(measured, nominal)]
     # Distances between readings do not depend on the device pose.
@@ -148,7 +150,7 @@ def _factor(measured: NDArray, nominal: NDArray, known: bool) -> float:
 
 
 def _scatter(measured: NDArray, nominal: NDArray, known: bool) -> float:
-    """Return the scatter [m] of the readings in the fitted or known device frame."""
+    """Return the scatter [m] of the readings, with the fitted or known device frame."""
     if known:
         return scatter_of(np.linalg.norm(measured - nominal, axis=1))
     return robust_frame(measured, nominal)[1]

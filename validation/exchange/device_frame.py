@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 # Multiple of the scatter of all readings above which a deviation is an outlier.
 _GROSS = 20.0
 # Targets are regarded as exchanged if their exchange reduces the residual below this
-# fraction.
+# fraction of its value.
 _BETTER = 0.25
 _MOST = 6  # largest number of targets for which every order is tried
 
@@ -33,7 +33,7 @@ class DeviceFrame:
 
 
 def fit_frame(measured: NDArray, nominal: NDArray) -> DeviceFrame:
-    """Return the device frame that fits measured to nominal points in least squares.
+    """Return the device frame that fits measured to nominal points by least squares.
 
     Args:
         measured: (N, 3) [m] points in device axes.
@@ -95,9 +95,9 @@ def exchanged_throughout(
     """Return the order of the targets if another order fits much better.
 
     Args:
-        measured: for each target (R, 3) [m] positions in device axes; NaN if not
+        measured: positions of each target in device axes, (R, 3) [m]; NaN if not
             measured.
-        nominal: for each target (R, 3) [m] positions in base axes.
+        nominal: nominal positions of each target in base axes, (R, 3) [m].
 
     Returns:
         For each target, the index of the target that was measured under its name.  None

@@ -41,7 +41,8 @@ def read_device_table(
 
     Args:
         path: the file.
-        writing: declared format, used for properties that are not in the file.
+        writing: declared format of the export, used if the file does not contain a unit
+            or an order of angles.
         targets: mapping from the name of each target to its position (3,) [m], platform
             axes.  A table may contain separate columns for each target.
 
@@ -86,7 +87,7 @@ def _refuse_other_headings(
 
 
 def _lacking(cells: Sequence[str]) -> str:
-    """Return the first coordinate (x, y or z) without a heading in a line."""
+    """Return the first coordinate (x, y or z) for which a line contains no heading."""
     words = " ".join(cells).lower().split()
     return next((axis for axis in "xyz" if axis not in words), "x")
 
@@ -98,7 +99,7 @@ def _is_data(cells: Sequence[str], decimal: str) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class _HeadedRows:
-    """Converter from the rows below a header to readings."""
+    """Converts the rows below a header to readings."""
 
     values: CellValues
 

@@ -99,8 +99,9 @@ def _by_target(
 ) -> list[Column]:
     """Return the columns of a table with several targets per row.
 
-    Target names are in the column headings or in a row above.  Without names, groups of
-    columns are assigned to the targets in order if their numbers are equal.
+    Target names are in the column headings or in a row above the headings. Without
+    names, the groups of columns x, y, z are assigned to the targets in order. This
+    requires as many groups as targets.
 
     Args:
         cells: cells of the header.
@@ -117,7 +118,7 @@ def _by_target(
     plain = [column_of(cell) for cell in cells]
     for _, above in reversed(before):
         labels = _filled(above, len(cells))
-        # A body arm is preferred to its markers arm:1 and arm:2.
+        # For example, the target arm is preferred to its markers arm:1 and arm:2.
         exact = set(labels) & set(targets)
         found = [
             label if label in exact else _only(label, [*{*targets} - exact])
@@ -138,7 +139,7 @@ def _by_target(
 
 
 def _by_order(columns: Sequence[Column], targets: list[str]) -> list[Column]:
-    """Assign groups of x, y, z to the targets in order if their numbers are equal."""
+    """Assign groups of columns x, y, z to the targets in order."""
     groups = -1
     ordered = []
     for column in columns:
@@ -160,7 +161,7 @@ def _complete(columns: Sequence[Column], least: int = 1) -> bool:
 
 
 def _of_target(cell: str, targets: Sequence[str]) -> tuple[Column, str]:
-    """Return the column and target of a heading such as ``A x`` or ``x_A``."""
+    """Return the meaning and the target of a heading such as ``A x`` or ``x_A``."""
     for target in sorted(targets, key=len, reverse=True):
         name = re.escape(target)
         before = re.search(rf"(?:^|[^a-z0-9]){name}(?=[^a-z0-9]|[xyz]\b)", cell, re.I)
@@ -177,7 +178,7 @@ def _of_target(cell: str, targets: Sequence[str]) -> tuple[Column, str]:
 
 
 def _only(label: str, targets: Sequence[str]) -> str:
-    """Return the target in a label such as ``arm:SMR1``, or an empty string."""
+    """Return the name of the target in a label such as ``arm:SMR1``, or ``""``."""
     words = re.split(r"[:./|\s]+", label)
     found = [target for target in targets if target in words or target == label]
     return found[0] if len(found) == 1 else ""
@@ -201,7 +202,7 @@ def _filled(cells: Sequence[str], count: int) -> list[str]:
 
 
 def _stated(rows: Sequence[tuple[int, list[str]]]) -> tuple[int, str]:
-    """Return line number and unit of lengths found above a header, or 0 and ""."""
+    """Return the unit of lengths above a header, and its line number, or 0 and ""."""
     for line, cells in rows:
         if match := _STATED.search(" ".join(cells)):
             words = re.findall(r"[A-Za-zµμ]+", match[1])[:4]

@@ -18,16 +18,16 @@ class Match:
 
     Attributes:
         how: method of the assignment: ``"name"``, ``"time"`` or ``"order"``.
-        rows: rows of the campaign: the index of the command, and a mapping from target
-            to reading.  A second reading of a target at the same command starts a new
-            row.
+        rows: rows of the campaign, each with the index of its command and a mapping
+            from target to reading.  A second reading of a target at the same command
+            starts a new row.
         strangers: readings of points that are not targets, for example ground points.
         unmatched: readings of targets to which no command was assigned.
         missing: readings without a position.
-        duplicates: readings with the same digits as an earlier one in the same file.
-            They are omitted.
-        copies: readings with the same digits as one in another file.  They are used,
-            because a device with few digits may measure equal values.
+        duplicates: readings with the same digits as an earlier reading in the same
+            file. They are omitted.
+        copies: readings with the same digits as a reading in a different file. They are
+            used, because rounded readings may be equal by chance.
     """
 
     how: str
@@ -158,7 +158,7 @@ def _of_commands(
 ) -> list[int]:
     """Return the command index of each reading from its name; -1 if it has none.
 
-    An empty list is returned unless most names contain the id of one command.
+    The list is empty unless most names contain the id of exactly one command.
     """
     index = {label: i for i, label in enumerate(ids)}
     asked = [
@@ -171,10 +171,10 @@ def _of_commands(
 
 
 def _within(readings: Sequence[Reading], labels: Sequence[str]) -> list[list[str]]:
-    """Return the labels in the name of each reading, such as SMR1 in ``p04_SMR1``.
+    """Return the label that each reading's name contains: SMR1 in ``p04_SMR1``.
 
     A label must not be adjacent to a letter or digit.  If labels overlap, the longest
-    is returned.
+    label is returned.
     """
     longest = sorted(labels, key=len, reverse=True)
     words = "|".join(map(re.escape, longest))

@@ -17,7 +17,8 @@ from forcefit.validation.exchange.column_names import QUATERNION, Column
 
 ROTATION_VECTOR = "rotation_vector"
 ANGLES = {"rad": 1.0, "mrad": 1e-3, "deg": np.pi / 180}
-# Inverse rotations fit much better if they reduce the scatter below this fraction.
+# Rotations are regarded as inverted if inverse rotations reduce the scatter below this
+# fraction of its value.
 _FAR_BETTER = 0.25
 # [rad] Scatter above which orientations are regarded as unrelated to the commands.  The
 # scatter of real machines is below 0.02 rad.
@@ -27,7 +28,7 @@ _GROSS = 20.0  # multiple of the scatter above which a reading is excluded from 
 # deviation of one component.
 _MEDIAN = 1.538
 _ROUNDING = 1e-12  # [rad] smallest scatter, due to round-off
-_UNIT_NORM = 0.01  # accepted difference of the norm of a rounded quaternion from 1
+_UNIT_NORM = 0.01  # accepted deviation of the norm of a quaternion from 1
 
 
 def orders() -> tuple[str, ...]:
@@ -56,7 +57,7 @@ def orientation_columns(
     """
     w = {columns[k].axis: k for k in own if columns[k].kind == "quaternion"}
     angles = {columns[k].axis: k for k in own if columns[k].kind == "angle"}
-    # With a column W, the columns Rotation X, Y and Z are components of a quaternion.
+    # If there is a column W, the columns Rotation X, Y and Z contain a quaternion.
     if "w" in w:
         w = angles | w
     if set(w) >= set(QUATERNION):

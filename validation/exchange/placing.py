@@ -1,4 +1,4 @@
-"""Transform readings to base axes and find impossible readings."""
+"""Transform readings to base axes and find implausible readings."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -24,8 +24,8 @@ from forcefit.validation.exchange.orientation import turns_of
 from forcefit.validation.exchange.reading import Reading
 from forcefit.validation.exchange.targets_file import TargetsFile
 
-# Fraction of the spread of the commands above which the scatter is not caused by the
-# machine.
+# Scatter relative to the range of the commands above which readings and commands
+# disagree.
 _ASTRAY = 0.1
 _HERE = DeviceFrame(np.eye(3), np.zeros(3))
 
@@ -65,7 +65,7 @@ def place(declared: TargetsFile, commands: Commands, rows: Rows) -> Placed:
     Args:
         declared: content of the targets file.
         commands: the commands.
-        rows: readings by command.
+        rows: rows of the campaign, each with the index of its command and its readings.
 
     Returns:
         The deviations of the readings from the declared robot.

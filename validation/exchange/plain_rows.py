@@ -1,4 +1,4 @@
-"""Read the rows of a headerless device table."""
+"""Read the rows of a device table without a header."""
 
 from collections.abc import Mapping, Sequence
 
@@ -25,9 +25,9 @@ def read_plain_rows(
 
     Args:
         values: reader of the cells' values.
-        rows: line number and cells of each row.  A row contains either a name and x, y,
-            z, or x, y, z of one point or of all targets in order.  Additional cells are
-            ignored.
+        rows: line number and cells of each row.  A row contains a name and x, y, z.
+            Alternatively, it contains x, y, z of one point, or of all targets in order.
+            Additional cells are ignored.
         targets: mapping from the name of each target to its position (3,) [m], platform
             axes.
 

@@ -44,12 +44,13 @@ class Reading:
     Attributes:
         file: path of the file, for messages.
         line: line in the file.
-        names: parts of the point's full name, such as collection, group and point.
+        names: components of the full name of the point, such as collection, group and
+            point.
         position: (3,) [m] position in the device's axes; NaN if the device detected no
             target.
         sigma: (3,) [m] standard deviation of each coordinate; NaN if the file does not
             contain it.
-        time: [s] time on the clock of the file; NaN without a time.
+        time: [s] time of the reading; NaN if the file contains no time.
         rotation: (3, 3) rotation matrix from target axes to device axes; None if not
             measured.
     """

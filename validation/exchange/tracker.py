@@ -27,7 +27,7 @@ from forcefit.validation.exchange.placing import Placed, place
 from forcefit.validation.exchange.reading import Reading
 from forcefit.validation.exchange.targets_file import TargetsFile, read_targets
 
-# Largest accepted fraction of omitted readings.  If more readings do not fit, the input
+# Largest accepted fraction of omitted readings. If this fraction is exceeded, the input
 # files are probably wrong.
 _MOST_LEFT_OUT = 0.2
 
@@ -115,8 +115,8 @@ def import_readings(
 
     Raises:
         BadInput: a file is invalid, too many readings would be omitted, or the readings
-            fit much better in another unit, mirrored or with exchanged targets.  Then,
-            no file is written.
+            fit much better in another unit, mirrored or with exchanged targets.  No
+            file is written in these cases.
     """
     folder = Path(folder)
     check_new_folder(folder)

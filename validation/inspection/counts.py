@@ -7,16 +7,16 @@ from forcefit.validation.campaign.campaign import LOAD, READING, Campaign
 
 
 def row_counts(kinds: NDArray) -> dict:
-    """Return the number of kinds of rows, and statistics of the rows per kind.
+    """Return the number of distinct rows, and how often they are repeated.
 
-    The statistics are the minimum, median and maximum number of rows.
+    The numbers of repetitions are given by their minimum, median and maximum.
     """
     _, rows = np.unique(kinds, return_counts=True)
     return {"count": len(rows), "rows_each": [rows.min(), np.median(rows), rows.max()]}
 
 
 def load_counts(c: Campaign) -> dict:
-    """Summarise the levels, magnitudes and components of the load."""
+    """Summarise the number, magnitudes and components of the loads."""
     force = np.linalg.norm(c.loads[:, 3:], axis=1)
     moment = np.linalg.norm(c.loads[:, :3], axis=1)
     pairs = np.unique(np.column_stack([c.configuration, c.repeat]), axis=0)
@@ -48,7 +48,7 @@ def reading_counts(c: Campaign) -> dict:
 
 
 def covariate_counts(c: Campaign) -> dict:
-    """Summarise the range, levels and correlations of each covariate."""
+    """Summarise the range, number of values and correlations of each covariate."""
     return {
         name: {
             "range": [x.min(), x.max()],
@@ -65,7 +65,7 @@ def covariate_counts(c: Campaign) -> dict:
 
 
 def correlation(x: NDArray, y: NDArray) -> float:
-    """Return the correlation of two columns, or 0 if one of them is constant."""
+    """Return the correlation of two variables, or 0 if one of them is constant."""
     x, y = x - x.mean(), y - y.mean()
     size = float(np.linalg.norm(x) * np.linalg.norm(y))
     return float(x @ y) / size if size > 0 else 0.0

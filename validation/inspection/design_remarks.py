@@ -16,7 +16,8 @@ from forcefit.validation.inspection.repeats import RepeatNoise
 
 # [1/K] Thermal expansion coefficient of aluminium.
 _EXPANSION = 2.4e-5
-_TOGETHER = 0.9  # correlation above which two covariates cannot be distinguished
+# Correlation above which the effects of two covariates cannot be distinguished.
+_TOGETHER = 0.9
 # Largest plausible manufacturing error, relative to the size of the robot.
 _UNIT = 0.02
 
@@ -24,7 +25,7 @@ _UNIT = 0.02
 def remarks_on(
     campaign: Campaign, repeats: Revisits, visits: Revisits, noise: RepeatNoise | None
 ) -> list[Remark]:
-    """Return all remarks about a campaign, those about lost information first.
+    """Return all remarks about a campaign, most serious first.
 
     Args:
         campaign: campaign of R rows.
@@ -108,7 +109,7 @@ def _on_configurations(campaign: Campaign, visits: Revisits) -> list[Remark]:
 
 
 def _on_loads(campaign: Campaign) -> list[Remark]:
-    """Return remarks about the levels and directions of the load."""
+    """Return remarks about the magnitudes and directions of the load."""
     loads = campaign.loads
     if not loads.any():
         text = (

@@ -26,11 +26,11 @@ _NOT_COMPARED = tuple(name for name, effect in LIBRARY.items() if effect.finite)
 
 @dataclass(frozen=True, eq=False)
 class DesignSignatures:
-    """Changes of the readings caused by plausible effects, divided by sigma.
+    """Changes of the readings due to plausible effects, divided by sigma.
 
     Attributes:
-        columns: mapping from each effect to the changes (N, k) caused by its unknowns.
-        nuisance: (N, p) changes caused by an unknown pose of the measuring device.
+        columns: mapping from each effect to the changes (N, k) due to its k unknowns.
+        nuisance: (N, p) changes due to an unknown pose of the measuring device.
         untestable: mapping from each effect that cannot be tested to the reason.
         unregistered: reason why the pose of the device cannot be estimated, otherwise
             empty.
@@ -51,7 +51,7 @@ def design_signatures(
     the device is therefore estimated first.  If this is impossible, base axes are used.
 
     Args:
-        campaign: campaign of N measured cells.
+        campaign: campaign with N readings.
         progress: function called with the number of finished effects and the total
             number.
     """
@@ -97,16 +97,16 @@ def design_signatures(
 def changes_between_repeats(
     campaign: Campaign, signatures: DesignSignatures
 ) -> dict[str, NDArray]:
-    """Return the changes that can occur between repeats.
+    """Return the changes that can occur between repeated measurements.
 
     Args:
-        campaign: campaign of N measured cells.
+        campaign: campaign with N readings.
         signatures: signatures of the library effects for the campaign.
 
     Returns:
-        Mapping from the name of each change to its columns.  The changes are those of
-        :func:`forcefit.validation.inspection.repeats.slow_changes`, thermal expansion
-        and friction.
+        Mapping from the name of each change to its design matrix.  The changes are
+        those of :func:`forcefit.validation.inspection.repeats.slow_changes`, thermal
+        expansion and friction.
     """
     slow = slow_changes(campaign)
     acts = {"temperature": "thermal_expansion", "approach": "friction_hysteresis"}
@@ -119,7 +119,7 @@ def changes_between_repeats(
 def _one_each(every: list[Hypothesis]) -> dict[str, Hypothesis]:
     """Return one hypothesis for each effect.
 
-    Among the hypotheses with the most parameters, the middle one is selected.
+    If several hypotheses have the most parameters, the middle one of these is selected.
     """
     hypotheses: dict[str, Hypothesis] = {}
     for name in dict.fromkeys(h.effect for h in every):

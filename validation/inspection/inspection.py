@@ -46,7 +46,7 @@ class Inspection:
         noise: noise computed from the repeats, None if no row was measured twice.
         signatures: signatures of the library effects.
         separability: comparison of the signatures.
-        remarks: remarks about the design, those about lost information first.
+        remarks: remarks about the design, most serious first.
         open: (R,) mask of rows in which the pose is undetermined because of clearances.
     """
 

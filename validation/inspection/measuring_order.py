@@ -1,8 +1,8 @@
 """Determine the order in which repeats were measured.
 
-Repeats may be spread over the session or measured consecutively.  If the machine drifts
-slowly, consecutive repeats do not contain the drift.  Their scatter then underestimates
-the noise of the session.
+Repeated measurements may be spread over the session or made consecutively. If the
+machine drifts slowly, consecutive measurements do not contain the drift. Their scatter
+then underestimates the variation in the session.
 """
 
 from dataclasses import dataclass
@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from forcefit.validation.campaign.campaign import Campaign
 
-_FEW, _MOST = 0.2, 0.8  # fractions of consecutive repeats that separate the orders
+# Limits on the fraction of consecutive repeats for the order "mixed".
+_FEW, _MOST = 0.2, 0.8
 # Smallest time span of interleaved repeats, as a fraction of the session.
 _SHORT = 0.1
 
@@ -22,10 +23,12 @@ class Revisits:
     """Measuring order of rows that were measured more than once.
 
     Attributes:
-        sets: number of sets.  A set contains all rows of one kind, at least two.
+        sets: number of sets. A set contains all rows with the same conditions, at least
+            two.
         rows: number of rows in these sets.
         others: number of rows outside these sets.
-        adjacent: fraction of repeats that directly follow a row of the same set.
+        adjacent: fraction of the repeated rows that directly follow a row of the same
+            set.
         span: median time from the first to the last row of a set, as a fraction of the
             duration of the campaign.
     """
@@ -59,7 +62,8 @@ def revisits(campaign: Campaign, kinds: NDArray) -> Revisits:
 
     Args:
         campaign: campaign of R rows, ordered by ``cov.time`` if it is recorded.
-        kinds: (R,) index of the kind of each row, such as ``campaign.repeat``.
+        kinds: (R,) labels, which are equal for repeated rows, such as
+            ``campaign.repeat``.
     """
     clock = session_clock(campaign)
     # All points of one measurement are treated as one row.

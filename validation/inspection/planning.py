@@ -5,11 +5,11 @@ An exchange algorithm selects rows from a set of candidate rows to maximise
     sum over e, f of ln(1 + l_ef),
     l_ef = tr(S_ee - S_ef (S_ff + I)^-1 S_fe) / k_e.
 
-Here l_ef is the mean non-centrality of effect e with k_e unknowns if effect f is fitted
-instead.  This is the criterion of Atkinson and Fedorov, averaged over a normal prior.
-The matrices S contain inner products of signatures.  In each step, rows with a small
-derivative of the criterion with respect to their weight are exchanged for rows with a
-large derivative.
+Here l_ef is the mean non-centrality if effect e with k_e unknowns is true and effect f
+is fitted. This is the criterion of Atkinson and Fedorov, averaged over a normal prior
+of the unknowns. The matrices S contain inner products of the changes of the readings
+due to the effects.  In each step, rows with a small derivative of the criterion with
+respect to their weight are exchanged for rows with a large derivative.
 
 Sources:
     Atkinson, Fedorov (1975), The design of experiments for discriminating between two
@@ -40,10 +40,10 @@ from forcefit.validation.synthetic.design import (
 from forcefit.validation.synthetic.generator import Synthetic
 
 _POOL = 600  # smallest number of candidate rows
-# Number of rows to remove and of rows to add that are tried in each step.
+# Number of rows that are tried for removal, and for addition, in each step.
 _TRIED = 4
 _BETTER = 1e-3  # smallest increase of the criterion for an exchange of rows
-_AVERAGE = 20  # number of random plans with which the plan is compared
+_AVERAGE = 20  # number of random plans for comparison with the chosen plan
 _PACE = 60.0  # [s] assumed time to measure one row
 _SWING = 2400.0  # [s] assumed period of temperature changes
 _FEWEST = 8  # smallest number of rows of a plan
@@ -59,8 +59,9 @@ class Planned:
         design: varied quantities and their ranges.
         sigma: [rad, m] noise of the measuring device.
         effects: names of the compared effects.
-        apart: (e, e) [-] mean non-centrality of effect i if effect j is fitted instead,
-            in element [i, j]. Each effect is scaled to an rms change of one sigma.
+        apart: (e, e) [-] mean non-centrality if effect i is true and effect j is
+            fitted, in element [i, j]. Each effect is scaled to an rms change of one
+            sigma.
         random: (e, e) mean of ``apart`` over random plans of the same size.
     """
 
@@ -182,7 +183,7 @@ def rows_as_campaign(
 
 
 def _alike(columns: NDArray) -> NDArray:
-    """Scale the columns of an effect to an rms of one sigma."""
+    """Scale the changes of the readings due to an effect to an rms of one sigma."""
     size = np.sqrt(np.mean(np.sum(columns**2, axis=1)))
     return columns / size
 
@@ -206,7 +207,7 @@ class _Criterion:
         self._X = np.hstack(blocks).reshape(rows, -1, begin[-1])
 
     def apart(self, chosen: NDArray) -> NDArray:
-        """Return the mean non-centrality (e, e) of each effect if another is fitted."""
+        """Return the mean non-centrality (e, e) for true and fitted effects."""
         return self._value(chosen)[0]
 
     def _value(self, chosen: NDArray) -> tuple[NDArray, NDArray]:
@@ -252,7 +253,7 @@ class _Criterion:
 
 
 def _told(apart: NDArray) -> float:
-    """Return the criterion for given non-centralities."""
+    """Return the design criterion for given non-centralities."""
     return float(np.nansum(np.log1p(apart)))
 
 

@@ -1,14 +1,14 @@
 """Estimate the noise of machine and measuring device from repeated measurements.
 
-Rows with the same configuration and load form a set.  Deviations from the mean of a set
-contain noise and slow changes.  Changes with time, temperature and side of approach are
-fitted to all sets together and subtracted.
+Rows with the same configuration and load form a set. Deviations from the mean of a set
+contain noise and slow changes. The slow changes with time, temperature and direction of
+approach are fitted to all sets together and subtracted.
 
 ======  ============  ======  ========================================================
 symbol  code          shape   meaning
 ======  ============  ======  ========================================================
-z       ``whitened``  (N,)    readings / declared sigma, measured cells by row
-B       ``slow``      (N, p)  columns of slow changes / sigma
+z       ``whitened``  (N,)    readings / declared sigma, row by row
+B       ``slow``      (N, p)  changes of the readings per coefficient / sigma
 x                     (p,)    coefficients of the slow changes
 e       ``rest``      (N,)    z minus the mean of the set and minus the fitted B x
 h       ``leverage``  (N,)    weight of a reading in its fitted value
@@ -16,8 +16,8 @@ h       ``leverage``  (N,)    weight of a reading in its fitted value
 
 Sources:
     Cook, Weisberg (1982), Residuals and influence in regression.  The deleted residual
-    e / (s sqrt(1 - h)), with s computed without the cell, has Student's t distribution.
-    The largest of N residuals is tested with Bonferroni's bound.
+    e / (s sqrt(1 - h)), with s computed without the tested reading, has Student's t
+    distribution. The largest of N residuals is tested with Bonferroni's bound.
 """
 
 from collections.abc import Iterable, Mapping
@@ -32,7 +32,7 @@ from forcefit.validation.campaign.campaign import READING, Campaign
 from forcefit.validation.diagnosis.separability import orthonormal_basis
 from forcefit.validation.inspection.measuring_order import session_clock
 
-_LEVEL = 0.01  # probability of a false suspect in a campaign without blunders
+_LEVEL = 0.01  # probability of at least one suspect in a campaign without blunders
 MOST = 20  # largest number of suspects
 
 
@@ -41,7 +41,7 @@ class Suspect:
     """A reading that deviates too much from its repeats.
 
     Attributes:
-        rows: row of the reading.  In a set of two rows, both are suspect.
+        rows: row of the reading. If the set contains two rows, both rows are listed.
         component: component of the reading.
         size: [-] deleted residual (Student's t).
         chance: probability that noise alone causes such a large residual in the
@@ -63,7 +63,7 @@ class RepeatNoise:
             components.
         degrees: degrees of freedom of the ratio.
         interval: confidence interval of the ratio.
-        plain: the ratio before slow changes are subtracted.
+        plain: the ratio without subtraction of slow changes.
         taken_out: mapping from each slow change to the probability that noise alone
             causes such a large change.
         component: (6,) [rad, m] standard deviations, NaN for components without
@@ -93,9 +93,9 @@ def repeat_noise(
     Slow changes are subtracted if enough degrees of freedom remain.
 
     Args:
-        campaign: campaign of N measured cells.
-        slow: mapping from the name of each slow change to its columns (N, p), divided
-            by sigma.  None for the result of :func:`slow_changes`.
+        campaign: campaign with N readings.
+        slow: mapping from the name of each slow change to its design matrix (N, p),
+            divided by sigma.  None for the result of :func:`slow_changes`.
     """
     slow = slow_changes(campaign) if slow is None else slow
     suspects: list[Suspect] = []
@@ -113,16 +113,16 @@ def repeat_noise(
 
 
 def slow_changes(campaign: Campaign) -> dict[str, NDArray]:
-    """Return the columns of slow changes that do not depend on the configuration.
+    """Return design matrices of slow changes that do not depend on the configuration.
 
     Args:
-        campaign: campaign of N measured cells.
+        campaign: campaign with N readings.
 
     Returns:
-        Mapping from the name of each change to its columns (N, p), divided by sigma.
-        Changes with time are an exponential and a cubic polynomial.  Changes with
-        temperature and side of approach are linear.  If no time was recorded, rows are
-        assumed to be equally spaced in time.
+        Mapping from the name of each change to its design matrix (N, p), divided by
+        sigma. Changes with time are an exponential and a cubic polynomial.  Changes
+        with temperature and direction of approach are linear.  If no time was recorded,
+        rows are assumed to be equally spaced in time.
     """
     clock = 2 * session_clock(campaign) - 1
     shapes = {
@@ -139,10 +139,10 @@ def slow_changes(campaign: Campaign) -> dict[str, NDArray]:
 
 
 def for_each_component(campaign: Campaign, shapes: NDArray) -> NDArray:
-    """Return columns (N, 6 p), divided by sigma, with a change of each component.
+    """Return a design matrix (N, 6 p) / sigma with separate changes per component.
 
     Args:
-        campaign: campaign of R rows and N measured cells.
+        campaign: campaign of R rows with N readings.
         shapes: (R, p) value of each change in each row.
     """
     cells = campaign.cells
@@ -152,13 +152,13 @@ def for_each_component(campaign: Campaign, shapes: NDArray) -> NDArray:
 
 
 def _sets(campaign: Campaign) -> NDArray:
-    """Return the index (N,) of the set of repeats of each measured cell."""
+    """Return the index (N,) of the set of repeats to which each reading belongs."""
     row, component = np.nonzero(campaign.cells)
     return campaign.repeat[row] * 6 + component
 
 
 def _repeated_cells(campaign: Campaign, out: set[int]) -> NDArray:
-    """Return a mask (N,) of repeated cells, without the rows in ``out``."""
+    """Return a mask (N,) of repeated readings, without the rows in ``out``."""
     row, _ = np.nonzero(campaign.cells)
     kept = ~np.isin(row, list(out))
     sets = _sets(campaign)
@@ -192,7 +192,7 @@ class _RepeatFit:
         self.rss = float(self.rest @ self.rest)
 
     def _centred(self, columns: NDArray) -> NDArray:
-        """Subtract the mean of every set from the columns."""
+        """Subtract the mean over each set of repeats from each column."""
         sums = np.zeros((len(self.count), columns.shape[1]))
         np.add.at(sums, self.set, columns)
         return columns - (sums / self.count[:, None])[self.set]
@@ -254,7 +254,7 @@ class _RepeatFit:
 
 
 def _basis(blocks: Iterable[NDArray], rows: int) -> NDArray:
-    """Return an orthonormal basis (rows, rank) of the columns of all blocks."""
+    """Return an orthonormal basis (rows, rank) of the columns of all matrices."""
     return orthonormal_basis(np.column_stack([np.zeros((rows, 0)), *blocks]))
 
 

@@ -183,7 +183,7 @@ def _suspects(inspection: Inspection) -> str:
 
 
 def _conditions(inspection: Inspection) -> str:
-    """Tabulate the levels and ranges of loads and covariates."""
+    """Tabulate the number of values and the range of loads and covariates."""
     loads = load_counts(inspection.campaign)
     rows: Cells = [
         [kind, str(loads["levels"]), *(Value(float(v), unit) for v in loads[kind])]

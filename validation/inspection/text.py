@@ -86,7 +86,7 @@ def _reading_lines(c: Campaign) -> list[str]:
 
 
 def _load_lines(c: Campaign) -> list[str]:
-    """Return one line about the levels and magnitudes of the load."""
+    """Return one line about the number of loads and their magnitudes."""
     t = load_counts(c)
     return [
         f"load: {t['levels']} levels, up to {t['force'][1]:.4g} N and "

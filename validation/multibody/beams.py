@@ -36,9 +36,9 @@ def beam_axes(x: NDArray, up: Sequence[float] | None) -> NDArray:
 def element_stiffness(link: BeamLink, step: float) -> NDArray:
     """Return EA, GA_y, GA_z, GJ, EI_y and EI_z of beam elements of a given length.
 
-    An element of constant strain lacks the bending deflection step^3 / 12 EI.  The
-    shear stiffness is reduced to include it.  The tip deflection of a cantilever is
-    then exact for any number of elements.
+    Beam elements with constant strain neglect the bending deflection step^3 / 12 EI.
+    The shear stiffness is reduced to compensate for this.  The tip deflection of a
+    cantilever is then exact for any number of elements.
 
     Args:
         link: the beam.
@@ -50,7 +50,7 @@ def element_stiffness(link: BeamLink, step: float) -> NDArray:
     section = declared_section(link.section, link.poisson)
     E, G = link.young, link.young / (2 * (1 + link.poisson))
     bending = E * np.array([section.I_y, section.I_z])
-    shear = step**2 / (12 * bending[::-1])  # a force along y causes bending about z
+    shear = step**2 / (12 * bending[::-1])  # a force along y bends the beam about z
     if link.theory == "timoshenko":
         shares = np.array([section.shear_y, section.shear_z])
         shear = shear + 1 / (G * section.area * shares)

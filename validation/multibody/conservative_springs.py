@@ -4,7 +4,7 @@ The energy of a spring is s.K s / 2, where s is the logarithm of the motion betw
 ends.  Exudyn applies the wrench K s half-way between the ends.  This wrench equals the
 gradient of the energy only to first order in the deformation.  This module computes the
 exact gradient with the inverse of the derivative of the exponential map.  A screw is a
-dual vector, so the translational part of this inverse is the derivative of its
+dual vector. The translational part of this inverse is therefore the derivative of the
 rotational part along the translation.
 
 Vectors are tuples for speed, because Exudyn calls these functions about 100 000 times.
@@ -21,7 +21,7 @@ _Vector = tuple[float, float, float]
 _BERNOULLI = (1 / 6, -1 / 30, 1 / 42, -1 / 30, 5 / 66, -691 / 2730, 7 / 6,
               -3617 / 510, 43867 / 798, -174611 / 330)  # fmt: skip
 # Coefficients of the power series of (1 - t/2 cot(t/2)) / t^2 in t^2.  For rotations
-# below one radian, the error is below (1 / 2 pi)^22.
+# below one radian, the relative error is below (1 / 2 pi)^22.
 _SERIES = tuple(
     abs(B) / math.factorial(2 * k) for k, B in enumerate(_BERNOULLI, 1)
 )  # fmt: skip
@@ -37,8 +37,9 @@ def middle_wrench(K: Sequence[Sequence[float]], screw: Sequence[float]) -> list[
 
     Returns:
         Wrench in the mean axes of both ends, (6,) [N m, N], the gradient of screw.K
-        screw / 2.  Its point is the near end plus half of the screw's translation
-        along these axes.  At the far end, :func:`far_couple` must be added.
+        screw / 2.  The point of application is the near end plus half of the screw's
+        translation along these axes. At the far end, the couple :func:`far_couple` must
+        be added.
     """
     a, b, c, d, e, g = screw
     w, v = (a, b, c), (d, e, g)
@@ -60,7 +61,7 @@ def middle_wrench(K: Sequence[Sequence[float]], screw: Sequence[float]) -> list[
     by_shift = _cross(v, f)
     mixed = _sum(_cross(w, by_shift), 1.0, _cross(v, across_f))
     along = a * d + b * e + c * g
-    lever = _sum(by_shift, 2 * factor, mixed)  # twice the contribution of the force
+    lever = _sum(by_shift, 2 * factor, mixed)  # twice the moment due to the force
     lever = _turned_back(w, turn, _sum(lever, 2 * slope * along, twice_f))
     moment = _sum(_sum(m, short, _cross(w, across_m)), 0.5, lever)
     return [*_sum(moment, -0.5, _cross(v, force)), *force]
@@ -69,10 +70,10 @@ def middle_wrench(K: Sequence[Sequence[float]], screw: Sequence[float]) -> list[
 def far_couple(screw: Sequence[float], force: Sequence[float]) -> list[float]:
     """Return the couple that Exudyn omits at the far end of a spring.
 
-    For each end, Exudyn applies the wrench at a distance of half of the screw's
-    translation.  If the ends rotate by t relative to each other, these two points
+    Exudyn applies the wrench at half of the screw's translation from each end. If the
+    ends rotate by t relative to each other, the points of application at both ends
     differ, because the chord of an arc is shorter than the arc by the factor sin(t/2) /
-    (t/2).  This difference causes a couple.
+    (t/2). This difference causes a couple.
 
     Args:
         screw: (6,) [rad, m] logarithm of the motion from the near end to the far end.
@@ -86,7 +87,8 @@ def far_couple(screw: Sequence[float], force: Sequence[float]) -> list[float]:
     turn = math.hypot(*w)
     if not turn:
         return [0.0] * 3
-    # For small x, sin x / x - 1 is computed by its series to avoid cancellation.
+    # The difference sin(t/2) / (t/2) - 1 is computed by its series in x = (t/2)^2 to
+    # avoid cancellation.
     x = turn * turn / 4
     short = -x / 6 * (1 - x / 20 * (1 - x / 42 * (1 - x / 72 * (1 - x / 110))))
     along = sum(p * q for p, q in zip(w, v, strict=True)) / (turn * turn)

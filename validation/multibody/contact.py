@@ -6,9 +6,9 @@ ball.  At distance r from the middle of a cone of size c,
 
     x = (r^2 - c^2) / 2c,   P = (x + sqrt(x^2 + w^2)) / 2,   energy = k P^2 / 2,
 
-where k is the stiffness of the contact.  The force k P P' r / c is smooth.  It is
-nearly zero inside the cone, and that of a stiff spring outside.  The width w of the
-smoothing, relative to c, is reduced from 3 to 3e-4 during the solution.
+where k is the stiffness of the contact.  The contact force k P P' r / c is smooth. It
+is nearly zero inside the cone, and equal to the force of a stiff spring outside.  The
+width w of the smoothing, relative to c, is reduced from 3 to 3e-4 during the solution.
 
 A pin in two bushes has contacts at z = +h and z = -h.  At each contact, a disc bounds
 the position of the pin's axis, (TX + h RY, TY - h RX).  The two discs replace the
@@ -23,7 +23,7 @@ from forcefit.assembly.model.robot import Clearance, Frame
 
 TURN_STIFFNESS = 1e9  # [N m/rad] rotational stiffness of the contact
 SHIFT_STIFFNESS = 1e12  # [N/m] translational stiffness of the contact
-# [-] Initial and final width of the smoothing, relative to the size of the cone.
+# [-] Initial and final smoothing width, relative to the size of the cone.
 WIDE, NARROW = 3.0, 3e-4
 _UNBOUNDED = 0.5  # [rad, m] bound above which a motion is modelled as unbounded
 _CONES = (
@@ -61,7 +61,7 @@ class ClearanceCone:
 
 @dataclass(frozen=True)
 class JointClearance:
-    """Motions of a joint that do not deform its springs.
+    """Motions of a joint without deformation of its springs.
 
     Attributes:
         cones: bounds on the motions.
@@ -72,7 +72,7 @@ class JointClearance:
     free: tuple[int, ...]
 
     def softened(self, factor: float) -> "JointClearance":
-        """Multiply the contact stiffness of the clearance by a factor."""
+        """Return the clearance with the contact stiffness multiplied by a factor."""
         cones = (replace(c, stiffness=factor * c.stiffness) for c in self.cones)
         return replace(self, cones=tuple(cones))
 
@@ -87,17 +87,17 @@ class JointClearance:
 def joint_clearance(
     frame: Frame, scale: float = 1.0, bushes: bool = False
 ) -> JointClearance:
-    """Return the clearances of a frame's joint and its free motion.
+    """Return the bounds and the free motions of a frame's joint.
 
     Args:
         frame: frame of a robot.
-        scale: factor on the clearances.
+        scale: factor by which clearances are multiplied.
         bushes: whether a joint with radial clearance and tilt is modelled as a pin in
             two bushes.  Each bush has the radial clearance, and the distance between
             the bushes is computed from the tilt.
 
     Returns:
-        The clearance.  Without clearance and free motion, every component is locked.
+        The bounds and free motions. If there are none, every component is locked.
     """
     given = frame.clearance or Clearance()
     moves = frame.passive and not frame.compliant
@@ -150,7 +150,7 @@ def cone_energy(cone: ClearanceCone, screw: Sequence[float], width: float) -> fl
 def _overlap(
     cone: ClearanceCone, offsets: list[float], width: float
 ) -> tuple[float, float]:
-    """Return P and sqrt(x^2 + w^2), which the module's docstring defines."""
+    """Return P and sqrt(x^2 + w^2) of the contact energy k P^2 / 2."""
     squared = sum(u * u for u in offsets)
     x = (squared - cone.size**2) / (2 * cone.size)
     w = width * cone.size

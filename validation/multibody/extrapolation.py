@@ -1,9 +1,10 @@
 """Extrapolate central differences to zero step and estimate the uncertainty.
 
 The truncation error of a central difference is proportional to the square of the step,
-and its round-off error to the inverse of the step.  Each pair of consecutive steps is
-extrapolated to zero step.  The result is the extrapolated value with the smallest
-difference from the preceding one.  This difference is the estimated uncertainty.
+and the round-off error is proportional to the inverse of the step.  Each pair of
+consecutive steps is extrapolated to zero step.  The result is the extrapolated value
+with the smallest difference from the preceding one.  This difference is the estimated
+uncertainty.
 
 Sources:
     Ridders (1982), Accurate computation of F'(x) and F'(x) F''(x).
@@ -26,7 +27,8 @@ def without_squares(
         differences: central differences of equal shape, one for each step.
 
     Returns:
-        k - 1 arrays without the error term proportional to the square of the step.
+        k - 1 arrays, in which the error proportional to the square of the step is
+        eliminated.
     """
     squares = [(one / two) ** 2 for one, two in pairwise(steps)]
     pairs = zip(squares, pairwise(differences), strict=True)
@@ -36,11 +38,11 @@ def without_squares(
 def steadiest(
     found: Sequence[NDArray], size: Callable[[NDArray], float]
 ) -> tuple[NDArray, NDArray]:
-    """Return the array that differs least from the preceding array.
+    """Return the array with the smallest difference from the preceding array.
 
     Args:
         found: at least two arrays of the same shape.
-        size: function that returns the norm of a change.
+        size: function that returns the norm of a difference.
 
     Returns:
         The array, and its absolute difference from the preceding array.

@@ -27,7 +27,7 @@ from forcefit.validation.multibody.exudyn_parts import Closure, Contact, Elastic
 from forcefit.validation.multibody.motion import inverse, shifted
 
 _SWAP = np.r_[3:6, 0:3]  # swaps [R T] and Exudyn's order [T R]
-IDLE_STIFFNESS = 1e-6  # [N m/rad, N/m] residual stiffness of free motions
+IDLE_STIFFNESS = 1e-6  # [N m/rad, N/m] final stiffness of free motions
 # [N m/rad, N/m] Stiffness of free motions while the loops are closed.
 HOLDING_STIFFNESS = 1e-2
 # [N/m] Stiffness of the springs that centre joints within their clearances.  The
@@ -38,15 +38,16 @@ _CENTRING = 1e3
 
 @dataclass(frozen=True)
 class Regularisation:
-    """Springs and tolerances of the simulation that are not data of a robot.
+    """Auxiliary springs and tolerances of the simulation.
 
     Attributes:
         closing: [N m/rad, N/m] stiffness of the connectors that close the loops.
-            ``inf`` denotes rigid joints, for a robot with closed loops from the start.
-        idle: [N m/rad, N/m] residual stiffness of free motions.
+            ``inf`` denotes rigid joints. It requires a robot whose loops are closed
+            from the start.
+        idle: [N m/rad, N/m] final stiffness of the weak springs on free motions.
         narrow: [-] final smoothing width of contacts, relative to their clearances.
-        tolerance: [m, rad, -] increment at which Newton's iteration ends.
-        contact: factor on the stiffness of contacts.
+        tolerance: [m, rad, -] size of the increment at which Newton's iteration ends.
+        contact: factor by which the stiffness of contacts is multiplied.
         conservative: whether spring wrenches are energy gradients instead of Exudyn's
             approximation.
     """
@@ -65,12 +66,13 @@ class Model:
     Attributes:
         robot: name of the robot, for messages.
         regularisation: springs and tolerances of the simulation.
-        ground: Exudyn's number of the base.
+        ground: index of the base in Exudyn.
         width: [-] smoothing width of contacts, relative to their clearances.
         deadline: [s] value of ``time.monotonic`` after which the solver stops.
         callback_error: exception raised by a user function.  Exudyn does not report
             this exception.
-        idle: Exudyn's numbers of the springs on free motions, and their axes.
+        idle: indices of the springs on free motions in Exudyn, and the axes of the
+            springs.
         recorded: body frames that are recorded while the loops are closed.
         history: poses of these frames at each step, (frames, 4, 4) each.
     """
@@ -118,7 +120,7 @@ class Model:
         return int(self.mbs.AddMarker(marker))
 
     def add_spring(self, place: Place, K: NDArray) -> Elastic:
-        """Add a body that a spring connects to a body frame; ``inf`` locks an axis."""
+        """Add a body on a spring at a body frame. A stiffness ``inf`` locks an axis."""
         far = self.add_body(place.built)
         markers = [self.add_marker(place), self.add_marker(far)]
         soft = np.isfinite(np.diag(K))
@@ -128,7 +130,8 @@ class Model:
             self.mbs.AddObject(joint)
         K = np.where(np.outer(soft, soft), K, 0.0)
         spring = self._connect(markers, K)
-        # With a single elastic axis, Exudyn's wrench is already the gradient.
+        # For a spring with a single elastic axis, Exudyn's wrench equals the energy
+        # gradient.
         if self.regularisation.conservative and soft.sum() > 1:
             self._follow_energy(spring, markers[1], K)
         return Elastic(place, far, (spring,))
@@ -176,9 +179,9 @@ class Model:
         """Set the wrench of a connector to a given function.
 
         Args:
-            connector: Exudyn's number of the connector.
-            law: function from the screw between the ends to the resisting wrench (6,)
-                [R T] half-way between them.
+            connector: index of the connector in Exudyn.
+            law: function that returns the resisting wrench (6,) [R T], half-way between
+                the ends, for the screw between the ends.
         """
 
         def wrench(
@@ -210,7 +213,7 @@ class Model:
                 [kg m].  Only vibrations require them.
 
         Returns:
-            Exudyn's numbers of the elements, and the body frames at the nodes.
+            Indices of the elements in Exudyn, and the body frames at the nodes.
         """
         section = self.exu.BeamSection()
         section.stiffnessMatrix = K
@@ -254,7 +257,7 @@ class Model:
         self.add_force(place, wrench[3:])
 
     def add_following_load(self, place: Place, wrench: NDArray) -> None:
-        """Add a wrench that rotates with its body, at and in a body frame."""
+        """Add a wrench that rotates with its body, in the axes of a body frame."""
         marker = self.add_marker(place)
         for load, vector in (
             (self.item.LoadTorqueVector, wrench[:3]),
@@ -293,8 +296,8 @@ class Model:
             lacking[:] = far_couple(screw, wrench[3:])
             return wrench
 
-        # Exudyn evaluates connectors before loads.  It differentiates loads with
-        # respect to the far end alone, so the couple must be constant there.
+        # Exudyn evaluates connectors before loads. Loads are differentiated only with
+        # respect to the far end. The couple must be constant in these derivatives.
         load = self.item.LoadTorqueVector(
             markerNumber=far, bodyFixed=True,
             loadVectorUserFunction=lambda mbs, t, load: lacking,

@@ -1,7 +1,7 @@
 """Define the body frames and elements of a simulation model.
 
-Numbers of objects are those of Exudyn.  Screws and wrenches are ordered [R T] as in the
-whole library.
+Objects are identified by their indices in Exudyn.  Screws and wrenches are ordered
+[R T], as in the whole library.
 """
 
 from dataclasses import dataclass, replace
@@ -35,7 +35,7 @@ class Place:
     """A coordinate frame fixed to a body of the model.
 
     Attributes:
-        body: number of the body in Exudyn.
+        body: index of the body in Exudyn.
         start: (4, 4) initial pose of the body in the base frame.
         local: (4, 4) pose of this frame in the body's frame.
     """
@@ -61,7 +61,7 @@ class Elastic:
     Attributes:
         near: body frame on the inner body.
         far: body frame on the outer body.
-        parts: Exudyn's numbers of a connector, or of the elements of a beam.
+        parts: index of the connector, or indices of the beam elements, in Exudyn.
         beam: whether the elastic body is a beam.
         nodes: body frames along a beam from base to tip, at equal distances.
         modes: interface modes of a meshed body; None for other elastic bodies.
@@ -112,10 +112,10 @@ class Modes:
     """Interface modes of a meshed body, relative to its base.
 
     Attributes:
-        node: Exudyn's number of the node with the mode coordinates.
+        node: index of the node with the mode coordinates in Exudyn.
         stiffness: (6, 6) modal stiffness.
-        wrench: (6, 6) matrix from mode coordinates to the wrench at the tip, frame
-            axes.
+        wrench: (6, 6) matrix that converts mode coordinates to the wrench at the tip,
+            in frame axes.
     """
 
     node: int
@@ -130,9 +130,9 @@ class Closure:
     Attributes:
         first: body frame on the first chain.
         second: body frame on the second chain.
-        marker: Exudyn's number of the connector's end on the first chain.  This end is
-            moved to close the loop.
-        connector: Exudyn's number of the connector.
+        marker: index in Exudyn of the end of the connector on the first chain. This end
+            is moved to close the loop.
+        connector: index of the connector in Exudyn.
         closed: (4, 4) nominal pose of the second body frame relative to the first body
             frame in the closed loop.
     """

@@ -25,7 +25,7 @@ def pose(model: Model, place: Place) -> NDArray:
 
 
 def closure_error(model: Model, closure: Closure) -> NDArray:
-    """Return the closure error: the screw from closed to current position, (6,)."""
+    """Return the closure error, the screw from closed to current position, (6,)."""
     first = pose(model, closure.first) @ closure.closed
     return logarithm(inverse(first) @ pose(model, closure.second))
 
@@ -60,7 +60,7 @@ def contact_energy(model: Model, contact: Contact) -> float:
 
 
 def wrench(model: Model, part: Elastic) -> NDArray:
-    """Return the wrench on the outer body, at and in the far frame, (6,) [N m, N]."""
+    """Return the wrench on the outer body at the far frame, in its axes, (6,)."""
     if part.modes is not None:
         near, far = (pose(model, p)[:3, :3] for p in (part.near, part.far))
         halves = part.modes.wrench @ _mode_coordinates(model, part.modes)
@@ -87,7 +87,7 @@ def closure_wrench(model: Model, closure: Closure, point: NDArray) -> NDArray:
 
 
 def connector_wrench(model: Model, number: int) -> NDArray:
-    """Return K times the screw of a connector's outer end, (6,) [N m, N]."""
+    """Return K times the displacement of a connector's outer end, (6,) [N m, N]."""
     kind, read = model.exu.OutputVariableType, model.mbs.GetObjectOutput
     return np.concatenate([
         read(number, kind.TorqueLocal),

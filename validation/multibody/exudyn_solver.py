@@ -1,11 +1,11 @@
-"""Solve an Exudyn model statically, in stages from open robot to equilibrium.
+"""Compute the static equilibrium of an Exudyn model in several stages.
 
 First, the loops are closed while the loads increase.  Then contacts are stiffened and
-free motions are released.  Finally, the target of each closure is corrected by its
-closure error until all closure errors vanish.
+free motions are released.  Finally, the target position of each connector that closes a
+loop is corrected by the closure error, until all closure errors vanish.
 
-Exudyn stops between two steps when its processor time reaches the time limit, and the
-user functions check the clock.  Exceptions in user functions are raised again.
+Exudyn stops between two steps when the time limit is reached. The user functions also
+check the time.  Exceptions in user functions are raised again.
 """
 
 import time
@@ -34,13 +34,14 @@ _CLOSED = 1e-12  # [rad, m] largest accepted closure error
 _LOAD_STEPS = 4
 # Number of steps in which the springs on free motions are weakened.
 _RELEASING_STEPS = 4
-# Number of steps in which the smoothing of contacts is reduced by equal factors.
+# Number of steps in which the smoothing width of contacts is reduced.
 _NARROWING_STEPS = 30
 _CLOSING_STEPS = 30
-# Largest number of iterations that relax the weak springs.
+# Largest number of iterations in which the weak springs are made stress-free.
 _RELAXING_STEPS = 4
 _RESTS = 1e-10  # [rad, m] change of free motions at which the iteration ends
-NO_EQUILIBRIUM = "no equilibrium"  # first words of the status of a failed solution
+# The status of a failed solution begins with this text.
+NO_EQUILIBRIUM = "no equilibrium"
 _STAGES = (
     "closures are closed and loads increase",
     "contacts stiffen and free motions are released",
@@ -51,7 +52,7 @@ _STAGES = (
 def solve(
     model: Model, closures: list[Closure], narrow: bool = False, steps: int = 0
 ) -> NDArray:
-    """Close the loops in steps, then remove the remaining closure errors.
+    """Close the loops in steps, then eliminate the remaining closure errors.
 
     Args:
         model: complete model.  After the call, it is in equilibrium.
@@ -60,7 +61,7 @@ def solve(
         steps: smallest number of steps for closing the loops.
 
     Returns:
-        Shifts of the closure targets, which are an argument of :func:`close`.
+        Shifts of the target positions of the closures, an argument of :func:`close`.
 
     Raises:
         SimulationFailed: no equilibrium was found.
@@ -77,7 +78,7 @@ def solve(
 
 
 def close(model: Model, closures: list[Closure], shift: NDArray) -> None:
-    """Correct the targets of the closures until the closure errors vanish.
+    """Correct the target positions of the closures until the closure errors vanish.
 
     Args:
         model: model in equilibrium, with remaining closure errors.
@@ -104,7 +105,7 @@ def close(model: Model, closures: list[Closure], shift: NDArray) -> None:
 def relax(
     model: Model, closures: list[Closure], idle: Mapping[str, Elastic], shift: NDArray
 ) -> None:
-    """Relax the weak springs on free motions in the present state of the model.
+    """Make the weak springs on free motions stress-free in the current state.
 
     Otherwise, the forces of these springs would displace the equilibrium.
 
@@ -129,7 +130,7 @@ def relax(
 def _before_step(
     model: Model, closures: list[Closure], shift: NDArray
 ) -> Callable[[Any, float], bool]:
-    """Return a function that moves targets and stiffens contacts before each step."""
+    """Return a function that is called before each step of the solver."""
     opened = [
         logarithm(inverse(c.first.built @ c.closed) @ c.second.built) for c in closures
     ]
@@ -161,8 +162,9 @@ def equilibrate(model: Model, start: float, steps: int) -> None:
 
     Args:
         model: the assembled model.
-        start: stage, which is Exudyn's start time.  0: loops are closed and loads
-            increase.  1: contacts stiffen.  2: closure targets are corrected.
+        start: number of the stage, which is the start time in Exudyn. In stage 0, loops
+            are closed and loads increase. In stage 1, contacts are stiffened. In stage
+            2, the target positions of closures are corrected.
         steps: initial number of steps.  A step that fails is divided.
 
     Raises:
@@ -192,7 +194,7 @@ def raise_callback_error(model: Model, stage: str) -> None:
 
     Args:
         model: model to which the function belongs.
-        stage: present stage, for the message.
+        stage: number of the current stage, for the message.
 
     Raises:
         OutOfTime: the deadline of the model has passed.
@@ -218,12 +220,13 @@ def static_settings(model: Model, start: float, steps: int) -> Any:
     static.useLoadFactor = start == 0.0
     static.minimumStepSize = 1e-3
     newton = static.newton
-    # Weak springs make residuals small, so increments determine the convergence.
+    # Convergence is determined from the increments, because weak springs cause only
+    # small residuals.
     newton.residualMode = 1
     newton.absoluteTolerance = newton.relativeTolerance = model.regularisation.tolerance
     newton.maxIterations = 25
     newton.numericalDifferentiation.relativeEpsilon = (
-        1e-8  # for forces of user functions
+        1e-8  # step size for the derivatives of user functions
     )
     return settings
 

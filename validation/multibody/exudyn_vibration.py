@@ -1,9 +1,10 @@
 """Compute small vibrations of an Exudyn model about its equilibrium.
 
 Exudyn linearises the model by forward differences and projects it onto the motions that
-its joints allow.  Differences with two step sizes are combined so that the first-order
-error cancels.  Only bodies with a given mass or given moments of inertia contribute to
-the mass matrix.  Degrees of freedom without inertia are condensed statically.
+its joints allow.  Differences with two step sizes are combined such that their
+first-order errors cancel.  Only bodies with a given mass or given moments of inertia
+contribute to the mass matrix.  Degrees of freedom without inertia are condensed
+statically.
 """
 
 import numpy as np
@@ -13,8 +14,8 @@ from forcefit.validation.multibody.exudyn_model import Model
 from forcefit.validation.multibody.exudyn_parts import Place
 
 _SIX = (np.array([0, 1, 2, 1, 0, 0]), np.array([0, 1, 2, 2, 2, 1]))  # Exudyn's order
-_STEP = 1e-5  # [-] step of differences; 1e-4 to 1e-7 agree within 1e-8
-_NOTHING = 1e-12  # fraction of the largest inertia below which inertias are set to 0
+_STEP = 1e-5  # [-] step of the finite differences
+_NOTHING = 1e-12  # inertias below this fraction of the largest inertia are set to 0
 
 
 def set_masses(model: Model, bodies: list[tuple[Place, float, NDArray]]) -> None:

@@ -1,9 +1,8 @@
-"""Compute the platform compliance from the linearised simulation.
+"""Compute the platform compliance by linearising the simulation model.
 
-Exudyn's residual is differentiated at the equilibrium, with constant loads and constant
-reactions of joints and closures.  The derivatives are computed along motions that
-joints and closures allow.  These motions are modes of Exudyn's Jacobian.  The
-differences are extrapolated to zero step.
+The residual forces in Exudyn are differentiated at the equilibrium, with constant loads
+and constant reactions of joints and closures. The derivatives are computed for motions
+that joints and closures permit. The finite differences are extrapolated to zero step.
 
 Weak springs of stiffness k act on free motions so that the model can be solved.  Their
 effect is removed by adding k X (1 - k B)^-1 X' to the compliance (Woodbury identity).
@@ -35,21 +34,22 @@ from forcefit.validation.multibody.exudyn_solver import (
 from forcefit.validation.multibody.motion import turned
 from forcefit.validation.multibody.open_robot import OpenTree
 
-# Steps in Exudyn's coordinates.  The steps for contacts are smaller than the
-# penetration and the smoothing width, which are a few nm.
+# Steps of the finite differences. The steps for models with contacts are smaller than
+# the penetration and the smoothing width of a contact, which are a few nm.
 _STEPS, _CONTACT_STEPS = (2e-4, 1e-4, 5e-5), (1e-8, 3e-9, 1e-9, 3e-10)
 _GAP_STEP = 1e-5
 _RANK = 1e-7  # relative tolerance for the rank of the derivatives of closure errors
-# [-] Relative stiffness of a free motion below which only its weak spring resists it.
+# [-] If the relative stiffness of a free motion is below this value, only the weak
+# spring resists the motion.
 _ROLLS = 1e-4
-# Number of final Newton steps, which remove the effect of rounding errors of closures.
+# Number of final Newton steps, which reduce the rounding errors of closures.
 _POLISH = 2
 
 
 def linearised_compliance(
     model: Model, tree: OpenTree, platform: str
 ) -> tuple[NDArray, float, bool]:
-    """Return the compliance of a model at its present equilibrium.
+    """Return the compliance of a model at its current equilibrium.
 
     Args:
         model: model in equilibrium.
@@ -57,7 +57,7 @@ def linearised_compliance(
         platform: name of the platform's frame.
 
     Returns:
-        Compliance for small motions at the platform's present origin, base axes, (6, 6)
+        Compliance for small motions at the platform's current origin, base axes, (6, 6)
         [rad/(N m) .. m/N]; the largest uncertainty of its entries divided by sqrt(C_ii
         C_jj); and whether the equilibrium is stable.
 
@@ -86,8 +86,8 @@ _LAW = "springForceTorqueUserFunction"
 def _freeze(model: Model, closure: Closure) -> None:
     """Replace the connector of a closed loop by a constant wrench.
 
-    The connector acts half-way between the closed frame and its target, which differ by
-    the deformation of the connector.  The constant wrench acts at the closed frame.
+    The connector acts half-way between the closed frame and its target position. The
+    constant wrench acts at the closed frame.
     """
     wrench = connector_wrench(model, closure.connector)
     screw = wrench / model.regularisation.closing
@@ -101,7 +101,7 @@ def _freeze(model: Model, closure: Closure) -> None:
 def _compliance(
     model: Model, motion: Callable[[NDArray, NDArray, float], NDArray], tree: OpenTree
 ) -> tuple[NDArray, float, bool]:
-    """Return V Z (Z'KZ)^-1 Z'V' for the motions Z that joints and closures allow."""
+    """Return V Z (Z'KZ)^-1 Z'V' for the motions Z that joints and closures permit."""
     solver, settings = model.exu.MainSolverStatic(), static_settings(model, 2.0, 1)
     solver.InitializeSolver(model.mbs, settings)
     count = solver.GetODE2size()
@@ -148,7 +148,7 @@ def _compliance(
 
 
 def _is_stable(model: Model, K: NDArray, V: NDArray) -> bool:
-    """Return whether the equilibrium is stable within the uncertainty of K."""
+    """Return whether the equilibrium is stable, given the uncertainty of K."""
     # The computed stiffness of free motions is a rounding error of either sign, so a
     # small stiffness is added.
     K = K + 1e3 * model.regularisation.idle * V[6:].T @ V[6:]
@@ -185,7 +185,7 @@ def _solve(K: NDArray, right: NDArray) -> NDArray:
 def _motion(
     model: Model, tree: OpenTree, platform: str, q: NDArray, Z: NDArray, step: float
 ) -> NDArray:
-    """Return derivatives of closure errors, platform pose and free joints along Z."""
+    """Return the derivatives of closure errors, platform pose and free joints."""
     system, place = model.mbs.systemData, tree.before[platform]
 
     def read(q: NDArray) -> tuple[NDArray, NDArray, NDArray]:

@@ -19,7 +19,8 @@ from forcefit.validation.multibody.exudyn_reading import idle_motions, pose
 from forcefit.validation.multibody.exudyn_solver import close, equilibrate
 from forcefit.validation.multibody.open_robot import OpenTree
 
-# Largest motion of the platform [rad, m], ratio of consecutive loads, number of loads.
+# Largest motion of the platform [rad, m], ratio of consecutive loads, and number of
+# loads.
 _LARGEST, _RATIO, _SIZES = 4e-3, 5.0, 4
 
 
@@ -36,7 +37,7 @@ def stepped_compliance(
     model: Model, tree: OpenTree, platform: str, loads: tuple[int, int], shift: NDArray,
     sizes: NDArray,
 ) -> tuple[NDArray, float]:  # fmt: skip
-    """Return the compliance of a model at its present equilibrium by load steps.
+    """Return the compliance of a model at its current equilibrium by load steps.
 
     Args:
         model: model in equilibrium.
@@ -48,7 +49,7 @@ def stepped_compliance(
         sizes: (6,) approximate largest motion [rad or m] under each unit load.
 
     Returns:
-        Compliance for small motions at the platform's present origin, base axes, (6, 6)
+        Compliance for small motions at the platform's current origin, base axes, (6, 6)
         [rad/(N m) .. m/N]; and the largest uncertainty of its entries divided by
         sqrt(C_ii C_jj).
 
@@ -62,7 +63,7 @@ def stepped_compliance(
     def moved(step: float, unit: NDArray, drift: NDArray) -> tuple[NDArray, ...]:
         for number, part in zip(loads, np.split(step * unit, 2), strict=True):
             model.mbs.SetLoadParameter(number, "loadVector", part.tolist())
-        # The targets move in proportion to the load, approximately.
+        # The target positions change approximately in proportion to the load.
         shift[:] = first[1] + step * drift
         system.SetSystemState(start, configuration=initial)
         equilibrate(model, 2.0, 1)
@@ -86,7 +87,7 @@ def stepped_compliance(
             except OutOfTime:
                 raise
             except SimulationFailed:
-                # A large load may have no equilibrium.
+                # There may be no equilibrium under a large load.
                 if step <= _LARGEST / size / _RATIO ** (_SIZES - 3):
                     raise
                 slopes.clear()

@@ -1,7 +1,8 @@
 """Compute finite rigid motions as 4 by 4 matrices for the simulation.
 
-This module does not use :mod:`forcefit.stiffness.screws`, so that an error there cannot
-affect both the virtual-joint model and the simulation.
+This module does not use :mod:`forcefit.stiffness.screws`, so that an error in
+:mod:`forcefit.stiffness.screws` cannot affect both the virtual-joint model and the
+simulation.
 """
 
 import math
@@ -25,7 +26,7 @@ def turned(rotation_vector: ArrayLike) -> NDArray:
 
 def turn_of(R: NDArray) -> NDArray:
     """Return the rotation vector (3,) [rad] of a rotation matrix, at most pi long."""
-    # Compute the quaternion from its largest component (Shepperd 1978).
+    # The quaternion is computed from its largest component (Shepperd 1978).
     (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = R.tolist()
     trace = xx + yy + zz
     largest = max(trace, xx, yy, zz)
@@ -88,8 +89,7 @@ def _mean_turn(angles: NDArray) -> NDArray:
     a = float(np.linalg.norm(angles))
     x, y, z = angles
     W = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    # The closed form would lose digits by cancellation.  The error of the series is
-    # below 1e-15.
+    # A series with an error below 1e-15 avoids the cancellation in the closed form.
     if a < 1e-3:
         first, second = 1 / 2 - a**2 / 24, 1 / 6 - a**2 / 120
     else:

@@ -31,7 +31,7 @@ from forcefit.validation.multibody.motion import inverse, matrix, placement, shi
 
 
 class PostureLike(Protocol):
-    """Protocol of the posture properties that the simulation uses."""
+    """Protocol with the properties of a posture that the simulation uses."""
 
     @property
     def robot(self) -> Robot:
@@ -48,7 +48,7 @@ class Case:
 
     Attributes:
         posture: the robot and its joint coordinates.
-        scale: factor on geometric errors and clearances.
+        scale: factor by which geometric errors and clearances are multiplied.
         springs: mapping from frame to K_E for links that are springs; see
             :func:`link_springs`.
         meshes: mapping from frame to meshed body for links that are solids.
@@ -114,14 +114,14 @@ def link_springs(
 
 @dataclass(frozen=True, eq=False)
 class OpenTree:
-    """Elements of a complete model.
+    """Body frames, springs and closures of a complete model.
 
-    Each mapping has the names of frames as keys.
+    The keys of each mapping are names of frames.
 
     Attributes:
         platform: (4, 4) nominal pose of the platform in the base frame.
-        bodies: frames of the robot on their bodies, before clearances and springs.
-        before: frames of the robot before the motion of their joints.
+        bodies: body frame of each robot frame, before clearance and joint spring.
+        before: body frame of each robot frame, before the motion of its joint.
         links: elastic links.
         joints: joint springs.
         idle: weak springs of free motions.
@@ -147,7 +147,7 @@ def build(model: Model, case: Case) -> OpenTree:
         case: description of the robot and its loads.
 
     Returns:
-        The elements of the model.
+        The body frames, springs and closures of the model.
 
     Raises:
         BadInput: the robot contains a helical joint.
@@ -161,7 +161,8 @@ def build(model: Model, case: Case) -> OpenTree:
         place = _add_frame(model, case, frame, after[frame.parent], tree)
         after[frame.name] = place.moved(_own_motion(frame, q))
     for a, b in robot.closures:
-        # Closure errors due to rounding of file values are not geometric errors.
+        # Closure errors due to rounded numbers in a robot file are not geometric
+        # errors.
         closed = inverse(nominal[a]) @ nominal[b]
         closure = model.add_closure(tree.before[a], tree.before[b], closed)
         tree.closures.append(closure)
@@ -187,7 +188,7 @@ def refuse_helical(robot: Robot) -> None:
 def _add_frame(
     model: Model, case: Case, frame: Frame, parent: Place, tree: OpenTree
 ) -> Place:
-    """Add a body with error, link and joint, and return the frame before the joint."""
+    """Add body, link and joint of a frame, and return the frame before the joint."""
     error = case.scale * frame.geometric_error
     place = parent.moved(placement(frame.rotation, frame.translation))
     place = place.moved(placement(error[:3], error[3:]))
@@ -255,7 +256,7 @@ def _add_beam(model: Model, place: Place, frame: Frame, elements: int) -> Elasti
 
 
 def _add_couple(model: Model, place: Place, nominal: NDArray, couple: NDArray) -> None:
-    """Add a couple m as pairs of forces m x axis / 2 on arms of 1 m along each axis."""
+    """Add a couple m as a pair of forces m x axis / 2 on 1 m arms for each axis."""
     for axis, arm in zip(nominal[:3, :3].T, np.eye(3), strict=True):
         force = np.cross(couple, axis) / 2
         model.add_force(place.moved(shifted(arm)), force)

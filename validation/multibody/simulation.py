@@ -9,7 +9,7 @@ At each frame, three motions are applied in the order of the paper: the geometri
 the deformation of the link, and the motion of the joint.  Rotation vector and
 translation of an error are both in the frame's axes.  Without clearances, passive
 joints move freely about or along their z axis.  A connector closes each loop.  The
-target of the connector is corrected until the closure error vanishes.
+target position of the connector is corrected until the closure error vanishes.
 
 Sources:
     Gerstmayr (2023), "Exudyn - a C++-based Python package for flexible multibody
@@ -77,15 +77,15 @@ LINKS = ("beam", "spring")
 # [s] Largest time of a simulation.
 TIME_LIMIT = 600.0
 _FINEST = 1e-10  # [m, rad, -] smallest tolerance of the last Newton increment
-# Regularisations in the order in which they are tried.  The second prevents a rod
-# between two spherical joints from rotating by radians about its axis.
+# Regularisations in the order in which they are tried. The second regularisation
+# prevents large rotations of a rod between two spherical joints about its axis.
 _TIGHT = (
     Regularisation(1e10, IDLE_STIFFNESS),
     Regularisation(1e10, HOLDING_STIFFNESS),
 )
-# Without contact, the position of a joint within its clearance depends on round-off.
-# Softer contacts and more smoothing reduce this effect.  The connectors of closures
-# must not be much more compliant than the contacts.
+# The position of a joint within its clearance depends on round-off if there is no
+# contact. Softer contacts and more smoothing reduce this effect.  The connectors of
+# closures must not be much more compliant than the contacts.
 WITH_CLEARANCES = (
     Regularisation(1e12, IDLE_STIFFNESS),
     Regularisation(1e10, IDLE_STIFFNESS, contact=0.1),
@@ -111,7 +111,7 @@ class SimulationModel:
         clearances: whether joints have clearances, which are scaled like the errors.
         bushes: whether joints with radial clearance and tilt are pins in two bushes;
             see :func:`forcefit.validation.multibody.contact.joint_clearance`.
-        hold: whether springs act on free motions from the start.  Otherwise, springs
+        hold: whether springs on free motions are added from the start. Otherwise, they
             are added only if no equilibrium is found.
     """
 
@@ -143,15 +143,16 @@ _UNDETERMINED = (
 class MultibodyAssembly:
     """A robot assembled by the simulation.
 
-    Rows of arrays are frames in the order of the robot.  Screws and wrenches are at the
-    frame in its axes.  They are zero for frames without the corresponding spring.
+    The first axis of arrays contains the frames in the order of the robot. Screws and
+    wrenches are at each frame, in frame axes. They are zero for frames without the
+    corresponding spring.
 
     Attributes:
         platform_screw: (6,) [rad, m] rotation vector of R_actual R_nominal^T, and
             displacement of the platform's origin, base axes.
         energy: [J] energy of all links and joint springs.
-        link_screws: (n, 6) [rad, m] deformations of the links: logarithms of the
-            relative motion.
+        link_screws: (n, 6) [rad, m] deformations of the links, as logarithms of
+            motions.
         link_wrenches: (n, 6) [N m, N] wrenches on the tips of the links.
         joint_screws: (n, 6) [rad, m] deformations of the joint springs.
         joint_wrenches: (n, 6) [N m, N] wrenches on the outer ends of the joint springs.
@@ -159,9 +160,9 @@ class MultibodyAssembly:
             motions of passive joints.
         closure_wrenches: (closures, 6) [N m, N] wrenches that the second chain of each
             closure exerts on the first, at the platform's nominal origin, base axes.
-        transforms: (n, 4, 4) frames in the base frame, before the motion of their
-            joints.
-        gap: [rad, m] largest component of a closure error.
+        transforms: (n, 4, 4) poses of the frames in the base frame, before the motion
+            of their joints.
+        gap: [rad, m] largest component of the closure errors.
         idle_energy: [J] energy of the weak springs on free motions, nearly zero.
         contact_energy: [J] energy of the elastic contacts.
         held: whether springs of 0.01 N m/rad or N/m act on free motions.  They are
@@ -206,15 +207,16 @@ def simulate_assembly(
 
     Args:
         posture: the robot and its joint coordinates.  Actuated joints are locked.
-        scale: factor on the robot's geometric errors and on the forces of its drives.
+        scale: factor by which the robot's geometric errors and drive forces are
+            multiplied.
         model: options for links and joints.
         load: (6,) [N m, N] load of constant direction on the platform at its origin,
             base axes.
         gravity: (3,) [m/s^2] gravity in base axes.  Only bodies with a mass and beams
             with a density have weight.
-        couple: (3,) [N m] additional couple on the platform, base axes.  It consists of
-            forces of constant direction on arms that rotate with the platform, so it
-            has a potential.
+        couple: (3,) [N m] additional couple on the platform, base axes.  The couple
+            consists of forces of constant direction on arms that rotate with the
+            platform, and therefore has a potential.
         time_limit: [s] time after which the simulation fails.
 
     Returns:
@@ -268,7 +270,7 @@ def _is_loaded(case: Case) -> bool:
 
 
 def _vector(given: ArrayLike | None, size: int) -> NDArray:
-    """Return the given vector (size,), or zeros for None."""
+    """Return a given vector (size,), or zeros if it is None."""
     return np.zeros(size) if given is None else np.asarray(given, dtype=float)
 
 
@@ -277,7 +279,8 @@ def _simulate(
 ) -> MultibodyAssembly:
     """Build and solve a model, read its results, and release its memory."""
     robot = case.posture.robot
-    # The tolerance is proportional to the scale, as the clearances are.
+    # The tolerance is proportional to the clearances, which are multiplied by the
+    # scale.
     tolerance = max(regularisation.tolerance * min(case.scale, 1.0), _FINEST)
     regularisation = replace(regularisation, tolerance=tolerance)
     model = Model(*import_exudyn(), robot.name, regularisation)
@@ -317,7 +320,7 @@ def simulated_frequencies(
         meshes={}, elements=elements, clearances=False, bushes=False,
         load=np.zeros(6), gravity=np.zeros(3), couple=np.zeros(3),
     )  # fmt: skip
-    # The unloaded robot is built with closed loops and is thus in equilibrium.
+    # The unloaded robot is built with closed loops, so it is in equilibrium.
     model = Model(
         *import_exudyn(), robot.name, Regularisation(math.inf, IDLE_STIFFNESS)
     )

@@ -48,13 +48,13 @@ class SimulatedTangent:
 
     Attributes:
         linearised: (6, 6) [rad/(N m) .. m/N] compliance from the linearised system, for
-            small motions at the platform's present origin, base axes.
+            small motions at the platform's current origin, base axes.
         stepped: (6, 6) compliance from small loads; NaN if it was not requested.
         linearised_error: [-] largest uncertainty of the entries of ``linearised``,
             divided by sqrt(C_ii C_jj).
         stepped_error: [-] largest uncertainty of the entries of ``stepped``, divided by
             sqrt(C_ii C_jj).
-        platform: (4, 4) present pose of the platform in the base frame.
+        platform: (4, 4) current pose of the platform in the base frame.
         stable: whether the equilibrium is stable.
         seconds: [s] computing time.
     """
@@ -87,7 +87,7 @@ def simulated_tangent(
         load: (6,) [N m, N] load on the platform at its origin, base axes.  The force
             has a constant direction, and the moment is a couple of such forces.
         gravity: (3,) [m/s^2] gravity in base axes.
-        steps: whether to compute the compliance by load steps, too.
+        steps: whether to compute the compliance also by load steps.
         time_limit: [s] largest time of the computation.
 
     Returns:
@@ -101,7 +101,8 @@ def simulated_tangent(
     """
     started = time.monotonic()
     case = _case(posture, model, load, gravity)
-    # Exudyn's own springs are faster, and exact if no spring deforms.
+    # The springs of Exudyn are faster than user functions, and exact if no spring
+    # deforms.
     bent = is_bent(posture.robot.errors, load, gravity)
     hard = tuple(r for r in WITH_CLEARANCES if r.contact == 1.0)
     tried = hard[:2] if model.clearances else _REGULARISATIONS

@@ -30,13 +30,13 @@ class PoseFigures:
     """ISO 9283 characteristics of a pose for one load and direction of approach.
 
     Attributes:
-        label: id of the first row of the pose.
+        label: id of the first row of the table that contains the pose.
         cycles: number of cycles.
         accuracy: AP_P [m]; None if no positions were measured.
         repeatability: RP_l [m]; None if no positions were measured.
         angles: AP_a, AP_b, AP_c [rad]; None if no rotations were measured.
         angle_repeatability: RP_a, RP_b, RP_c [rad]; None if no rotations were measured.
-        drift: drift of AP_P [m]; None if it cannot be computed.
+        drift: drift of the accuracy AP_P [m]; None if it cannot be computed.
     """
 
     label: str
@@ -71,7 +71,8 @@ class StandardFigures:
 
     Attributes:
         campaign: name of the campaign.
-        registration: ``"known"`` or ``"unknown"``.  AP includes registration errors.
+        registration: ``"known"`` or ``"unknown"``.  If it is unknown, AP includes
+            registration errors.
         poses: characteristics of the poses that were measured at least twice.
         distances: characteristics of pairs of poses with equal load, session, point and
             direction of approach.
@@ -188,7 +189,7 @@ def _pose(campaign: Campaign, rows: NDArray) -> PoseFigures:
 
 
 def _circumstances(campaign: Campaign) -> NDArray:
-    """Return the number of each row's combination of load, session and point, (R,)."""
+    """Return labels (R,), equal for rows with the same load, session and point."""
     names = [
         np.unique(column, return_inverse=True)[1]
         for column in (campaign.session, campaign.point)

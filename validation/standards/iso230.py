@@ -24,7 +24,7 @@ class AxisFigures:
         repeatability_backward: R down, the largest repeatability in backward direction.
         repeatability: R, the largest bidirectional repeatability.
         systematic_deviation: E, the bidirectional systematic deviation.
-        mean_deviation: M, the range of the mean of both directions.
+        mean_deviation: M, the range of the mean bidirectional deviations.
         accuracy: A, the bidirectional accuracy.
     """
 

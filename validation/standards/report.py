@@ -68,7 +68,7 @@ def _verdict(figures: StandardFigures) -> str:
 
 
 def _known(figures: StandardFigures, key: str) -> list[float]:
-    """Return the known values of a characteristic of all poses."""
+    """Return the values of a characteristic at the poses where it is known."""
     values = [getattr(pose, key) for pose in figures.poses]
     return [value for value in values if value is not None]
 

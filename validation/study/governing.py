@@ -1,4 +1,4 @@
-"""Compute the certified pose error bounds of a robot with one perfect part."""
+"""Compute bounds of the pose error if one frame or joint has no imperfection."""
 
 from dataclasses import replace
 from typing import Any

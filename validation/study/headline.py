@@ -24,7 +24,7 @@ _LARGER = {
     "budget": "the deformation energy may be 5 % above its minimum",
 }
 _OUTCOMES = ("passed", "failed", "not decided")  # possible results of a check
-# [-] Smallest required fraction of the clearances that exceeds round-off.
+# [-] A required fraction of the clearances below this value is treated as zero.
 _NO_CLEARANCE = 1e-6
 
 
@@ -216,7 +216,7 @@ def _drawn_text(results: StudyResults) -> str:
 
 
 def _other_assumptions(results: StudyResults) -> list[str]:
-    """Return bounds under other assumptions that are more than one per cent larger."""
+    """Return the bounds under other assumptions if they are over 1 % larger."""
     texts = []
     own = results.error[WORST]
     for assumption, error in results.error.items():

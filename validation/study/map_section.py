@@ -14,7 +14,7 @@ from forcefit.results.quantities import unit_of
 from forcefit.stiffness.screws import WRENCH
 from forcefit.validation.study.drawn_tolerances import DRAWN_ERRORS
 
-# Quantities shown as maps: name in the results and description.
+# Quantities shown as maps, with their names in the results and descriptions.
 MAPPED = {
     "translation_error": "largest translation, eq. (27), over all clearances",
     "rotation_error": "largest rotation, eq. (27), over all clearances",
@@ -26,7 +26,7 @@ _UNITS = {"tx": "m", "ty": "m", "tz": "m", "rx": "rad", "ry": "rad", "rz": "rad"
 
 
 class Mapped(NamedTuple):
-    """A quantity over the grid.
+    """Values of a quantity at the points of a grid of poses.
 
     Attributes:
         key: name of the quantity in the results.
@@ -42,7 +42,7 @@ class Mapped(NamedTuple):
 
 
 def mapped(maps: Any) -> Iterator[Mapped]:
-    """Yield the quantities of a study's maps, with upper bounds of pose errors."""
+    """Yield the quantities of the maps of a study. Pose errors are upper bounds."""
     for key, words in MAPPED.items():
         one = maps[key].sel(bound="upper") if "bound" in maps[key].dims else maps[key]
         yield Mapped(key, words, unit_of(key), one)
@@ -74,10 +74,7 @@ def mapped(maps: Any) -> Iterator[Mapped]:
 
 
 def finite(one: Mapped) -> NDArray:
-    """Return the known values of a map.
-
-    Pose errors may be infinite, and other values are finite.
-    """
+    """Return the known values of a map, which may be infinite for pose errors."""
     values = np.asarray(one.values, dtype=float).ravel()
     if one.key.endswith("_error"):
         return values[~np.isnan(values)]
@@ -119,7 +116,7 @@ def maps_section(maps: Any, summary: dict[str, Any]) -> str:
 
 
 def _drawn(maps: Any, first: Mapped) -> str:
-    """Return the map over two axes, and a paragraph on the values of other axes."""
+    """Return the map over two axes, and a paragraph on the values along other axes."""
     names = [str(d) for d in maps["energy"].dims if maps.sizes[d] > 1]
     if not names:
         return ""

@@ -1,4 +1,4 @@
-"""Solve problems (21) and (22) in cvxpy, exactly as printed in the paper."""
+"""Solve problems (21) and (22) of the paper in cvxpy, without reformulation."""
 
 import math
 from typing import Any
@@ -17,14 +17,14 @@ from forcefit.assembly.model.statuses import (
 from forcefit.validation.crosscheck.verdict import Check
 
 TOLERANCE = 1e-6  # [-] relative tolerance of energies and margins
-# Numerical noise of energies [J] and margins [-] in cvxpy.
+# Rounding errors of energies [J] and margins [-] in cvxpy.
 _NOISE_ENERGY, _NOISE_MARGIN = 1e-12, 1e-10
 
 
 def compare_printed(
     posture: Posture, assembly: Assembly, zone: dict[str, Any]
 ) -> dict[str, Any]:
-    """Solve the printed problems and compare energy and margins with forcefit's.
+    """Solve problems (21) and (22) in cvxpy, and compare energy and margins.
 
     Args:
         posture: the robot's configuration.

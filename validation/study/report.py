@@ -231,7 +231,7 @@ def _force_tile(assembly: Assembly) -> Tile:
 
 
 def _governing_tiles(results: StudyResults, worst: dict[str, float]) -> list[Tile]:
-    """Return the tiles of the governing part and the tolerance to tighten."""
+    """Return tiles of the largest imperfection and of the tolerance to tighten."""
     known = [
         one for one in results.governing
         if one["translation"] is not None and np.isfinite(one["translation"])

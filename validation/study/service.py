@@ -1,7 +1,8 @@
 """Compute deflection, stiffness and natural frequencies of a robot under load.
 
 The table ``[service]`` of a study file requests these results.  They are computed at
-the study's pose.  Over the grid, they become additional variables of the maps.
+the pose of the study. If the study contains a grid of poses, they are additional
+variables of the maps.
 """
 
 from collections.abc import Callable, Mapping

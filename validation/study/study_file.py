@@ -48,7 +48,7 @@ class Study:
 
     Attributes:
         title: title of the report.
-        robot: robot with its errors and its original links.
+        robot: robot with its geometric errors, and with the links in the robot file.
         errors: sentence on the origin of the errors.
         source: source of the link stiffness, ``"beam"`` (as declared) or ``"fea"``.
         meshes: mapping from frame to meshed link.
@@ -57,7 +57,7 @@ class Study:
         grid: mapping from pose component to its values in the maps; empty without maps.
         scales: scales of the errors in the cross-check; empty without a cross-check.
         checks: names of the checks to run.
-        asked: names of the checks that the file requests.
+        asked: names of the checks that are explicitly requested in the file.
         folder: folder of the report.
         files: files that were read: the study file, a robot file, surfaces.
         service: results requested for the robot under load; None without a table

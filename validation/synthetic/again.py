@@ -36,7 +36,8 @@ def distances(
         effects: effects of the machine.  Effects that change only the readings are
             ignored.
         targets: commands at which the nominal robot reaches the target poses.
-        coordinates: (R, n) [rad or m] nominal coordinates of the commands.
+        coordinates: (R, n) [rad or m] joint coordinates of the nominal robot for the
+            commands.
         program: name of the simulation program.
 
     Returns:

@@ -8,7 +8,7 @@ from forcefit.validation.synthetic.effects import Row
 
 
 def behind(time_constant: float) -> str:
-    """Return the name of the covariate with a temperature that lags."""
+    """Return the name of the covariate that contains a lagged temperature."""
     return f"behind {time_constant!r}"
 
 
@@ -34,8 +34,8 @@ def with_delays(rows: Sequence[Row], time_constants: Iterable[float]) -> list[Ro
             step = (row.covariates["time"] - before["time"]) / late
             if step == 0.0:
                 warm = now
-            # Exact solution: the response to a ramp of the temperature, plus the
-            # exponential decay of the initial difference.
+            # The exact solution is the response to a temperature ramp, plus the
+            # exponential decay of the initial temperature difference.
             else:
                 lag = (now - before["temperature"]) / step
                 start = warm - before["temperature"] + lag

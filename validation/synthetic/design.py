@@ -18,7 +18,7 @@ _PERIOD = 2400.0  # [s] period of the temperature
 _STEP = 60.0  # [s] time between measurements
 _DRAWS = 40  # largest number of random draws per configuration
 _DIGITS = 6  # number of decimal digits of commanded coordinates
-# Attributes of the design that each effect requires.
+# Attributes of the design that each effect requires to be visible.
 _VARIED_FOR: dict[str, dict[str, Any]] = {
     "_humidity": {"humidity": True},
     "_quadratic_temperature": {"temperature": "around"},
@@ -33,16 +33,17 @@ class CampaignDesign:
 
     Attributes:
         configurations: number of distinct configurations.
-        rows: number of measurements, in which the configurations alternate.
-        reach: [rad] largest change of a revolute drive from its home position; for a
-            prismatic drive it is multiplied by ``size``.
-        size: [m] length by which ``reach`` is multiplied.
+        rows: number of measurements. Successive measurements are in different
+            configurations.
+        reach: [rad] largest displacement of a revolute drive from its home position.
+            For a prismatic drive, this value is multiplied by ``size``.
+        size: [m] length by which ``reach`` is multiplied for a prismatic drive.
         load: [N] largest force applied to the platform.
         levels: ``"many"`` for loads of many magnitudes and directions, or ``"one"`` for
             the same force in every row.
         temperature: range of the temperature: ``"swing"`` for -0.5 to 6.5 K,
             ``"around"`` for -4 to 4 K, or ``"constant"`` for 6 K.
-        command: form of the commands in the file, ``"joints"`` or ``"pose"``.
+        command: type of the commands in the file, ``"joints"`` or ``"pose"``.
         humidity: whether the covariate ``humidity`` [%] is recorded.
         tilt: [rad] magnitude of the covariate ``tilt``; 0 if it is not recorded.
         gravity: [m/s^2] magnitude of the recorded gravity, which acts along -z.
@@ -97,7 +98,7 @@ def varied_for(design: CampaignDesign, names: Iterable[str]) -> CampaignDesign:
         names: names of the effects.
 
     Returns:
-        The design with the additional conditions.
+        The design, in which these covariates vary.
     """
     given = {key: v for n in names for key, v in _VARIED_FOR.get(n, {}).items()}
     return replace(design, **given)

@@ -58,7 +58,7 @@ def strengthened(effect: Hidden, factor: float) -> Hidden:
 
     Args:
         effect: effect with its parameters.
-        factor: [-] factor on the contribution, > 0.
+        factor: [-] positive factor by which the contribution is multiplied.
     """
     name, given = effect.name, dict(effect.parameters)
     for key, value in given.items():
@@ -70,7 +70,8 @@ def strengthened(effect: Hidden, factor: float) -> Hidden:
         elif name == "contact_stiffening":
             exponent = given[key.removesuffix("coefficient") + "exponent"]
             given[key] = value / factor**exponent
-        # The compliance is inversely proportional to the modulus.
+        # The factor applies to the compliance, which is inversely proportional to the
+        # modulus.
         elif name == "modulus_scale":
             given[key] = 1.0 / max(1.0 + factor * (1.0 / value - 1.0), 0.05)
         elif key == "factor":
@@ -86,7 +87,7 @@ def _one(frames: list[Frame], rng: np.random.Generator) -> str:
 
 
 def _some(frames: list[Frame], rng: np.random.Generator) -> list[str]:
-    """Return the name of a random frame or all names."""
+    """Return the name of a random frame, or the names of all frames."""
     if not frames:
         raise NotApplicable("the robot has no frame on which the effect acts")
     return [_one(frames, rng)] if rng.random() < 0.5 else [f.name for f in frames]
@@ -110,7 +111,7 @@ def _turning(robot: Robot) -> list[Frame]:
 
 
 def _vector(name: str, components: Iterable[str], values: NDArray) -> Parameters:
-    """Return parameters ``<name>.<component>`` with the components of a vector."""
+    """Return parameters ``<name>.<component>`` for the components of a vector."""
     keys = (f"{name}.{component}" for component in components)
     return dict(zip(keys, values.tolist(), strict=True))
 

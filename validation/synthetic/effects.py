@@ -31,7 +31,7 @@ Parameters = Mapping[str, float]
 
 @dataclass(frozen=True, eq=False)
 class Row:
-    """Commanded measurement.
+    """One row of a design, which is a commanded measurement.
 
     Attributes:
         coordinates: mapping from frame to the nominal coordinate of its joint [rad or
@@ -58,8 +58,8 @@ class Machine:
             joints.
         load: (6,) [N m, N] applied load.
         gravity: (3,) [m/s^2] gravity in base axes.
-        laws: mapping from frame to the nonlinear spring of its joint, or to the
-            clearance of its joint on an open chain; see
+        laws: mapping from frame to a nonlinear spring of its joint, or to the clearance
+            of its joint if the frame is on an open chain; see
             :mod:`forcefit.validation.synthetic.rest`.
     """
 
@@ -100,14 +100,14 @@ def insert_after(robot: Robot, name: str, suffix: str, **given: Any) -> Robot:
 
 
 def along_own_axis(frame: Frame, value: float, others: float = 0.0) -> NDArray:
-    """Return a vector (6,) with a given component along the motion of a joint."""
+    """Return a screw (6,) of given magnitude along the free motion of a joint."""
     screw = np.full(6, others)
     screw[frame.own_axis] = value
     return screw
 
 
 def sprung(frame: Frame, stiffness: float) -> NDArray:
-    """Return a stiffness (6, 6) that is finite only along a joint's motion."""
+    """Return a joint stiffness (6, 6) that is finite only along the free motion."""
     return np.diag(along_own_axis(frame, stiffness, math.inf))
 
 
@@ -122,7 +122,8 @@ def beam_length(robot: Robot, name: str) -> float:
 def lengthened(robot: Robot, name: str, change: float) -> Robot:
     """Return the robot with a body that is longer by ``change`` [m]."""
     frame = robot.frame(name)
-    if not isinstance(frame.link, BeamLink):  # the body ends at its joints
+    # The length of the body is the distance between its joints.
+    if not isinstance(frame.link, BeamLink):
         longer = 1.0 + change / float(np.linalg.norm(frame.translation))
         return with_frame(robot, replace(frame, translation=longer * frame.translation))
     length, x = beam_span(frame, frame.link)
@@ -134,7 +135,7 @@ def lengthened(robot: Robot, name: str, change: float) -> Robot:
 
 
 def with_frame(robot: Robot, frame: Frame) -> Robot:
-    """Return the robot with the frame of the same name replaced."""
+    """Return the robot with a frame that replaces the frame of the same name."""
     frames = (frame if f.name == frame.name else f for f in robot.frames)
     return replace(robot, frames=tuple(frames))
 
@@ -171,7 +172,7 @@ def on_ground(robot: Robot, ground: Frame) -> Robot:
 
 
 def own_compliance(frame: Frame) -> float:
-    """Return the declared compliance of a joint along its motion; 0 if it is rigid."""
+    """Return the declared compliance along a joint's free motion; 0 if rigid."""
     K = frame.springs
     if K is None or not np.isfinite(K[frame.own_axis, frame.own_axis]):
         return 0.0
@@ -242,7 +243,8 @@ def _joint_clearance(machine: Machine, row: Row, given: Parameters) -> Machine:
     for name in dict.fromkeys(key.rpartition(".")[0] for key in given):
         kinds = ("radial", "axial", "tilt")
         clearance = Clearance(**{k: given.get(f"{name}.{k}") for k in kinds})
-        if robot.closures:  # the simulation computes the positions of the joints
+        # The simulation computes the positions of the joints in their clearances.
+        if robot.closures:
             robot = with_frame(robot, replace(robot.frame(name), clearance=clearance))
             continue
         K = np.repeat(SENSOR, 3)
@@ -253,7 +255,7 @@ def _joint_clearance(machine: Machine, row: Row, given: Parameters) -> Machine:
 
 
 def _friction_hysteresis(machine: Machine, row: Row, given: Parameters) -> Machine:
-    # A constant torque on a linear spring shifts its equilibrium.
+    # A constant torque shifts the equilibrium of a linear spring.
     for name, torque in given.items():
         compliance = own_compliance(machine.robot.frame(name))
         change = -torque * row.covariates["approach"] * compliance
@@ -291,7 +293,8 @@ def _body_mass(machine: Machine, row: Row, given: Parameters) -> Machine:
 
 
 def _geometric_stiffening(machine: Machine, row: Row, given: Parameters) -> Machine:
-    return machine  # the simulation uses finite motions, which contain this effect
+    # The simulation always includes this effect, because motions are finite.
+    return machine
 
 
 def _registration(pose: NDArray, row: Row, given: Parameters) -> NDArray:
@@ -318,7 +321,7 @@ def _drift(reading: NDArray, row: Row, given: Parameters) -> NDArray:
 
 
 def named(given: Parameters, component: str) -> list[str]:
-    """Return the frames in the parameters ``<frame>.<component>`` of a component."""
+    """Return the frames with a parameter ``<frame>.<component>`` for a component."""
     end = f".{component}"
     return [key.removesuffix(end) for key in given if key.endswith(end)]
 

@@ -3,8 +3,8 @@
 The signature of an effect is the first-order change of the readings, divided by the
 noise.  It is computed by ``springs.py``, independently of the model under test.  A set
 of effects explains the data as well as the hidden effects if a linear combination of
-its signatures equals the contribution of the hidden effects within the noise.  A
-diagnosis that names such a set is not wrong.
+its signatures equals the contribution of the hidden effects within the noise. Such a
+set is accepted as the result of a diagnosis.
 
 Clearance and geometric stiffening are omitted, because they have no linear signature.
 """
@@ -22,8 +22,8 @@ from forcefit.validation.synthetic.effects import SCREW, WRENCH, Row, own_compli
 from forcefit.validation.synthetic.generator import Synthetic
 from forcefit.validation.synthetic.machine import Hidden, simulate_readings
 
-SAME = 10.0  # residual chi-square below which noise hides the difference
-# Time constants of a drift, relative to the duration.
+SAME = 10.0  # residual chi-square below which two sets of effects are equivalent
+# Assumed time constants of a drift, relative to the duration of the campaign.
 _DRIFTS = (0.1, 0.3, 1.0)
 _STEP = 1e-5  # [rad, m] step of a finite difference
 _GRAM = 1e-3  # [kg, kg m] step of a finite difference
@@ -38,8 +38,8 @@ class Alternative:
     Attributes:
         names: names of the effects.
         parameters: number of their parameters.
-        residual: [-] chi-square of the hidden effects' contribution after fitting this
-            set.
+        residual: [-] chi-square of the contribution of the hidden effects after fitting
+            this set to it.
     """
 
     names: tuple[str, ...]
@@ -73,7 +73,7 @@ def alternatives(campaign: Synthetic, size: int = 1) -> list[Alternative]:
 
 
 def _residual(A: NDArray, target: NDArray) -> float:
-    """Return the squared distance of a vector from the span of a matrix's columns."""
+    """Return the squared distance between a vector and the column space of a matrix."""
     norms = np.linalg.norm(A, axis=0)
     A = A[:, norms > 0] / norms[norms > 0]
     if not A.shape[1]:
@@ -91,8 +91,8 @@ def signatures(campaign: Synthetic) -> dict[str, NDArray]:
         campaign: campaign with the design and the noise.
 
     Returns:
-        Mapping from effect to its signatures (6 rows, parameters).  Drift has one entry
-        per time constant.
+        Mapping from each effect to its signatures (6 rows, parameters). For a drift,
+        there is one entry for each assumed time constant.
     """
     raw = dict(_raw(campaign))
     sigma = np.tile(campaign.sigma, len(campaign.plan.rows))
@@ -104,7 +104,7 @@ def signatures(campaign: Synthetic) -> dict[str, NDArray]:
 
 
 def _raw(campaign: Synthetic) -> Iterator[tuple[str, NDArray]]:
-    """Return the derivatives of readings by each effect, (rows, 6, parameters)."""
+    """Return the derivatives of the readings for each effect, (rows, 6, parameters)."""
     differences = _FiniteDifferences(campaign)
     covariate = {
         name: np.array([row.covariates[name] for row in campaign.plan.rows])[:, None]
@@ -192,7 +192,7 @@ def _of_the_device(
 
 
 def _columns(screws: Sequence[NDArray]) -> NDArray:
-    """Stack screws as columns (rows, 6, parameters)."""
+    """Stack screws along the last axis, (rows, 6, parameters)."""
     return np.stack(screws, axis=-1) if screws else np.zeros((0, 6, 0))
 
 
@@ -217,14 +217,14 @@ class _FiniteDifferences:
         return (readings - self._loaded_readings) / step
 
     def unloaded(self, name: str, key: str, step: float) -> NDArray:
-        """Return the derivative by a parameter if the load has no influence on it."""
+        """Return the derivative by an effect parameter without load, (rows, 6)."""
         readings = self._read(self._unloaded, [Hidden(name, {key: step})])
         return ((readings - self._unloaded_readings) / step)[self._of]
 
 
 def _stiffening(softer: NDArray, offset: NDArray) -> NDArray:
     """Return the signatures of a Hertz contact in a drive, offset x load^(2/3)."""
-    # Factors [1/m] convert lengths to angles.
+    # The factor for translations is 2/m, which converts lengths to angles.
     scale = np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])
     a, b = softer * scale, offset * scale
     moments = (a * b).sum(axis=1) / (b * b).sum(axis=1)

@@ -2,8 +2,9 @@
 
 The machine is simulated in Exudyn with finite rotations and geometrically exact beams,
 independently of the model that is fitted later.  Each effect is scaled so that the rms
-of its contribution to the readings is the requested multiple of the noise.  Weight and
-geometric stiffening cannot be scaled, so for these effects the noise is adjusted.
+of its contribution to the readings is the requested multiple of the noise.  The effects
+of weight and of geometric stiffening cannot be scaled. For these effects, the noise is
+adjusted instead.
 
 The campaign folder contains only data that a measurement would provide.  Hidden effects
 are stored separately, in the truth format of the practice campaigns.
@@ -36,7 +37,8 @@ _TRIES = 5
 _DRAWS = 6  # largest number of random draws of an effect's parameters
 _CLOSE = 0.05  # accepted relative error of an effect's requested strength
 _MOST = 1000.0  # largest accepted factor on the plausible size of an effect
-_SMALL = 1e-2  # factor on errors and load for nearly linear readings
+# Factor on the errors and the load that makes readings nearly linear in them.
+_SMALL = 1e-2
 _BLUNDER = 40.0  # [sigma] size of a blunder
 
 Progress = Callable[[str, int, int], None]
@@ -53,10 +55,10 @@ class Synthetic:
         reference_point: (3,) [m] measured point, platform axes.
         registration: ``"known"``, or ``"unknown"`` with a hidden measuring frame.
         sigma: (6,) [rad, m] standard deviation of the noise.
-        readings: (rows, 6) [rad, m] measured deviations; NaN where missing.
+        readings: (rows, 6) [rad, m] measured deviations; NaN for missing values.
         exact: (rows, 6) [rad, m] deviations without noise and without blunders.
-        added: (rows, 6) [rad, m] contribution of the hidden effects without the
-            measuring frame.
+        added: (rows, 6) [rad, m] contribution of the hidden effects, without the error
+            of the measuring frame.
         effects: hidden effects with their parameters.
         strength: mapping from the name of each effect to the rms of its contribution
             [sigma].
@@ -89,7 +91,7 @@ class Noise:
         rotation: [rad] standard deviation of rotations.
         position: [m] standard deviation of positions.
         outliers: number of rows that contain a blunder.
-        missing: fraction of missing cells.
+        missing: fraction of missing values.
         hidden_frame: [rad, m] largest error of each component of the measuring frame's
             pose; 0 if the pose is known.
     """
@@ -271,7 +273,7 @@ def _scaled_effect(
     sigma: NDArray,
     declared: NDArray,
 ) -> tuple[Hidden, NDArray, NDArray]:
-    """Return the effect scaled to a strength, its readings and the noise."""
+    """Return the scaled effect, the readings with it, and the noise."""
     factor = 1.0
     for attempt in range(_TRIES):
         tried = strengthened(effect, factor) if attempt else effect
@@ -298,7 +300,7 @@ def _scaled_effect(
 
 
 def _linear(machine: _SimulatedMachine) -> NDArray:
-    """Return the readings to first order in errors and load, (rows, 6)."""
+    """Return readings of a machine with small errors and load, (rows, 6)."""
     ends = []
     for scale in (_SMALL, -_SMALL):
         small = machine.robot.with_errors(scale * machine.robot.errors)
@@ -310,7 +312,7 @@ def _linear(machine: _SimulatedMachine) -> NDArray:
 def _measured(
     exact: NDArray, sigma: NDArray, noise: Noise, rng: np.random.Generator
 ) -> tuple[NDArray, tuple[int, ...]]:
-    """Return readings with noise, blunders and gaps, and the rows with blunders."""
+    """Return readings with noise, blunders and missing values, and blunder rows."""
     readings = exact + sigma * rng.normal(size=exact.shape)
     blunders = rng.choice(len(exact), noise.outliers, replace=False)
     columns = rng.integers(6, size=noise.outliers)

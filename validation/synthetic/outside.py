@@ -64,7 +64,7 @@ def _growth(machine: Machine, row: Row, given: Parameters) -> Machine:
 
 
 def _backlash(row: Row, given: Parameters, name: str, angle: float) -> float:
-    """Return the displacement [rad or m] by a backlash that varies with an angle."""
+    """Return the displacement [rad or m] due to a backlash that depends on an angle."""
     share = 1.0 + 0.8 * math.sin(angle + given[f"{name}.phase"])
     return given[f"{name}.amplitude"] * row.covariates["approach"] * share
 
@@ -88,7 +88,7 @@ def _cable(machine: Machine, row: Row, given: Parameters) -> Machine:
 
 
 def _two_steps(machine: Machine, row: Row, given: Parameters) -> Machine:
-    """Add a joint compliance that changes at a load."""
+    """Add a joint compliance that changes at a certain load."""
     robot, laws = machine.robot, dict(machine.laws)
     for name in named(given, "knee"):
         keys = ("below", "above", "knee")
@@ -100,7 +100,7 @@ def _two_steps(machine: Machine, row: Row, given: Parameters) -> Machine:
 
 
 def _torque_backlash(machine: Machine, row: Row, given: Parameters) -> Machine:
-    """Add the backlash of a gear, with the sign of the drive's load."""
+    """Add the backlash of a gear, in the direction of the drive's load."""
     robot, laws = machine.robot, dict(machine.laws)
     for name, clearance in given.items():
         frame = robot.frame(name)

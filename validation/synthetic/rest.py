@@ -26,10 +26,10 @@ from forcefit.validation.multibody.simulation import (
 from forcefit.validation.synthetic.effects import Machine, Rest, sprung, with_frame
 from forcefit.validation.synthetic.springs import rest_on_springs
 
-# Number of elements of a beam, sufficient for small deflections.
+# Number of finite elements per beam, sufficient for small deflections.
 _ELEMENTS = 2
 _STEPS = 60
-_SETTLED = 1e-11  # [rad, m] largest change of power-law springs at convergence
+_SETTLED = 1e-11  # [rad, m] largest change of a spring deflection at convergence
 # [rad, m] Largest change of a joint's position within its clearance at convergence.
 _SETTLED_CLEARANCE = 5e-9
 # [N/m, N m/rad] Stiffness of the springs that centre joints within their clearances.
@@ -75,7 +75,7 @@ def rest_poses(
 
 
 def _updated(machine: Machine, equilibrium: Rest) -> tuple[Machine, float]:
-    """Return the joints under the computed loads, and the change over the tolerance."""
+    """Return updated springs and offsets, and their change divided by the tolerance."""
     largest, robot = 0.0, machine.robot
     for name, law in machine.laws.items():
         i, frame = robot.index(name), robot.frame(name)
@@ -108,7 +108,7 @@ def _clearance_position(clearance: Clearance, wrench: NDArray) -> NDArray:
 
 @dataclass(frozen=True, eq=False)
 class _Placed:
-    """Robot and joint coordinates for the simulation."""
+    """Robot with the joint coordinates that are simulated."""
 
     robot: Robot
     coordinates: NDArray

@@ -17,9 +17,10 @@ first chain of a closure and -1 if it is on the second:
     [ -S       -(s a) ] [ dl ]     [ r ]
     [ (s a)^T    0    ] [ dq ] = - [ t ]
 
-S is the compliance between each pair of closures.  Each step is the solution of minimum
-norm, which also determines free rotations and the wrenches of overconstrained rigid
-loops.  Screws and wrenches are at the base origin in base axes.
+S contains the compliance between the two frames of each closure, and the compliances
+that couple closures.  Each step is the solution of minimum norm, which also determines
+free rotations and the wrenches of overconstrained rigid loops.  Screws and wrenches are
+at the base origin in base axes.
 """
 
 from collections.abc import Sequence
@@ -39,7 +40,7 @@ from forcefit.validation.synthetic.effects import Machine, Rest
 _STEPS = 60
 _CONVERGED = 1e-12  # [rad, m] largest step at convergence
 _DIVERGED = 1e3  # [rad, m] coordinate above which the iteration has diverged
-_RANK = 1e-10  # relative size below which a singular value belongs to a free motion
+_RANK = 1e-10  # relative singular value that is treated as zero, as for a free motion
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,8 +51,8 @@ class _SpringModel:
         robot: a robot with this structure.
         placed: (k, n, 4, 4) poses of frames with their errors, relative to their
             parents.
-        compliances: (2, k, n, 6, 6) compliances of links and joints, at the frame in
-            its axes.
+        compliances: (2, k, n, 6, 6) compliances of links and of joints, at each frame
+            in frame axes.
         nominal: (k, n, 4, 4) nominal poses of frames.
         passive: indices of the frames with free joints.
         pairs: (closures, 2) indices of the frames that each closure joins.
@@ -95,7 +96,8 @@ def rest_on_springs(machines: Sequence[Machine]) -> list[Rest]:
     ends = _forward(parts, q, screws)
     for _ in range(_STEPS):
         carried = _carried(machines, parts, ends, wrenches)
-        # Only wrenches half-way along the deformation are the gradient of an energy.
+        # Wrenches are the gradient of an energy only if they are applied half-way along
+        # the deformation.
         halfway = ends @ np.linalg.inv(_deflections(screws / 2))
         read = _at_frames(halfway, carried)
         new = np.einsum("skaij,skaj->skai", parts.compliances, read)
@@ -134,7 +136,7 @@ def _spring_model(machines: Sequence[Machine], q: NDArray) -> _SpringModel:
     first, second = np.array(pairs, dtype=int).reshape(-1, 2).T
     closed = np.linalg.inv(nominal[:, first]) @ nominal[:, second]
     passive = [i for i, f in enumerate(robot.frames) if f.passive and not f.compliant]
-    # Frames that machines share are computed once.
+    # The compliances of a frame that several machines contain are computed once.
     known: dict[int, tuple[NDArray, NDArray]] = {}
     for frame in (f for m in machines for f in m.robot.frames):
         if id(frame) not in known:
@@ -269,7 +271,7 @@ def _newton(parts: _SpringModel, q: NDArray) -> tuple[NDArray, float]:
 def _carried(
     machines: Sequence[Machine], parts: _SpringModel, ends: NDArray, closing: NDArray
 ) -> NDArray:
-    """Return wrenches through each body's end and through its joint, (2, k, n, 6)."""
+    """Return the wrenches at each body's end and in its joint, (2, k, n, 6)."""
     robot, (bodies, before) = parts.robot, ends
     carried = np.zeros((2, *before.shape[:2], 6))
     platform = robot.index(robot.platform)
@@ -281,7 +283,8 @@ def _carried(
     gravity = np.array([m.gravity for m in machines])
     if gravity.any():
         _add_weights(machines, gravity, bodies, carried)
-    for i in range(before.shape[1] - 1, -1, -1):  # parents come before their children
+    # Children are treated before their parents.
+    for i in range(before.shape[1] - 1, -1, -1):
         carried[0, :, i] += carried[1, :, i]
         if robot.parents[i] >= 0:
             carried[1, :, robot.parents[i]] += carried[0, :, i]
