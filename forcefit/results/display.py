@@ -5,7 +5,8 @@ To use them, a dataclass contains the line::
     __repr__, _repr_html_ = short_repr, html_table
 
 The values are taken from the method ``_figures`` of the object or, without such a
-method, from its abbreviated fields.  Consoles show the text, notebooks the HTML table.
+method, from its abbreviated fields.  Consoles show the text, and notebooks show the
+HTML table.
 """
 
 import html

@@ -100,7 +100,7 @@ def _weight_cost(
 
 
 def _solid_cost(posture: Posture, load: ArrayLike | None, solids: bool) -> Cost:
-    """Return the error of beam theory relative to solid finite elements."""
+    """Return the error of beam theory, compared with solid finite elements."""
     beams = [f for f in posture.robot.frames if isinstance(f.link, BeamLink)]
     if beams and not solids:
         raise _NotApplicable(_NOT_MESHED)

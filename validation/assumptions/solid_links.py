@@ -54,12 +54,12 @@ class SolidLink:
 
     @property
     def condensed(self) -> NDArray:
-        """K_E with rigid ends at the frame in its axes, (6, 6)."""
+        """Stiffness K_E for rigid ends, in frame axes, (6, 6)."""
         return self._in_frame(self.ends[6:, 6:])
 
     @property
     def spread(self) -> NDArray:
-        """K_E with distributed wrenches at the frame in its axes, (6, 6)."""
+        """Stiffness K_E for wrenches distributed over the ends, frame axes, (6, 6)."""
         return self._in_frame(self.distributing)
 
     def _in_frame(self, K: NDArray) -> NDArray:
@@ -127,7 +127,7 @@ def solid_links(robot: Robot) -> Mapping[str, SolidLink]:
 
 
 def _mesh_error(solved: MeshedLink) -> float:
-    """Return the estimated largest error [-] of the mesh's K_E."""
+    """Return the estimated largest relative error of the K_E of the mesh."""
     # The K_E of the mesh is the upper end of the error interval, and ``link.stiffness``
     # is the middle of the interval.
     K = solved.link.stiffness

@@ -103,7 +103,7 @@ def cost_between(
 
 
 def closure_cost(posture: Posture, load: ArrayLike | None = None) -> Cost:
-    """Return the error of linearised loop closures relative to finite motions.
+    """Return the error of linearised loop closures, compared with finite motions.
 
     Args:
         posture: the robot's configuration.
@@ -125,7 +125,7 @@ def link_cost(
     stiffness: Mapping[str, NDArray],
     load: ArrayLike | None = None,
 ) -> Cost:
-    """Return the error of beam theory relative to given link stiffnesses.
+    """Return the error of beam theory, compared with given link stiffnesses.
 
     Args:
         posture: the robot's configuration.
@@ -169,7 +169,7 @@ def spread_cost(
 
 
 def bush_cost(posture: Posture, load: ArrayLike | None = None) -> Cost:
-    """Return the error of the paper's bounds relative to pins in two bushes.
+    """Return the error of the paper's clearance bounds for pins in two bushes.
 
     Args:
         posture: the robot's configuration.

@@ -51,13 +51,13 @@ class Campaign:
         repeat: (R,) index of the combination of configuration and load, from 0. Rows
             with the same index are repeated measurements.
         session: (R,) name of the session of each row.  None without sessions.
-        motion_units: mapping from each covariate that is a measured motion to its unit,
-            ``rad`` or ``m``.
+        motion_units: unit (``rad`` or ``m``) of each covariate that is a measured
+            motion, by name.
         points: mapping from the name of each additional measured point to its position
             (3,) [m], platform axes.
         per_session: names of additional effects that may differ between sessions.
-        partial: mapping from each covariate that was recorded only in some sessions to
-            (R,) values, NaN in the other sessions.
+        partial: (R,) values of each covariate that was recorded only in some sessions,
+            by name; NaN in the other sessions.
         point: (R,) name of the measured point, ``""`` for the reference point.  None if
             only the reference point was measured.  If a row of the file contains
             several points, the campaign contains a row for each of them.

@@ -40,7 +40,7 @@ class Dialect:
         delimiter: character between two values.
         decimal: the decimal mark.
         units: mapping from each key of ``[units]`` to its unit.
-        motions: mapping from each covariate that is a measured motion to its unit.
+        motions: unit of each covariate that is a measured motion, by name.
     """
 
     delimiter: str
@@ -58,7 +58,7 @@ class Dialect:
 
     @property
     def motion_units(self) -> dict[str, str]:
-        """Mapping from each covariate that is a measured motion to its SI unit."""
+        """SI unit of each covariate that is a measured motion, by name."""
         return {n: "m" if u in _LENGTHS else "rad" for n, u in self.motions.items()}
 
 

@@ -161,7 +161,7 @@ class ClearanceMetric:
         return checks
 
     def table(self) -> dict[str, Any]:
-        """Return the results of this metric under their public keys."""
+        """Return the results of this comparison by JSON key."""
         return {
             "clearances": "on both sides; poses are not unique and not judged",
             "slope": None,

@@ -86,7 +86,7 @@ class Metric(Protocol):
         """Return one table row per scale."""
 
     def table(self) -> dict[str, Any]:
-        """Return the results of this metric under their public keys."""
+        """Return the results of this comparison by JSON key."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,7 +142,7 @@ class Crosscheck:
         return verdict(self) == PASSED
 
     def table(self) -> dict[str, Any]:
-        """Return all results of ``validation crosscheck`` under their public keys.
+        """Return all results of ``validation crosscheck`` by JSON key.
 
         Returns:
             Mapping in which ``scales`` contains the requested scales and

@@ -76,7 +76,7 @@ class Pair:
         return self.simulated.platform_screw - self.linear.platform_screw
 
     def table(self, robot: Robot) -> dict[str, Any]:
-        """Return both solutions and their differences in the public format."""
+        """Return both solutions and their differences as plain values."""
         linear, simulated = self.linear, self.simulated
         vjm = {
             "platform_screw": linear.platform_screw,

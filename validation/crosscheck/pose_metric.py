@@ -153,7 +153,7 @@ class PoseMetric:
         return slopes | limits | shares
 
     def table(self) -> dict[str, Any]:
-        """Return the results of this metric under their public keys."""
+        """Return the results of this comparison by JSON key."""
         return {
             "clearances": "left out on both sides",
             "slope": self.slope,

@@ -75,10 +75,11 @@ class StiffnessCheck:
 
     @cached_property
     def differences(self) -> dict[str, float]:
-        """Largest differences between entries, divided by sqrt(C_ii C_jj), by name.
+        """Largest differences between two compliances, for three pairs of methods.
 
-        ``exact`` compares the exact model with load steps, ``linearised`` the exact
-        model with the linearised simulation, and ``linear`` the linear model with the
+        Differences of entries are divided by sqrt(C_ii C_jj). ``exact`` compares the
+        exact model with the load-step method. ``linearised`` compares the exact model
+        with the linearised simulation. ``linear`` compares the linear model with the
         linearised simulation.
         """
         exact, linear = self.exact.compliance, self.linear.compliance

@@ -2,8 +2,8 @@
 
 An effect is supported if it satisfies three conditions. The change of the readings due
 to the effect exceeds the uncertainty of this change. Noise alone is unlikely to cause
-this change. No shape parameter is at a bound, and no other parameter is at its upper
-bound.
+this change. No nonlinear parameter, such as a time constant, is at a bound, and no
+other parameter is at its upper bound.
 """
 
 from dataclasses import dataclass

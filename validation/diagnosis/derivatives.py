@@ -19,7 +19,7 @@ from forcefit.validation.diagnosis.hypotheses import Slot
 from forcefit.validation.diagnosis.responses import Responses, responses
 from forcefit.validation.diagnosis.sensitivities import Sensitivities
 
-# Step of numerical derivatives, relative to the plausible size of the unknown.
+# Step of numerical derivatives, relative to a plausible value of the unknown.
 STEP = 1e-3
 
 
@@ -55,8 +55,8 @@ class Derivatives:
         """Return the readings (R, 6) [rad, m] of a machine with given effects.
 
         Args:
-            effects: mapping from the name of each effect to its parameters by public
-                name.
+            effects: parameters of each effect, as nested mappings from effect and
+                parameter names.
             finite: whether to compute finite motions with these effects.
 
         Returns:

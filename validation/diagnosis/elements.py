@@ -111,13 +111,13 @@ def effect_element(
     used = shown if shapes is not None else shown & ~shape
     slots = np.flatnonzero(used)
     plausible = np.array([h.slots[k].unknown.scale for k in slots])
-    # The prior standard deviation of a shape parameter is half its value.
+    # The prior standard deviation of a nonlinear parameter is half its start value.
     plausible = np.where(shape[slots], 0.5 * np.abs(begin[slots]), plausible)
     columns = signature.columns[:, slots] * plausible
     kinds = [_kind(robot, h, k) for k in slots.tolist()]
     norm = _norms(columns, kinds)
     norm = np.where(shape[slots], 1.0, norm)
-    # Shape parameters are fixed if the effect is linearised at its start values.
+    # Nonlinear parameters are fixed if the effect is linearised at its start values.
     held = np.where(shape & (shapes is None), 0.0, begin)
     offset = signature.offset + signature.columns @ held
     scale = plausible / norm

@@ -42,7 +42,7 @@ from forcefit.validation.diagnosis.whitening import whitening_of
 _STEPS = 20  # maximum number of Gauss-Newton steps
 _SLOPES = 6  # the derivatives are recomputed after this number of steps
 _SHORTEST = 1 / 64  # smallest fraction of a Gauss-Newton step
-# Decrease of F in one step below which the iteration ends.
+# The iteration ends if F decreases by less than this value in one step.
 _SETTLED = 1e-3
 # [sigma] Residual of a reading for which the model has no solution.
 _NO_ANSWER = 1e3
@@ -88,7 +88,7 @@ class MachineFit:
         return tuple(one for one in self.unknowns.effects if not one.device)
 
     def own(self, part: Acting) -> tuple[NDArray, NDArray, NDArray]:
-        """Return values (k,), covariance (k, k), derivatives (n, k) of one effect."""
+        """Return the values, covariance and derivatives of one effect's parameters."""
         own = self.unknowns.place(part)
         return self.x[own], self.covariance[own, own], self.slopes[:, own]
 

@@ -96,7 +96,7 @@ def beyond_by_row(robot: Robot, campaign: Campaign) -> NDArray:
 def _outside(
     robot: Robot, campaign: Campaign
 ) -> Iterator[tuple[str, NDArray, NDArray]]:
-    """Yield name, values (R,) and mask (R,) of each variable outside its range."""
+    """Yield the name, values and mask of outside rows of each variable, (R,) each."""
     variables = _variables(campaign)
     for name, (low, high) in robot.learned_range.items():
         values = variables.get(name, np.zeros(0))
@@ -110,7 +110,7 @@ def _outside(
 
 
 def _repeats(robot: Robot, name: str) -> bool:
-    """Return whether a robot's functions are periodic in a joint coordinate."""
+    """Return whether all functions of a joint coordinate are periodic in it."""
     turning = [f"q.{f.name}" for f in robot.frames if f.joint == "revolute"]
     return name in turning and all(
         _turns_over(function, name)
@@ -134,6 +134,6 @@ def _variables(campaign: Campaign) -> dict[str, NDArray]:
     }
     variables |= {f"load.{a}": w for a, w in zip(LOAD, campaign.loads.T, strict=True)}
     for name, values in campaign.covariates.items():
-        if name != "time":  # time restarts in each session
+        if name != "time":  # time starts at zero in each session
             variables["approach" if name == "approach" else f"cov.{name}"] = values
     return variables

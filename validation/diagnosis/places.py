@@ -36,8 +36,8 @@ class Weighted:
 
     Attributes:
         rows: (R,) rows that contain selected readings.
-        answers: (S, R, 6) changes of the readings, zero for readings that are not
-            selected.
+        answers: (S, R, 6) changes of the readings for S screw components, zero for
+            readings that are not selected.
         squares: (S, R) sums of squares of ``answers`` over each row.
         pair_products: (pairs, R) sums of products of ``answers`` for two components at
             one location.

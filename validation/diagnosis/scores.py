@@ -22,7 +22,7 @@ OF_NAME = 2  # largest number of tried candidates with the same name
 _VARIABLES = 4  # number of variables that are combined with other variables
 # Largest number of columns of a function at several locations, to limit memory.
 _WIDEST = 600
-# Number of halvings of the step of a shape parameter.
+# Number of times the step of a nonlinear parameter is halved in its optimisation.
 _HALVINGS = 6
 
 
@@ -158,7 +158,7 @@ class Scores:
         return [e for _, e in best]
 
     def sharper(self, e: Element, base: State) -> Element:
-        """Optimise the shape parameter of a function."""
+        """Optimise the nonlinear parameter of a function."""
         one = e.candidate
         if not len(one.shape.bends):
             return e

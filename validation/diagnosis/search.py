@@ -100,7 +100,7 @@ class Search:
         return kept
 
     def _without_nuisance(self, states: Sequence[State]) -> list[State]:
-        """Return models, and the same models with fewer nuisance parameters."""
+        """Return models, and variants of the models with fewer nuisance parameters."""
         less = [
             self.models.state(s.elements, mode, s)
             for s in states

@@ -3,7 +3,7 @@
 ======  ===============  =========  ==================================================
 symbol  code             shape      meaning
 ======  ===============  =========  ==================================================
-a       ``sensitivity``  (R, 6)     change of the reading per unit of a screw component
+a       ``sensitivity``  (R, 6)     change of the reading per unit screw component
 P       ``basis``        (R, p)     basis functions of a functional form
 T       ``mixed``        (p, q)     coefficients of the basis functions per unknown
 ======  ===============  =========  ==================================================

@@ -40,7 +40,8 @@ _LESS = 0.9
 _DECISIVE = 0.5
 # Smallest accepted ratio of the residuals without and with a reported correction.
 _NEEDED = 1.5
-# Largest standard deviation of corrected positions, relative to that of the readings.
+# Largest accepted standard deviation of the corrected positions, relative to the
+# standard deviation of the readings.
 _FAR = 10.0
 _NOISE = 3.0  # [sigma] residual below which the search for blunders ends
 _LEAST = 100.0  # smallest decrease of chi-square for each reported blunder

@@ -3,7 +3,7 @@
 ======  ============  ======  ========================================================
 symbol  code          shape   meaning
 ======  ============  ======  ========================================================
-z       ``residual``    (N,)    (measured - predicted reading) / sigma
+z       ``residual``  (N,)    (measured - predicted reading) / sigma
 A       ``columns``   (N, k)  derivatives of the model by the unknowns / sigma
 o       ``offset``    (N,)    change of the model / sigma if all unknowns are zero
 ======  ============  ======  ========================================================
@@ -107,7 +107,7 @@ def loaded_components(campaign: Campaign) -> list[str]:
 
 
 def whiten(campaign: Campaign, deviation: NDArray) -> NDArray:
-    """Return the measured values of an array over rows, divided by sigma, (N, ...)."""
+    """Select the measured values of an array (R, 6, ...), and divide them by sigma."""
     some = deviation[campaign.cells]
     return some / campaign.sigma[campaign.cells].reshape(-1, *[1] * (some.ndim - 1))
 

@@ -154,8 +154,8 @@ class State:
 def _at_bounds(e: Element, mean: NDArray) -> bool:
     """Return whether parameters of an effect are at a bound.
 
-    The result is true if all its parameters, or one of its shape parameters, are at
-    a bound.
+    The result is true if all parameters, or one nonlinear parameter such as a time
+    constant, are at a bound.
     """
     if not e.name or not e.columns.shape[1]:
         return False

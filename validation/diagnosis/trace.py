@@ -50,7 +50,8 @@ _SEARCHED = 2000
 # Maximum number of searches, each of which excludes further blunders.
 _TURNS = 6
 _BENDS = 1  # maximum number of updates of the second-order terms
-_GROSS = 30.0  # smallest rms of a gross blunder, relative to the median rms of all rows
+# Smallest rms residual of a row with a gross blunder, relative to the median row.
+_GROSS = 30.0
 # Required predictive gain of functions of time, in standard errors.
 _CLEARLY = 2.0
 # [sigma] Smallest relevant second-order change of a reading.

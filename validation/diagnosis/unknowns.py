@@ -27,10 +27,11 @@ from forcefit.validation.diagnosis.signatures import conditions_of
 
 # Prior standard deviation of an effect parameter, relative to a plausible value.
 _WIDE = 1e3
-# Largest change of a shape parameter, and its prior standard deviation, relative to the
-# value of the parameter.
+# Largest change of a nonlinear parameter of a function, and prior standard deviation of
+# this change, relative to the value of the parameter.
 _BEND = 0.5
-# Prior standard deviation of a fixed unknown, relative to a plausible value.
+# Prior standard deviation of an unknown that is held fixed, relative to a plausible
+# value.
 _HELD = 1e-12
 STEP = 1e-4  # step of numerical derivatives, relative to the parameter
 
@@ -160,7 +161,7 @@ class Unknowns:
         ]
 
     def place(self, part: Part) -> slice:
-        """Return the slice of an effect, function or other group of parameters in x."""
+        """Return the slice of x that contains the parameters of a part."""
         return next(own for one, own in self.places if one is part)
 
     @property
@@ -289,7 +290,7 @@ def _linear(conditions: Conditions) -> Conditions:
 
 
 def _resting_as(conditions: Conditions, held: Conditions) -> Conditions:
-    """Copy the rest positions of joints from other conditions."""
+    """Return conditions with the rest positions of joints of other conditions."""
     assert held.rest is not None
     rest = np.zeros_like(conditions.errors)
     for row, frame in enumerate(conditions.robot.frames):

@@ -152,7 +152,7 @@ def _factor(path: Path | str, name: str, column: str, robot: Robot) -> float:
 
 
 def _units(name: str, robot: Robot) -> Mapping[str, float] | None:
-    """Return the factor of each accepted unit, or None if every unit is accepted."""
+    """Return conversion factors of the accepted units; None if all are accepted."""
     lengths = UNITS["command_position"] | _INCHES
     if name in {"time", "cov.time"}:
         return UNITS["time"]

@@ -20,7 +20,8 @@ class Writing:
         commands_decimal: decimal mark of the table of commands.
         dates: ``"day_first"`` or ``"month_first"`` for dates with slashes; None if
             undeclared.
-        coverage: ratio of an uncertainty U or U95 to the standard deviation.
+        coverage: coverage factor, the ratio of an uncertainty U or U95 to the standard
+            deviation.
         orientation: order of three angles (:func:`.orientation.orders`); None if
             undeclared.
         angle_unit: unit of angles; None if the header contains it.

@@ -45,7 +45,7 @@ _TRIED = 4
 _BETTER = 1e-3  # smallest increase of the criterion for an exchange of rows
 _AVERAGE = 20  # number of random plans for comparison with the chosen plan
 _PACE = 60.0  # [s] assumed time to measure one row
-_SWING = 2400.0  # [s] assumed period of temperature changes
+_SWING = 2400.0  # [s] assumed period of the temperature oscillation
 _FEWEST = 8  # smallest number of rows of a plan
 
 

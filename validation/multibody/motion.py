@@ -85,7 +85,7 @@ def logarithm(T: NDArray) -> NDArray:
 
 
 def _mean_turn(angles: NDArray) -> NDArray:
-    """Return the mean (3, 3) of the rotations by t w over 0 < t < 1."""
+    """Return the mean (3, 3) of the rotation matrices of t w for 0 < t < 1."""
     a = float(np.linalg.norm(angles))
     x, y, z = angles
     W = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])

@@ -76,7 +76,7 @@ from forcefit.validation.multibody.open_robot import (
 LINKS = ("beam", "spring")
 # [s] Largest time of a simulation.
 TIME_LIMIT = 600.0
-_FINEST = 1e-10  # [m, rad, -] smallest tolerance of the last Newton increment
+_FINEST = 1e-10  # [m, rad, -] lower bound of the tolerance on the last Newton increment
 # Regularisations in the order in which they are tried. The second regularisation
 # prevents large rotations of a rod between two spherical joints about its axis.
 _TIGHT = (

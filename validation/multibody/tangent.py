@@ -37,8 +37,8 @@ _REGULARISATIONS = (
     Regularisation(1e8, 1e-8), Regularisation(1e8, 1e-6), Regularisation(1e10, 1e-6)
 )  # fmt: skip
 
-# Numbers of load steps that are tried if the equilibrium is unstable, because a large
-# step may pass a bifurcation.
+# Numbers of load steps that are tried if the equilibrium is unstable. A large load step
+# may lead to an unstable branch.
 _SMALLER_STEPS = (16, 64)
 
 
@@ -82,8 +82,8 @@ def simulated_tangent(
 
     Args:
         posture: the robot's configuration, with its geometric errors.
-        model: model of links and joints.  Clearances are smoothed contacts of 1e12 N/m,
-            with which no load steps are computed.
+        model: model of links and joints.  Clearances are modelled as smoothed contacts
+            of 1e12 N/m. With clearances, no load steps are computed.
         load: (6,) [N m, N] load on the platform at its origin, base axes.  The force
             has a constant direction, and the moment is a couple of such forces.
         gravity: (3,) [m/s^2] gravity in base axes.

@@ -120,7 +120,7 @@ def _drawn(maps: Any, first: Mapped) -> str:
     names = [str(d) for d in maps["energy"].dims if maps.sizes[d] > 1]
     if not names:
         return ""
-    # The map shows the two axes with the largest numbers of values.
+    # The map shows the two axes with the most values.
     axes = sorted(sorted(names, key=lambda n: -maps.sizes[n])[:2], key=names.index)
     at = {name: i for name, i in _largest(first).items() if name not in axes}
     held = {name: i for name, i in at.items() if name in names}

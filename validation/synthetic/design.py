@@ -222,7 +222,8 @@ def _commands(
 def _interleaved(design: CampaignDesign, rng: np.random.Generator) -> NDArray:
     """Return the configuration of each row.
 
-    Each pass visits all configurations in a new random order.
+    All configurations are measured in random order. The order changes at each
+    repetition.
     """
     passes = -(-design.rows // design.configurations)
     orders = [rng.permutation(design.configurations) for _ in range(passes)]

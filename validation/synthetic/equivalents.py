@@ -26,7 +26,7 @@ SAME = 10.0  # residual chi-square below which two sets of effects are equivalen
 # Assumed time constants of a drift, relative to the duration of the campaign.
 _DRIFTS = (0.1, 0.3, 1.0)
 _STEP = 1e-5  # [rad, m] step of a finite difference
-_GRAM = 1e-3  # [kg, kg m] step of a finite difference
+_GRAM = 1e-3  # [kg, kg m] step of finite differences for masses and first moments
 MOMENTS = ("moment.x", "moment.y", "moment.z")
 _SOFT = 1e9  # [N m/rad, N/m] stiffness of a spring added for a finite difference
 
