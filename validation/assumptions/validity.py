@@ -17,8 +17,8 @@ relative difference of the elastic energy.  It is significant if the energy diff
 more than 1 % or the position by more than 20 um, the required accuracy of the IRSBot-2.
 The error is unknown if neither model has deformations or platform motions.
 
-Poses are those of the minimum-energy solutions.  These poses are not unique if a joint
-with clearance is not loaded; see ``docs/validity.md``.
+The poses of the minimum-energy solutions are compared.  These poses are not unique if a
+joint with clearance is not loaded; see ``docs/validity.md``.
 """
 
 import math

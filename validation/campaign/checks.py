@@ -56,7 +56,7 @@ def check_commands(table: MeasurementTable, robot: Robot) -> None:
 
 
 def _check_covariates(table: MeasurementTable) -> None:
-    """Reject impossible values of temperature, time and side of approach."""
+    """Reject impossible values of temperature, time and direction of approach."""
     columns = table.columns
     if "cov.temperature" in columns:
         what = "the deviation from the temperature of calibration, in K"

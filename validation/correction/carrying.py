@@ -102,7 +102,7 @@ class CarriedRobot:
 
     @property
     def good(self) -> bool:
-        """Whether set-up rows suffice and predictions are better in all sessions."""
+        """Whether the set-up rows suffice and predictions improve in all sessions."""
         return all(one.suffices and one.better for one in self.sessions)
 
 

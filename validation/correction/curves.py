@@ -77,8 +77,9 @@ def curves_of(
 
     Args:
         robot: robot with its functions.
-        over: mapping from variable to its smallest and largest plotted value.  The
-            default is a full turn, the range of a spline's knots, or a typical range.
+        over: mapping from variable to its smallest and largest plotted value.  By
+            default, it is the range of the knots for splines, a full turn for angles,
+            and a typical range for other variables.
 
     Returns:
         One curve for each component of a function of one variable. Three curves for

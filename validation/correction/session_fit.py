@@ -79,7 +79,7 @@ class SetUp:
 
     @property
     def told(self) -> float:
-        """Prior variance of a reading divided by sigma^2, including repeats."""
+        """Variance of a reading divided by sigma^2, times the number of repeats."""
         left = self.campaign.robot.diagnosis.get("normalised")
         level = max(1.0, left) if isinstance(left, float) else 1.0
         return level**2 * self.repeated

@@ -1,10 +1,10 @@
 """Estimate noise that is common to the points of one measurement.
 
-A device may measure several points of the platform together. Their readings then share
-the repeatability error of the machine. This common noise is modelled as a small random
-platform motion in each measurement, with one standard deviation for rotations and one
-for translations. The two standard deviations maximise the evidence, which is the
-probability density of the readings with all other unknowns integrated out.
+A device may measure several points of the platform together. The repeatability error of
+the machine is then the same in these readings. This common noise is modelled as a small
+random platform motion in each measurement, with one standard deviation for rotations
+and one for translations. The two standard deviations maximise the evidence, which is
+the probability density of the readings with all other unknowns integrated out.
 """
 
 import math

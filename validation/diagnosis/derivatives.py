@@ -1,7 +1,7 @@
 """Compute the readings of a machine and their derivatives with respect to effects.
 
-The derivatives depend on the design of a campaign but not on its readings. All folds of
-a diagnosis therefore share them.
+The derivatives depend on the design of a campaign but not on its readings. The same
+derivatives are therefore used in all folds of a diagnosis.
 """
 
 from collections.abc import Mapping

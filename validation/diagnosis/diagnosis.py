@@ -116,7 +116,7 @@ class Diagnosis:
 
     @property
     def better(self) -> bool:
-        """Whether held-out errors are smaller than those of the declared machine."""
+        """Whether held-out errors are smaller than errors of the declared machine."""
         found = bool(len(self.fit.unknowns)) or bool(self.effects)
         return found and self.after.normalised < self.before.normalised
 

@@ -42,8 +42,8 @@ class Element:
             function.
         slots: (m,) index of each unknown in the parameters of ``what``.
         begin: parameters of ``what`` at d = 0.
-        first: the same element linearised at its start values. None if it is already
-            linearised there.
+        first: the linear model at the start values of the parameters. None if this is
+            the model at the start values.
     """
 
     name: str
@@ -62,7 +62,7 @@ class Element:
 
     @property
     def origin(self) -> "Element":
-        """The element linearised at its start values."""
+        """The linear model at the start values of the parameters."""
         return self.first or self
 
     @property
@@ -98,8 +98,8 @@ def effect_element(
         signature: derivatives of the effect.
         robot: robot on which the effect acts.
         log_prior: logarithm of the prior probability.
-        shapes: (k,) shape parameters at which the effect is linearised.  None for their
-            start values.
+        shapes: (k,) values of the nonlinear parameters at which the effect is
+            linearised. None for their start values.
 
     Returns:
         The linear model, without unknowns that do not affect the readings.
@@ -140,7 +140,7 @@ def effect_element(
 
 
 def _kind(robot: Robot, h: Hypothesis, slot: int) -> tuple[object, ...]:
-    """Return a key that is equal for unknowns of the same kind and unit."""
+    """Return a key that is equal for unknowns with the same unit."""
     name, unknown = h.slots[slot].names[0], h.slots[slot].unknown
     last = name.rpartition(".")[2]
     joints = [f.joint for f in robot.frames if name.startswith(f"{f.name}.")]

@@ -78,7 +78,7 @@ class MachineFit:
 
     @property
     def determined(self) -> NDArray:
-        """Relative reduction (k,) of the prior variances due to the readings."""
+        """Relative decrease (k,) of each variance from prior to posterior."""
         prior = self.unknowns.std**2
         return 1.0 - np.clip(np.diag(self.covariance) / prior, 0.0, 1.0)
 

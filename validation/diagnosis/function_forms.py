@@ -28,14 +28,15 @@ _ALL_DEPTHS = tuple(0.01 * 1.4**k for k in range(15))
 _TURNS = 0.5
 # Largest tested number of screw turns over the travel of a slide.
 _MOST_TURNS = 200.0
-_FINER = 1.2  # first factor on a shape parameter when it is refined
+_FINER = 1.2  # first factor by which a shape parameter is changed to refine it
 # Loads below this fraction of the largest load are treated as zero.
 _NO_LOAD = 1e-3
 _HIGH = 12  # highest harmonic that is tested without lower harmonics
 _CLOCKS = "time", "cov.time"
 # Number of tested times of a jump in the first search and in the refined search.
 _JUMPS, _MANY_JUMPS = 10, 91
-_INNER = np.linspace(0.1, 0.9, 9)  # quantiles of a variable used as shape parameters
+# Quantiles at which steps and changes of stiffness are tested.
+_INNER = np.linspace(0.1, 0.9, 9)
 
 
 @dataclass(frozen=True)

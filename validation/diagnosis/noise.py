@@ -17,7 +17,7 @@ from forcefit.results.text import readings_text
 
 _BLUNDERS = 2e-4  # prior probability of a blunder
 _WIDTH = 30.0  # standard deviation of a blunder, relative to tau
-_LEFT_OUT = 1e-12  # weight of a blunder, relative to that of a good reading
+_LEFT_OUT = 1e-12  # weight of a blunder, relative to the weight of a good reading
 # Smallest residual of a blunder before a model is fitted, relative to tau.
 _CLEAR = 10.0
 # Largest accepted fraction of blunders among the readings.

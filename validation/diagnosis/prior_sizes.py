@@ -57,7 +57,7 @@ class Sizes:
 
     @property
     def determined(self) -> NDArray:
-        """Relative reduction (k,) of the prior variances due to the readings."""
+        """Relative decrease (k,) of each variance from prior to posterior."""
         with np.errstate(divide="ignore", invalid="ignore"):
             share = 1 - np.diag(self.covariance) / self.std**2
         return np.where(self.std > 0, share, 0.0)

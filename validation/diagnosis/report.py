@@ -62,7 +62,7 @@ def report_page(
 ) -> str:
     """Return the report page as self-contained HTML.
 
-    The arguments are those of :func:`write_report`.
+    The arguments are the same as for :func:`write_report`.
     """
     campaign, answer = diagnosis.campaign, results.table(diagnosis, tally)
     body = [

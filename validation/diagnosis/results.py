@@ -19,7 +19,8 @@ from forcefit.validation.diagnosis.sequence import LEARNED
 
 # Verdicts for which effects are listed.
 LISTED = {statuses.EXPLAINED, statuses.AMBIGUOUS, statuses.LEARNED}
-_HARDLY = 0.05  # smallest sum of the determined fractions of a listed frame
+# Smallest number of parameters of a listed frame that the readings determine.
+_HARDLY = 0.05
 # Half width of the 90 % interval of a normal distribution, in standard deviations.
 _INTERVAL = 1.645
 _UNITS = {GEOMETRY: ("rad", "m"), SPRINGS: ("rad/(N m)", "m/N")}

@@ -55,7 +55,7 @@ def select(
     update: Update = lambda what, done, total: None,
     common: tuple[float, float] | None = None,
 ) -> Selected:  # fmt: skip
-    """Select the effects and functions that the declared model lacks.
+    """Select the effects and functions that are missing in the declared model.
 
     Args:
         columns: design matrices for all N readings.
@@ -242,7 +242,7 @@ def _best_first(states: Sequence[State]) -> list[State]:
 
 
 def _joined(one: State, other: State) -> State:
-    """Add the weight of a model to that of another model."""
+    """Add the weight of a model to the weight of another model."""
     return replace(one, score=float(np.logaddexp(one.score, other.score)))
 
 

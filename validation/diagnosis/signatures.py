@@ -137,7 +137,7 @@ class Tangents:
     def model(self, effects: Mapping[str, Values], *, finite: bool = False) -> NDArray:
         """Return the whitened readings (N,) of a machine with given effects.
 
-        The arguments are those of :meth:`.Derivatives.model`.
+        The arguments are the same as for :meth:`.Derivatives.model`.
         """
         return whiten(self.campaign, self.derivatives.model(effects, finite=finite))
 

@@ -154,7 +154,7 @@ def trace(
     campaign: Campaign, fitted: NDArray, declared: Declared, update: Update, *,
     odds: Mapping[str, float] = MappingProxyType({}),
 ) -> tuple[Traced, MachineFit]:  # fmt: skip
-    """Search for the effects and functions that a declared model lacks.
+    """Search for the effects and functions that are missing in a declared model.
 
     Args:
         campaign: campaign of R rows.

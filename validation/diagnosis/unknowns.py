@@ -161,7 +161,7 @@ class Unknowns:
         ]
 
     def place(self, part: Part) -> slice:
-        """Return the slice of x that contains the parameters of a part."""
+        """Return the slice of x that contains a group of parameters."""
         return next(own for one, own in self.places if one is part)
 
     @property

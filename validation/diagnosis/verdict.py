@@ -11,7 +11,7 @@ from forcefit.validation.diagnosis.columns import FUNCTION
 from forcefit.validation.diagnosis.selected import Selected
 
 CLAIM = 0.9  # probability above which an effect is claimed
-RIVAL = 0.5  # probability above which an unclaimed effect is a rival
+RIVAL = 0.5  # probability above which an effect that is not claimed is a rival effect
 _LISTED = 0.02  # probability above which an alternative set of effects is listed
 
 Sets = tuple[tuple[tuple[str, ...], float], ...]

@@ -167,7 +167,7 @@ class _HeadedRows:
         return Reading(file, line, names, position, sigma, time, rotation)
 
     def _spread(self, line: int, k: int, value: float) -> float:
-        """Return a standard deviation [m]; NaN if the file contains 0."""
+        """Return a standard deviation [m]. A value of 0 is converted to NaN."""
         if value < 0:
             name = self.values.header.cells[k]
             place = f"{self.values.sheet.file}: line {line}, {name}"

@@ -46,7 +46,7 @@ def read_plain_rows(
 
 
 def _nameless(cells: Sequence[str], decimal: str) -> bool:
-    """Return whether a row begins with a number or a missing number."""
+    """Return whether a row begins with a number or with a missing reading."""
     return missing(cells[0]) or bool(np.isfinite(parse_number(cells[0], decimal)))
 
 

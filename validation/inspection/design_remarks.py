@@ -239,5 +239,5 @@ def _on_covariates(campaign: Campaign) -> list[Remark]:
 
 
 def _in_both(configuration: NDArray, side: NDArray) -> int:
-    """Return the number of configurations approached from both sides."""
+    """Return the number of configurations approached from both directions."""
     return len(np.intersect1d(configuration[side > 0], configuration[side < 0]))

@@ -259,6 +259,6 @@ def _basis(blocks: Iterable[NDArray], rows: int) -> NDArray:
 
 
 def _interval(degrees: float) -> tuple[float, float]:
-    """Return the 90 % interval of a standard deviation, relative to its estimate."""
+    """Return the 90 % confidence interval of a standard deviation over its estimate."""
     low, high = chi2.ppf([0.05, 0.95], degrees)
     return float(np.sqrt(degrees / high)), float(np.sqrt(degrees / low))

@@ -3,7 +3,7 @@
 The truncation error of a central difference is proportional to the square of the step,
 and the round-off error is proportional to the inverse of the step.  Each pair of
 consecutive steps is extrapolated to zero step.  The result is the extrapolated value
-with the smallest difference from the preceding one.  This difference is the estimated
+with the smallest difference from the preceding value.  This difference is the estimated
 uncertainty.
 
 Sources:

@@ -158,7 +158,7 @@ def _before_step(
 
 
 def equilibrate(model: Model, start: float, steps: int) -> None:
-    """Run one stage of Exudyn's static solver from the last state.
+    """Run one stage of Exudyn's static solver, starting from the current state.
 
     Args:
         model: the assembled model.

@@ -9,7 +9,7 @@ from forcefit.validation.study.study import StudyResults
 
 
 def drawn_section(results: StudyResults) -> str:
-    """Return the statistics and the worst case of bodies within tolerance as HTML."""
+    """Return the statistics and the worst case of parts within tolerance as HTML."""
     found = results.statistics
     if found is None:
         return ""

@@ -58,7 +58,7 @@ def robot_section(results: StudyResults) -> str:
 
 
 def _error_body(results: StudyResults) -> ErrorBody | None:
-    """Return the body of possible platform translations, or None if unbounded."""
+    """Return the set of possible platform translations, or None if unbounded."""
     assert results.assembly is not None
     reach = reachable_screws(results.assembly, WORST)
     if reach.unbounded(3):
