@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 Kind = Literal["number", "integer", "string", "boolean"]
-# labels of the entries along dimensions that several quantities have
+# labels of the entries along each named dimension of arrays
 LABELS: dict[str, tuple[str, ...]] = {
     "screw": ("RX", "RY", "RZ", "TX", "TY", "TZ"),
     "wrench_component": ("MX", "MY", "MZ", "FX", "FY", "FZ"),

@@ -70,7 +70,7 @@ class Metric(Protocol):
 
     @property
     def slope(self) -> float:
-        """Slope of the pose difference over the scale; NaN if not compared."""
+        """Log-log slope of the pose difference over the scale; NaN if not compared."""
 
     @property
     def checks(self) -> dict[str, Check]:
@@ -120,7 +120,7 @@ class Crosscheck:
 
     @property
     def slope(self) -> float:
-        """Slope of the pose difference over the scale; NaN if not compared."""
+        """Log-log slope of the pose difference over the scale; NaN if not compared."""
         return self.metric.slope
 
     @property

@@ -40,8 +40,8 @@ from forcefit.validation.crosscheck.verdict import Check
 
 # Largest accepted deviation of the slope from 2.
 SLOPE_TOLERANCE = 0.1
-# [-] Largest accepted ratio of the pose differences from the exact and the linear
-# model, if links are springs.
+# [-] Largest accepted pose difference from the exact model if links are springs,
+# relative to the pose difference from the linear model.
 EXPLAINED_TOLERANCE = 0.02
 # [-] Relative first-order pose difference between K_E of a mesh and the simulated
 # solid, due to round-off.

@@ -104,7 +104,7 @@ class StiffnessCheck:
 
     @property
     def tolerance(self) -> float:
-        """Largest accepted difference of entries, divided by sqrt(C_ii C_jj)."""
+        """Largest accepted relative difference between entries of two compliances."""
         own = TOLERANCE[self.links]
         return max(own, CONTACT_TOLERANCE) if self.clearances else own
 

@@ -53,7 +53,7 @@ def supported(fit: MachineFit, one: Acting) -> bool:
 
 
 def _without_devices(fit: MachineFit, slopes: NDArray) -> NDArray:
-    """Return derivatives (n, k) with the effect of a moved measuring device removed."""
+    """Return derivatives (n, k) after projecting out motions of the device."""
     own = [fit.own(one)[2] for one in fit.unknowns.effects if one.device]
     if not own:
         return slopes

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from forcefit.validation.campaign.campaign import Campaign
 
-FEWEST = 8  # smallest number of configurations or time spans for a test
+FEWEST = 8  # smallest number of configurations or time spans for a held-out test
 # Smallest number of configurations for a single split.
 _SPLIT = 60
 # Held-out fraction of the blocks for few blocks, and for many blocks.

@@ -58,7 +58,7 @@ def orientation_repeatability(angles: ArrayLike) -> NDArray:
         angles: (n, 3) [rad] attained minus commanded angles, n >= 2.
 
     Returns:
-        Half of each range, (3,) [rad].
+        Half the width of the range of each angle, (3,) [rad].
     """
     return 3 * np.std(np.asarray(angles, dtype=float), axis=0, ddof=1)
 

@@ -224,7 +224,7 @@ def _base_compliance(machine: Machine, row: Row, given: Parameters) -> Machine:
 
 
 def wave(given: Parameters, name: str, angle: float) -> float:
-    """Return the displacement [rad or m] of a drive by a harmonic of an angle [rad]."""
+    """Return a drive displacement [rad or m] that is a harmonic of an angle [rad]."""
     return given[f"{name}.amplitude"] * math.sin(angle + given[f"{name}.phase"])
 
 
