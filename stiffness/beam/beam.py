@@ -6,7 +6,7 @@ symbol    meaning                                                 unit
 x y z     section axes: x along the beam, from base to tip, z up  -
 I_y I_z   second moments of area; I_y bends about y               m^4
 J         Saint-Venant's torsion constant                         m^4
-shear_*   shear factor of the area, for a force along y or z      1
+shear_*   shear area for a force along y or z, divided by area    1
 C         tip compliance, ``screw = C @ wrench``                  SI
 ========  ======================================================  =====
 """

@@ -32,12 +32,12 @@ from forcefit.stiffness.beam.sections import Section, declared_section
 # number of fibres around a round section, which limits the relative error of the peak
 # to 4e-5
 _AROUND = 360
-# number of fibres along a side, which limits the relative error of a parabolic peak to
-# 1e-3
+# number of fibres along each side of a rectangle, which limits the relative error of
+# the peak of a parabola to 1e-3
 _ACROSS = 33
 _CHUNK = 2048  # number of sections in a batch, whose stresses occupy 54 MB
-# number of sections of a beam with weight, which limits the relative error of a
-# parabolic peak to 1e-3
+# number of sections of a beam with weight, which limits the relative error of the peak
+# of a parabola to 1e-3
 _ALONG = 33
 _SHAPES = "radius and optionally inner_radius, or width, height and optionally wall"
 
@@ -218,7 +218,7 @@ def _round(section: Section, radius: float, hole: float) -> tuple[NDArray, NDArr
 def _rectangle(
     section: Section, width: float, height: float
 ) -> tuple[NDArray, NDArray]:
-    """Return the fibres on a grid over the section and their stresses."""
+    """Return a grid of fibres over a rectangle and their stresses under unit loads."""
     share = np.linspace(-0.5, 0.5, _ACROSS)
     y, z = (v.ravel() for v in np.meshgrid(width * share, height * share))
     influence = _bending(section, y, z)
@@ -234,7 +234,7 @@ def _rectangle(
 
 
 def _torsion(p: NDArray, q: NDArray, a: float, b: float) -> tuple[NDArray, NDArray]:
-    """Return the shear stresses along p and q for unit G theta [m]."""
+    """Return the torsional shear stresses along p and q, divided by G theta [m]."""
     along_p, along_q = np.zeros_like(p), 2 * p
     # The terms decrease as exp(-n pi (b - |q|) / 2a), and as 1 / n^2 on the short
     # sides.
@@ -251,7 +251,7 @@ def _torsion(p: NDArray, q: NDArray, a: float, b: float) -> tuple[NDArray, NDArr
 def _hollow(
     section: Section, width: float, height: float, wall: float
 ) -> tuple[NDArray, NDArray]:
-    """Return the fibres on the outer sides, counterclockwise, and their stresses."""
+    """Return the fibres on the outer sides and their stresses under unit loads."""
     share = np.linspace(-0.5, 0.5, _ACROSS)
     places, influences = [], []
     for turns in range(4):
@@ -265,9 +265,11 @@ def _hollow(
         influence = _bending(section, *where.T)
         b, h = across - wall, up - wall
         around = 2 * (b + h)
-        # Bredt's shear flow plus the torsional shear stress of an open wall at its face
+        # torsional shear stress by Bredt's formula, plus the torsional shear stress at
+        # the face of an open wall
         twist = 2 * b * h / around / section.J + wall / section.J
-        # V Q / (I b), where Q is that of the flange and of the wall beyond the point
+        # V Q / (I b), where Q is the first moment of the flange and of the wall beyond
+        # the point about the neutral axis
         inside = np.minimum(np.abs(up * share), up / 2 - wall)
         flange = across * (up**2 - (up - 2 * wall) ** 2) / 8
         Q = flange + wall * ((up / 2 - wall) ** 2 - inside**2)

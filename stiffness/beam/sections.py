@@ -143,8 +143,8 @@ def box_section(width: float, height: float, wall: float, nu: float) -> Section:
         nu: [-] Poisson's ratio.
 
     Returns:
-        The section. The torsion constant is that of a closed thin wall plus that of an
-        open thin wall. The shear factors are those of thin walls.
+        The section. The torsion constant is the sum of the constants of a closed and of
+        an open thin wall. The shear factors are valid for thin walls.
 
     Raises:
         BadInput: a dimension or Poisson's ratio is out of range.
@@ -195,7 +195,7 @@ def i_section(
         nu: [-] Poisson's ratio.
 
     Returns:
-        The section. The torsion constant is that of an open thin wall that is free to
+        The section. The torsion constant is valid for an open thin wall that is free to
         warp. For a shear force along y, the section consists of two rectangular
         flanges.
 

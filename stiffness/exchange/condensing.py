@@ -162,7 +162,7 @@ def interface_rows(
                 )
             unit = np.eye(3)[direction - 1]
             rows.append(row[node, direction])
-            # u = t + w x arm
+            # displacement t + w x arm for the screw (w, t)
             motions.append(np.concatenate([np.cross(place - point, unit), unit]))
     return np.array(rows), np.array(motions), point
 
@@ -223,7 +223,7 @@ def condensed(
                 f"{matrix.file}: the stiffness between the interfaces is singular; "
                 "expected a body that connects them"
             )
-    # computed from the strain energy, because its error is quadratic in the solution
-    # error
+    # K12 is computed from the strain energy, because the error of the energy is
+    # quadratic in the error of the displacements
     K12 = fields.T @ (K @ fields)
     return (K12 + K12.T) / 2, fields

@@ -58,8 +58,8 @@ def link_of_both_ends(
         The link. If the points are unknown, the tip is at the origin.
 
     Raises:
-        BadInput: K_E is not positive definite, or the matrix is not that of a free
-            body.
+        BadInput: K_E is not positive definite, or K12 is not the stiffness matrix of a
+            free body.
     """
     K12 = np.asarray(K12, dtype=float)
     K = K12[6:, 6:]

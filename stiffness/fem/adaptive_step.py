@@ -78,7 +78,7 @@ class Level:
     volume_error: float = 0.0
 
     def totals(self) -> tuple[NDArray, NDArray, NDArray]:
-        """Return stiffness, error indicator and geometry error, each (6, 6)."""
+        """Return the stiffness and the total errors of a mesh, each (6, 6)."""
         return (
             self.solution.stiffness,
             self.errors.sum(axis=0),
@@ -98,8 +98,8 @@ def solve_level(
     Args:
         solid: straight tetrahedra. Tetrahedra that would be inverted when curved, or
             that touch two singular edges, are bisected first.
-        materials: the first material is that of the whole link, except in the regions
-            of the others.
+        materials: materials of the link. The first material is used outside the regions
+            of the other materials.
         centers: (2, 3) [m] centres of the base and the tip interface.
         interface: kind of the interfaces, one of ``KINDS``.
         check: callback that is called with the number of unknowns before the solution.
@@ -127,8 +127,8 @@ def solve_level(
     indicated = error_matrices(
         mesh, solution.fields, lam, mu, singular, solution.stiffness
     )
-    # residual tractions are not used at singular edges, where they overestimate the
-    # error by a factor of 2
+    # residual surface tractions overestimate the error by a factor of 2 at singular
+    # edges, so they are not used there
     free = np.flatnonzero((mesh.patch > max(ENDS)) & ~singular[mesh.owner])
     residual = np.zeros_like(indicated)
     tractions = traction_errors(mesh, solution.fields, lam, mu, free)
@@ -158,7 +158,8 @@ def estimated_error(
     """Estimate the error of the stiffness on the finest mesh.
 
     Args:
-        history: result of :func:`totals` for each mesh, from coarse to fine.
+        history: stiffness, error indicator and geometry error of each mesh, from coarse
+            to fine, as returned by :func:`totals`.
 
     Returns:
         Estimate of K_h - K without the geometry error, (6, 6), and the largest
@@ -172,7 +173,8 @@ def estimated_error(
         effectivity = np.full(6, DEFAULT_EFFECTIVITY)
         np.divide(np.diag(coarse - K), drop, out=effectivity, where=drop > 0)
         factors = SAFETY_FACTOR * np.clip(effectivity, 1.0, 2 * DEFAULT_EFFECTIVITY)
-    # one index for each motion, because bending and torsion have different errors
+    # each tip motion has its own effectivity index, because bending and torsion have
+    # different errors
     root = np.sqrt(factors)
     estimate = np.outer(root, root) * indicated
     worst = int(np.argmax(np.diag(estimate) / np.diag(K)))
@@ -222,7 +224,7 @@ def refine_level(level: Level, growth: float) -> Solid:
 
     def halvings(limit: float) -> NDArray:
         # A bisection reduces the error of an element by at least a factor of 2^1.5. The
-        # error is proportional to h^4 to h^7.
+        # error of elements of size h is proportional to a power of h between 4 and 7.
         return np.clip(np.round(np.log2(shares) / 1.5 - limit), 0, 6).astype(int)
 
     low, high = -200.0, 200.0

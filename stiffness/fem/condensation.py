@@ -86,12 +86,12 @@ def rigid_motions(points: NDArray, center: NDArray) -> NDArray:
 
 
 def _product(upper: csr_array, fields: NDArray) -> NDArray:
-    """Multiply the matrix with this upper triangle by displacement fields."""
+    """Multiply a symmetric matrix, given by its upper triangle, by fields."""
     return upper @ fields + upper.T @ fields - upper.diagonal()[:, None] * fields
 
 
 def _rigid(mesh: Elements, upper: csr_array, tip_center: NDArray) -> Condensed:
-    """Solve for rigid interfaces."""
+    """Compute the stiffness of a link with two rigid interfaces."""
     fields = np.zeros((len(mesh.nodes), 3, 6))
     base = np.unique(mesh.faces[mesh.patch == 0])
     tip = np.unique(mesh.faces[mesh.patch == 1])
@@ -102,8 +102,8 @@ def _rigid(mesh: Elements, upper: csr_array, tip_center: NDArray) -> Condensed:
     flat = fields.reshape(-1, 6)
     loads = -_product(upper, flat)[free]
     flat[free] = solve(upper[free][:, free], loads)
-    # computed from the strain energy, because its error is quadratic in the solution
-    # error
+    # K is computed from the strain energy, because the error of the energy is quadratic
+    # in the error of the displacements
     K = flat.T @ _product(upper, flat)
     return Condensed((K + K.T) / 2, fields, int(free.sum()))
 
@@ -111,7 +111,7 @@ def _rigid(mesh: Elements, upper: csr_array, tip_center: NDArray) -> Condensed:
 def _distributing_tip(
     mesh: Elements, upper: csr_array, tip_center: NDArray
 ) -> Condensed:
-    """Solve for a rigid base and a distributing tip."""
+    """Compute the stiffness of a link with a rigid base and a distributing tip."""
     flat = _distributed_loads(mesh, 1, tip_center).reshape(-1, 6)
     free = np.ones(len(mesh.nodes), dtype=bool)
     free[np.unique(mesh.faces[mesh.patch == 0])] = False
@@ -120,7 +120,7 @@ def _distributing_tip(
 
 
 def _distributing_both(mesh: Elements, upper: csr_array, centers: NDArray) -> Condensed:
-    """Solve for two distributing interfaces."""
+    """Compute the stiffness of a link with two distributing interfaces."""
     base, tip = (_distributed_loads(mesh, k, centers[k]) for k in (0, 1))
     # unit wrenches at the tip and their reactions at the base
     to_base = screw_map(centers[0] - centers[1])

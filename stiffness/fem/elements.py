@@ -40,7 +40,7 @@ from forcefit.stiffness.mesh.solid import Solid
 ORDER = 3
 # derivatives of the barycentric coordinates with respect to the reference coordinates
 _COORDINATES = np.vstack([-np.ones(3), np.eye(3)])
-_CHUNK = 3_600_000  # element-matrix entries per batch, 30 MB
+_CHUNK = 3_600_000  # number of stiffness entries in a batch, which occupy 30 MB
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,8 +96,8 @@ def isoparametric(
     Args:
         solid: straight tetrahedra.
         order: order of the polynomials, 2 or 3.
-        parts: tetrahedra into which those of the solid are divided. If None, each
-            tetrahedron of the solid becomes an element.
+        parts: tetrahedra into which the tetrahedra of the solid are divided. If None,
+            each tetrahedron of the solid becomes an element.
 
     Returns:
         The elements.
@@ -170,7 +170,7 @@ def _chunks(members: NDArray, nodes: int) -> Iterator[NDArray]:
 def gradients_on_faces(
     mesh: Elements, faces: NDArray
 ) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-    """Return quadrature data for integrals of stresses over boundary faces.
+    """Return data for the integration of stresses over boundary faces.
 
     Args:
         mesh: the elements.
@@ -229,7 +229,7 @@ def node_gradients(
 
 
 def triangle_areas(mesh: Elements, faces: NDArray) -> tuple[NDArray, NDArray]:
-    """Return quadrature data for integrals over boundary faces.
+    """Return data for the integration over boundary faces.
 
     Args:
         mesh: the elements.
@@ -312,14 +312,15 @@ def _node_blocks(
     """Yield element indices, (c,), and stiffness blocks of node pairs, (c, 9, p)."""
     L, weights = quadrature(2 * (mesh.order - 1))
     _, dN = shape_functions(mesh.order, L)
-    # integrals of products of derivatives with respect to reference coordinates
+    # integrals of products of derivatives of the shape functions with respect to
+    # reference coordinates
     own = np.einsum("q,qpx,qpy->xyp", weights, dN[:, a], dN[:, b]).reshape(9, -1)
     for part in _chunks(np.flatnonzero(~mesh.curved), dN.shape[1]):
         corners = mesh.nodes[mesh.cells[part, :4]]
         J = (corners[:, 1:] - corners[:, :1]).swapaxes(1, 2)
         inverse, size = np.linalg.inv(J), np.abs(np.linalg.det(J))
-        # turn[c, i, j, x, y] is the factor of the derivatives with respect to reference
-        # coordinates x and y in G_ai G_bj
+        # G_ai G_bj is the sum over x and y of turn[c, i, j, x, y] dN_ax dN_by, where dN
+        # are derivatives with respect to reference coordinates
         turn = np.einsum("c,cxi,cyj->cijxy", size, inverse, inverse)
         yield part, _hooke(turn.reshape(-1, 3, 3, 9), lam[part], mu[part]) @ own
     for part, _, _, _, G, w in integration(mesh, mesh.curved):
@@ -331,7 +332,7 @@ def _node_blocks(
 
 
 def _hooke(S: NDArray, lam: NDArray, mu: NDArray) -> NDArray:
-    """Return lam S_ij + mu S_ji + mu d_ij S_kk, (c, 9, p)."""
+    """Return the stiffness blocks lam S_ij + mu S_ji + mu d_ij S_kk, (c, 9, p)."""
     m = mu[:, None, None, None]
     block = lam[:, None, None, None] * S + m * S.swapaxes(1, 2)
     block[:, range(3), range(3)] += m[:, 0] * np.trace(S, axis1=1, axis2=2)[:, None]

@@ -35,11 +35,12 @@ from forcefit.stiffness.surface.true_surface import TrueSurface
 VOIGT = np.array([[0, 0], [1, 1], [2, 2], [1, 2], [0, 2], [0, 1]])
 _SAME_MODULUS = 1e-6  # relative difference below which moduli are treated as equal
 _CHUNK = 1024  # number of faces in a batch
-# ratio of the error e_3 to the energy s_3 at a singular edge, calibrated on the links
-# in meshes/
+# At a singular edge, the error of a cubic element is this factor times the energy of
+# its quadratic stresses. The factor was calibrated on the links in meshes/.
 _SINGULAR_SHARE = 1.2
-# ratio of the error e_3 to the energy s_3 as a function of s_3 / s_2, for exponents b
-# from 0.1 to 40
+# Error of a cubic element divided by the energy of its quadratic stresses, as a
+# function of the energy ratio of quadratic to linear stresses. The table covers
+# exponents b from 0.1 to 40.
 _RATES = np.geomspace(40.0, 0.1, 400)
 _DECAY = (2**-_RATES - 3**-_RATES) / (1 - 2**-_RATES)
 _REMAINDER = np.minimum(3**-_RATES / (2**-_RATES - 3**-_RATES), 3.0)
@@ -232,7 +233,7 @@ def material_errors(
 
 
 def _energy_roots(G: NDArray, u: NDArray, lam: NDArray, mu: NDArray) -> NDArray:
-    """Return square roots of the parts of the energy density, (c, q, k, 7)."""
+    """Return seven numbers whose squares add up to the energy density, (c, q, k, 7)."""
     count, points, nodes, _ = G.shape
     cases = u.shape[3]
     slope = u.transpose(0, 3, 2, 1).reshape(count, 1, 3 * cases, nodes) @ G

@@ -52,7 +52,7 @@ from forcefit.stiffness.surface.surface import Surface, read_surface
 P = ParamSpec("P")
 R = TypeVar("R")
 _LOG = logging.getLogger("forcefit.finite_elements")
-_SETUP = 2.0  # [s] part of the solution time that does not depend on the mesh
+_SETUP = 2.0  # [s] solution time that does not depend on the mesh
 # fraction of the time limit that is available for the mesher
 _MESHER = 0.6
 
@@ -157,7 +157,7 @@ def mesh_link(
             STEP).
         base: clamped interface, or a text such as ``"z=0"`` [m], see
             :func:`forcefit.stiffness.surface.interface.parse_interface`.
-        tip: loaded interface, in the same form.
+        tip: loaded interface, given like ``base``.
         E: [Pa] Young's modulus, > 0.
         nu: [-] Poisson's ratio, in (-1, 0.5).
         density: [kg/m^3] density; 0 for a link without mass.
@@ -198,8 +198,9 @@ def solve_link(
         surface: surface of the link.
         base: clamped interface.
         tip: loaded interface.
-        materials: the first material is that of the whole link, except in the regions
-            of the others. In a STEP file, each solid may instead have its own material.
+        materials: materials of the link. The first material is used outside the regions
+            of the other materials. In a STEP file, each solid may instead have its own
+            material.
         options: options of the solution.
         point_masses: point masses, which affect the mass properties but not the
             stiffness.
@@ -265,8 +266,8 @@ def _refined(
 
     Args:
         first: first mesh.
-        materials: the first material is that of the whole link, except in the regions
-            of the others.
+        materials: materials of the link. The first material is used outside the regions
+            of the other materials.
         centers: (2, 3) [m] centres of the base and the tip interface.
         options: options of the solution.
         start: [s] time at which the computation started.
@@ -435,7 +436,7 @@ def _refuse_cost(
 def _wanted_growth(
     history: Sequence[tuple[NDArray, ...]], sizes: Sequence[int], excess: float
 ) -> float:
-    """Return the growth of the mesh that divides the error by ``excess``."""
+    """Return the factor on the element number that divides the error by ``excess``."""
     rate = 1.3  # convergence rate with respect to the number of elements
     if len(history) > 1:
         before, now = (np.max(np.diag(e) / np.diag(K)) for K, e, _ in history[-2:])
@@ -447,7 +448,7 @@ def _wanted_growth(
 def _affordable_mesh(
     level: Level, growth: float, budget: Budget, start: float, pace: float = 1.0
 ) -> Solid | None:
-    """Refine the mesh by the wanted growth or as far as the budget permits."""
+    """Refine the mesh as far as the accuracy requires and the budget permits."""
     part = growth**0.55 - 1  # fraction of elements to bisect, without neighbours
     solid = refine_level(level, 1 + part)
     added = len(solid.cells) / len(level.solid.cells) - 1

@@ -51,8 +51,8 @@ def material_of_elements(
 
     Args:
         mesh: the elements.
-        materials: the first material is that of the whole link, except in the regions
-            of the others.
+        materials: materials of the link. The first material is used outside the regions
+            of the other materials.
         cut_region: (t,) number of the region of each element, for regions at whose
             faces elements were split; None if no elements were split.
 
@@ -60,7 +60,7 @@ def material_of_elements(
         (t, 3) lambda [Pa], mu [Pa] and density [kg/m^3] of each element.
 
     Raises:
-        BadInput: no material is given, or the first has a smaller region.
+        BadInput: no material is given, or the first material is limited to a region.
     """
     check_materials(materials)
     centers = mesh.nodes[mesh.cells[:, :4]].mean(axis=1)
@@ -79,8 +79,8 @@ def material_at(points: NDArray, materials: Sequence[Material]) -> NDArray:
 
     Args:
         points: (n, 3) [m] points.
-        materials: the first material is that of the whole link, except in the regions
-            of the others.
+        materials: materials of the link. The first material is used outside the regions
+            of the other materials.
 
     Returns:
         (n, 3) lambda [Pa], mu [Pa] and density [kg/m^3] at each point.
@@ -97,8 +97,8 @@ def regions_of(materials: Sequence[Material]) -> tuple[Region, ...]:
     """Return the regions of all materials after the first.
 
     Args:
-        materials: the first material is that of the whole link, except in the regions
-            of the others.
+        materials: materials of the link. The first material is used outside the regions
+            of the other materials.
 
     Returns:
         The regions. In an overlap, the last region is used.

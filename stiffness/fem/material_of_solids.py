@@ -23,8 +23,8 @@ def placed_materials(
 
     Args:
         surface: surface of the link.
-        materials: either the first material is that of the whole link, or each solid
-            has a material.
+        materials: materials of the link. Either the first material is not assigned to a
+            solid and is used for the whole link, or each solid has a material.
 
     Returns:
         The materials with regions in place of the names of solids.

@@ -25,9 +25,9 @@ def mesh_report(solid: Solid, mesh: Elements) -> dict[str, Any]:
         ``area`` [m^2]; ``closed``, True if every boundary edge belongs to two faces;
         ``worst_quality`` and ``mean_quality``; ``smallest_angle`` and ``largest_angle``
         [rad] between two faces of a tetrahedron; ``flat_elements``, the number of
-        tetrahedra with a quality below 0.01; and ``drawn_out``, True for a bar of long
-        elements. Quality and angles are those of the straight tetrahedra, without the
-        thin layers along singular edges.
+        tetrahedra with a quality below 0.01; and ``drawn_out``, True for an extruded
+        mesh of a bar, which has long elements. Quality and angles refer to the straight
+        tetrahedra before thin layers are added along singular edges.
     """
     quality, angles = element_quality(solid), dihedral_angles(solid)
     edges = np.sort(directed_edges(solid.faces), axis=1)

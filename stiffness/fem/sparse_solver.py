@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_array, csr_array, csr_matrix, triu
 from scipy.sparse.linalg import splu
 
-# Parameters iparm of PARDISO. Three of them differ from the defaults: 8, no iterative
-# refinement; 24, two-level factorisation, which saves an eighth of the time; and 37,
-# rows with nearly the same nonzero columns form a block, which halves the time of the
+# Parameters iparm of PARDISO. Parameter 8 disables iterative refinement. Parameter 24
+# selects two-level factorisation, which saves an eighth of the time. Parameter 37 forms
+# blocks of rows with nearly the same nonzero columns, which halves the time of the
 # analysis.
 _SETTINGS = {1: 1, 2: 2, 8: 0, 10: 8, 18: -1, 24: 1, 37: -90}
 

@@ -82,7 +82,7 @@ class StressInfluence:
 
     @property
     def region(self) -> str:
-        """Description of the region of the nodes."""
+        """Description of the region in which stresses were evaluated."""
         words = (
             f"{len(self.places)} nodes at least {self.away:.4g} m away from both "
             "interfaces, whose clamped edges are singular"
@@ -235,7 +235,7 @@ def peak_stress(
     whole, _ = peak_beam_stress(section, length, in_beam, weight)
     near_tip = in_beam.copy()
     near_tip[:3] += np.cross([field.away, 0, 0], in_beam[3:])
-    # weight of the beam within the excluded distance from the tip
+    # add the weight of the beam between the tip and the evaluated region
     beyond = weight * field.away / length
     near_tip[:3] += np.cross([field.away / 2, 0, 0], beyond)
     near_tip[3:] += beyond
@@ -277,7 +277,7 @@ def stress_influence(solved: MeshedLink, away: float | None = None) -> StressInf
     distance = max(radii) if away is None else away
     clamped = np.unique(mesh.faces[mesh.patch <= 1])
     gap = cKDTree(mesh.nodes[clamped]).query(mesh.nodes[node])[0]
-    far = gap >= distance * (1 - 1e-9)  # a node at exactly this distance is included
+    far = gap >= distance * (1 - 1e-9)  # a node at this distance is included
     if not far.any():
         raise BadInput(
             f"stress: found no node at a distance of {distance:.4g} m from the "
@@ -306,7 +306,7 @@ def _peaks_on_facets(field: StressInfluence, wrench: NDArray) -> bool:
 
 
 def _motions(level: Level) -> NDArray:
-    """Return the factors of the displacement fields for each unit load, (k, k)."""
+    """Return the coefficients of the displacement fields for unit loads, (k, k)."""
     # the stiffness on this mesh is used, so that the stresses balance the wrench
     motions = np.eye(level.solution.fields.shape[2])
     motions[:6, :6] = inverted(level.solution.stiffness)

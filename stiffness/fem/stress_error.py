@@ -3,9 +3,9 @@ r"""Estimated error of the peak stress in a meshed link.
 The stress at a node is the mean of the stresses in the adjacent elements. The estimated
 error is the root mean square of the largest deviations from this mean, times a safety
 factor. It is computed at the nodes of the elements around the peak and at all nodes
-with nearly the same stress. Nodes where the mesh deviates from the surface of the part
-are excluded. If the stress at an excluded node is larger than the peak, the difference
-is added to the error. At a singularity, the error is infinite.
+whose stress is nearly equal to the peak. Nodes where the mesh deviates from the surface
+of the part are excluded. If the stress at an excluded node is larger than the peak, the
+difference is added to the error. At a singularity, the error is infinite.
 
 Sources:
     Zienkiewicz & Zhu (1987), A simple error estimator, for the comparison of element
@@ -26,15 +26,16 @@ from forcefit.stiffness.surface.facets import Facets
 if TYPE_CHECKING:
     from forcefit.stiffness.fem.adaptive_step import Level
 
-# largest ratio of the error of a peak stress to the deviations around the peak, for
-# nine shouldered bars in tension, torsion and bending; the median is 0.3
+# Largest ratio of the error of a peak stress to the deviations of element stresses from
+# their mean at the peak. It was computed for nine shouldered bars in tension, torsion
+# and bending. The median is 0.3.
 SAFETY_FACTOR = 1.6
 # cosine of the largest angle between the normals at a smooth edge
 _SMOOTH = np.cos(np.radians(5.0))
 # largest accepted distance of a node from the exact shape, relative to the face size;
 # for cubic faces on a fillet, the ratio is 1e-4
 _OFF = 5e-3
-ZONE = 0.9  # fraction of the peak above which a stress is nearly the same
+ZONE = 0.9  # fraction of the peak above which a stress is nearly equal to it
 
 
 def von_mises(stress: ArrayLike) -> NDArray:
@@ -112,7 +113,7 @@ def estimated_error(
         level: a solved mesh. Its nodes are numbered by :func:`nodes_by_material`.
         motion: (6,) [rad, m] screw of the tip.
         node: number of the node with the peak.
-        zone: (n,) bool, True for nodes with nearly the same stress.
+        zone: (n,) bool, True for nodes whose stress is nearly equal to the peak.
         left_out: (n,) bool, True for nodes where the mesh deviates from the surface.
 
     Returns:
@@ -127,7 +128,7 @@ def estimated_error(
 
 
 def _means_and_deviations(level: "Level", motion: NDArray) -> tuple[NDArray, NDArray]:
-    """Compute nodal stresses, (n, 6) [Pa], and the largest deviations, (n,) [Pa]."""
+    """Compute mean nodal stresses, (n, 6) [Pa], and largest deviations, (n,) [Pa]."""
     cells, nodes = nodes_by_material(level)
     count = len(nodes)
     total, largest = np.zeros((count, 6)), np.zeros(count)
@@ -162,7 +163,7 @@ def on_inner_edges(level: "Level") -> NDArray:
 
 
 def _meet_at_an_angle(level: "Level", edges: NDArray) -> NDArray:
-    """Return whether the adjacent shapes form a sharp edge, (e,)."""
+    """Return whether the two shapes at each edge form a sharp edge, (e,)."""
     solid = level.solid
     count = np.int64(len(solid.points))
     pairs = np.sort(solid.faces[:, [[0, 1], [1, 2], [0, 2]]], axis=2)

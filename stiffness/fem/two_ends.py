@@ -1,9 +1,9 @@
 """Stiffness and mass matrix of a meshed link with two moving ends.
 
 Both ends are rigid, and the solid between them deforms statically (Guyan reduction).
-The mass matrix is exact for rigid motions, and in bending as accurate as that of a
-cubic beam element. Because a rigid motion causes no deformation, the displacements due
-to a motion of the base follow from those due to a motion of the tip.
+The mass matrix is exact for rigid motions. In bending, it is as accurate as the mass
+matrix of a cubic beam element. Because a rigid motion causes no deformation, the
+displacements due to a motion of the base follow from those due to a motion of the tip.
 """
 
 from dataclasses import dataclass

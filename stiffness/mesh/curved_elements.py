@@ -3,8 +3,8 @@
 The nodes of a straight element form a regular lattice. First, the nodes on boundary
 edges are moved onto the shapes of their patches. The nodes on the adjacent faces are
 moved with them. The nodes on boundary faces are then moved onto the shapes. Cubic edges
-and faces interpolate the shapes at points where the mean of the interpolation error is
-zero, so the volume error decreases with the sixth power of the element size.
+and faces interpolate the shapes at points that make the mean interpolation error zero.
+The volume error is therefore proportional to the sixth power of the element size.
 """
 
 from collections.abc import Callable
@@ -172,12 +172,12 @@ def _cubic_edges(
 
 
 def _face_nodes_by_edges(moved: NDArray) -> NDArray:
-    """Return displacements of face nodes due to those of edge nodes, (t, 4, 3) [m]."""
+    """Return displacements of face nodes caused by edge nodes, (t, 4, 3) [m]."""
     # The displacement due to an edge is L_a L_b (c_0 + c_1 (L_b - L_a)), which is c_0 /
     # 9 in the middle of an adjacent face.
     carried = np.zeros((len(moved), 4, 3))
-    # L_a L_b is 2 / 9 at the nodes of an edge, so c_0 is their mean displacement times
-    # 9 / 2
+    # L_a L_b is 2 / 9 at the nodes of an edge, so c_0 is the mean displacement of these
+    # nodes times 9 / 2
     mean = moved[:, 4:16].reshape(-1, 6, 2, 3).mean(axis=2)
     for f, face in enumerate(FACES):
         around = [np.isin(edge, face).all() for edge in EDGES]

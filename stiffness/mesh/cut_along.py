@@ -42,7 +42,7 @@ def cut_along(solid: Solid, outline: SmoothOutline) -> Solid:
 
 
 def _members(solid: Solid, outline: SmoothOutline) -> NDArray:
-    """Return whether each boundary triangle is on a patch at the outline, (f,)."""
+    """Return which boundary triangles are on a patch next to the outline, (f,)."""
     return np.isin(solid.patch, outline.patches)
 
 
@@ -76,7 +76,7 @@ def _corners_on(solid: Solid, outline: SmoothOutline) -> NDArray:
 def _crossing_edges(
     solid: Solid, outline: SmoothOutline, on: NDArray, ends: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Return which edges cross the outline, (e,), and at which fraction."""
+    """Return which edges cross the outline, and at which fraction, both (e,)."""
     pairs = _boundary_edges(solid, outline)
     index = np.searchsorted(edge_code(ends, len(on)), edge_code(pairs, len(on)))
     start, end = solid.points[pairs].swapaxes(0, 1)
@@ -99,7 +99,7 @@ def _sides(solid: Solid, outline: SmoothOutline, on: NDArray) -> NDArray:
     near = np.flatnonzero(_members(solid, outline) & on[solid.faces].any(axis=1))
     corners = solid.points[solid.faces[near]]
     away = outline.outside(corners.reshape(-1, 3)).reshape(-1, 3)
-    # corners on the outline are not on either side
+    # corners on the outline are on neither side of the outline
     mean = np.where(on[solid.faces[near]], 0.0, away).sum(axis=1)
     mean = np.where(on[solid.faces[near]].all(axis=1), away.sum(axis=1), mean)
     patch[near] = np.where(mean > 0, outline.patches[1], outline.patches[0])

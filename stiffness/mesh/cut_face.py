@@ -118,14 +118,14 @@ def cut(solid: Solid, face: CutFace) -> Solid:
 
 
 def without_chords(solid: Solid) -> Solid:
-    """Split edges that are chords of a curved face.
+    """Split edges inside the solid that have both ends on a curved face.
 
     Args:
         solid: straight tetrahedra.
 
     Returns:
-        The solid without chords, of which both ends but no inner points are on the
-        face. A tetrahedron with two faces on a curved face would become flat.
+        The solid without such edges. Otherwise, a tetrahedron with two faces on the
+        curved face would become flat.
     """
     for number in np.unique(solid.inner_patch):
         if isinstance(solid.shapes[number], Plane):
@@ -171,7 +171,7 @@ def _resolved(solid: Solid, face: CutFace) -> Solid:
 def _crossing(
     solid: Solid, face: CutFace, on: NDArray, ends: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Return which edges cross the face, (e,), and at which fraction."""
+    """Return which edges cross the face, and at which fraction, both (e,)."""
     value = np.where(on, 0.0, face.shape.signed(solid.points)[0])
     low, high = value[ends].T
     across = low * high < 0
@@ -242,7 +242,7 @@ def _onto(solid: Solid, face: CutFace) -> tuple[Solid, NDArray]:
         np.maximum.at(longest, ends[:, k], length)
     near = height < reach
     near[near] = face.is_near(solid.points[near], longest[near])
-    # corners slightly beyond the border are moved too
+    # corners slightly beyond the border of the face are moved too
     near |= height < ON_FACE * size
     target, on = _targets(solid, face.shape, near, reach, ON_FACE * size)
     already, before = on & (height < ON_FACE * size), solid.volumes()

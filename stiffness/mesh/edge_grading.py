@@ -34,13 +34,14 @@ LAYER_SHARE = 0.25
 _PASSES = 100
 # cosine of the smallest angle by which a re-entrant edge exceeds 180 degrees
 _REENTRANT = np.cos(np.radians(35.0))
-# divided edges of a tetrahedron with one or two singular corners, which come first
+# edges that are divided in a tetrahedron with one or two corners on singular edges,
+# which have the lowest corner numbers
 _CUT_EDGES = {1: [[0, 1], [0, 2], [0, 3]], 2: [[0, 2], [0, 3], [1, 2], [1, 3]]}
 # A divided tetrahedron consists of a small tetrahedron and a prism, or of two prisms.
 # Corners have the numbers 0 to 3, and the points on divided edges have the next
 # numbers. Each prism consists of three tetrahedra. The diagonal of each side starts at
-# the smallest number, so that neighbours have the same diagonal (Dompierre et al.
-# 1999).
+# the point with the smallest number, so that neighbours have the same diagonal
+# (Dompierre et al. 1999).
 _PARTS = {
     1: np.array([[0, 4, 5, 6], [1, 3, 2, 6], [1, 6, 2, 5], [1, 6, 5, 4]]),
     2: np.array([
@@ -90,7 +91,8 @@ def singular_edges(solid: Solid, held: tuple[int, ...]) -> NDArray:
     code = edge_code(pairs, count).ravel()
     order = np.argsort(code, kind="stable")
     code, owner = code[order], order // 3
-    # an edge at which two bodies touch has four faces, which can be paired in any order
+    # an edge that is common to two bodies has four faces, which can be paired in any
+    # order
     code, left, right = code[::2], owner[::2], owner[1::2]
     border = solid.patch[left] != solid.patch[right]
     clamped = np.isin(solid.patch[left], held) | np.isin(solid.patch[right], held)
@@ -144,7 +146,7 @@ def split_joining_edges(
         ends, of_cell = edges_of(solid.cells, count)
         joining = touched[ends].all(axis=1)
         rank = length_ranks(solid.points, ends)
-        # of three singular edges that form a triangle, the longest edge is split too
+        # if three singular edges form a triangle, the longest edge is split too
         triangle = joining[of_cell].sum(axis=1) > 2
         longest = np.where(joining, rank, -1)[of_cell].argmax(axis=1)
         longest = of_cell[np.arange(len(of_cell)), longest]
@@ -156,7 +158,7 @@ def split_joining_edges(
                 return solid
             solid, settled = moved_onto_shapes(solid), True
             continue
-        # an edge is split first if it is the longest such edge in all adjacent
+        # an edge is split first if it is the longest edge to split in all adjacent
         # tetrahedra
         rank[~joining] = -1
         highest = rank[of_cell].max(axis=1)
@@ -193,7 +195,7 @@ def layered(
     while (several := touched[parts.corners].sum(axis=1) > 2).any():
         touched[parts.corners[several]] = False
     on = touched[parts.corners]
-    # singular corners come first
+    # corners on singular edges come first
     order = np.argsort(~on, axis=1, kind="stable")
     corners = np.take_along_axis(parts.corners, order, axis=1)
     places = np.take_along_axis(parts.places, order[:, :, None], axis=1)

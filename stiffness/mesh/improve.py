@@ -31,7 +31,7 @@ from forcefit.stiffness.surface.primitives import project
 # quality below which a tetrahedron is improved
 POOR = 0.08
 _ROUNDS = 4
-# number of steps in the search for the position of a corner
+# maximum number of steps in the search for the best position of a corner
 _STEPS = 10
 _DIRECTIONS = np.array([d for d in product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
 

@@ -127,7 +127,8 @@ def face_nodes(degree: int) -> NDArray:
         degree: degree of the polynomials.
 
     Returns:
-        (4, k) indices of the nodes on each of ``FACES``, in the order of a triangle.
+        (4, k) indices of the nodes on each of ``FACES``, in the order of the lattice
+        points of a triangle.
     """
     whole = [tuple(point) for point in lattice(degree)]
     rows = []

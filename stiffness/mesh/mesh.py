@@ -57,10 +57,11 @@ def mesh_solid(
         surface: surface of the link.
         base: clamped interface.
         tip: loaded interface.
-        edge: [m] requested edge length. The default is a twentieth of the diagonal.
+        edge: [m] requested edge length. The default is a twentieth of the diagonal of
+            the bounding box.
         envelope: [-] largest deviation of the mesh from the simplified surface, divided
-            by the diagonal. The simplified surface may deviate from the given surface
-            by the same amount.
+            by the diagonal of the bounding box. The simplified surface may deviate from
+            the given surface by the same amount.
         time_limit: [s] time limit of the mesher.
         cache: folder in which meshes are stored. The default is the user's cache
             folder.

@@ -20,7 +20,7 @@ class _Rule(NamedTuple):
 
     Attributes:
         degree: largest degree of polynomials that are integrated exactly.
-        points: letters of each point.
+        points: letters of each group of points, such as ``aab``.
         coordinates: values of the letters a, b, c, in this order.
         weights: weight of each group of points with the same letters.
     """

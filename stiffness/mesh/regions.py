@@ -24,8 +24,8 @@ from forcefit.stiffness.mesh.refine import edge_code
 from forcefit.stiffness.mesh.solid import Solid
 
 _POOR = 0.2  # smallest quality of a tetrahedron that can follow a curved face
-# fraction of the volume of a connected part in a region above which the whole part is
-# assigned to the region
+# A connected part of the mesh is assigned to a region if the region contains more than
+# this fraction of its volume.
 _AGREED = 0.9
 
 

@@ -33,7 +33,8 @@ class Solid:
             :mod:`forcefit.stiffness.surface.smooth_outline`.
         surface: exact surface of the part; None if it is not needed.
         inner: (k, 3) corners of triangles between regions inside the link.
-        inner_patch: (k,) index in ``shapes`` of each inner triangle.
+        inner_patch: (k,) index in ``shapes`` of the shape on which each inner triangle
+            is.
         region: (t,) number of the region of each tetrahedron, see
             :mod:`forcefit.stiffness.mesh.regions`; None if no elements were split.
     """
@@ -68,8 +69,8 @@ def meeting_shapes(
         points: (n, 3) [m] positions of the corners.
 
     Returns:
-        The shapes. For two tangent patches, the wall through their common line replaces
-        one of them.
+        The shapes. For two tangent patches, one of the shapes is replaced by the wall
+        through their common line.
     """
     return _meeting_shapes(key, solid.shapes, solid.walls, points) if key else ()
 
@@ -96,7 +97,7 @@ def _meeting_shapes(
     points: NDArray,
 ) -> tuple[Shape, ...]:
     """Return the shapes that intersect in the common points of several patches."""
-    # the common line of tangent shapes is poorly determined, so one of them is replaced
+    # the common line of tangent shapes is poorly determined, so one shape is replaced
     # by the wall
     standing = {pair: wall for pair, wall in walls.items() if set(pair) <= set(key)}
     replaced = {other for _, other in standing}

@@ -1,10 +1,10 @@
 """Tetrahedral meshes of straight bars by extrusion of their sections.
 
 A triangulated section is extruded along z in layers. Layers are thin at the clamped
-ends and thicker in between, where the displacements are those of a beam. In each layer,
-the prism over a triangle is divided into three tetrahedra. The diagonal of each side
-starts at the smallest corner number, so that neighbours have the same diagonal
-(Dompierre et al. 1999). There is one element across a wall.
+ends and thicker in between, where the displacements agree with beam theory. In each
+layer, the prism over a triangle is divided into three tetrahedra. The diagonal of each
+side starts at the corner with the smallest number, so that neighbours have the same
+diagonal (Dompierre et al. 1999). Each wall has one element across its thickness.
 """
 
 import math
@@ -71,7 +71,7 @@ def _thinnest(section: Mapping[str, float]) -> float:
 
 
 def _heights(first: float, longest: float) -> NDArray:
-    """Return the heights of the borders of layers, from 0 to 1."""
+    """Return the heights of the borders between layers, from 0 to 1."""
     steps = [min(first, 0.25)]
     while sum(steps) < 0.5:
         steps.append(min(_GROWTH * steps[-1], longest))

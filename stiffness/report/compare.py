@@ -33,8 +33,8 @@ class LinkComparison:
     Attributes:
         beam: link by beam theory.
         fea: link by finite elements, with the same tip and the same axes.
-        difference: (6, 6) [1] stiffness of ``fea`` minus that of ``beam``, divided by
-            sqrt(K_ii K_jj) of the beam.
+        difference: (6, 6) [1] stiffness of ``fea`` minus stiffness of ``beam``, divided
+            by sqrt(K_ii K_jj) of the beam.
         length: [m] length of the beam.
         size: [m] section size: twice the radius of gyration, which is the radius of a
             solid round bar.
@@ -74,8 +74,8 @@ class LinkComparison:
             for angle in _TURNS
         }
         noise = 2 * self.fea.relative_error_estimate
-        # of several rotations with equal differences within mesh error and round-off,
-        # the smallest is reported
+        # if the differences of several rotations are equal within mesh error and
+        # round-off, the smallest rotation is reported
         least = min(remaining.values()) + noise + 1e-9 * worst
         best = min(angle for angle in remaining if remaining[angle] <= least)
         better = remaining[best] < _MUCH_BETTER * worst and worst > noise

@@ -1,10 +1,11 @@
 """Smooth surfaces through triangles, for patches of unknown shape.
 
 A point on a facet is projected onto the tangent planes at the three corners. It is then
-lifted by half of the weighted mean of these projections (Boubekeur & Alexa 2008, Phong
-tessellation). Along each edge, the smaller of two lifts is used. For an arc with the
-half-angle a, the error is about a^4 times the radius. For flat facets, it is about a^2
-times the radius.
+moved halfway towards the weighted mean of these projections (Boubekeur & Alexa 2008,
+Phong tessellation). This displacement is the lift of the point. The lift at the
+midpoint of an edge is computed from the normal at each end, and the smaller value is
+used. For an arc with the half-angle a, the error is about a^4 times the radius. For
+flat facets, it is about a^2 times the radius.
 """
 
 from dataclasses import dataclass, field
@@ -53,12 +54,12 @@ class Facets:
         return total / np.maximum(np.linalg.norm(total, axis=1), 1e-300)[:, None]
 
     def edge_lifts(self, edges: NDArray) -> NDArray:
-        """Return the lifts at the midpoints of edges, (e,) [m]."""
+        """Return the distances from edge midpoints to the smooth surface, (e,) [m]."""
         rises = _rises(self.points[edges], self.normals[edges], limited=False)
         return np.asarray(np.linalg.norm(rises, axis=1) / 4)
 
     def lifts(self) -> NDArray:
-        """Return the largest lift on the edges of each facet, (m,) [m]."""
+        """Return the largest of :meth:`edge_lifts` on each facet, (m,) [m]."""
         sides = [self.edge_lifts(self.triangles[:, [k, k - 1]]) for k in range(3)]
         return np.asarray(np.max(sides, axis=0))
 
@@ -68,7 +69,7 @@ class Facets:
         return np.asarray(np.linalg.norm(points - np.atleast_2d(foot), axis=1))
 
     def signed(self, points: NDArray) -> tuple[NDArray, NDArray]:
-        """Return signed distances, (n,) [m], and their gradients, (n, 3)."""
+        """Return signed distances of points, (n,) [m], and their gradients, (n, 3)."""
         cell, foot = self._mesh.find_closest_cell(points, return_closest_point=True)
         members = self.triangles[np.atleast_1d(cell)]
         foot = np.atleast_2d(foot)
@@ -85,9 +86,9 @@ class Facets:
 
 
 def _rises(corners: NDArray, normals: NDArray, limited: bool) -> NDArray:
-    """Return four times the lifts at the midpoints of edges, (e, 3) [m]."""
-    # The smaller of the lifts at the two ends is used. If their signs differ, as
-    # between a flat side and a fillet, the lift is zero.
+    """Return four times the lifts of edge midpoints as vectors, (e, 3) [m]."""
+    # The smaller of the lifts computed from the normals at the two ends is used. If
+    # their signs differ, as between a flat side and a fillet, the lift is zero.
     along = corners[:, 0] - corners[:, 1]
     heights = np.stack([
         np.einsum("ei,ei->e", sign * along, normals[:, k])

@@ -152,8 +152,8 @@ def triangles_on(surface: Surface, interface: Interface, name: str) -> NDArray:
     along = np.abs(normals @ interface.direction)
     on &= along < 0.5 if interface.kind == "bore" else along > 0.9
     if interface.kind == "bore":
-        # excludes a flat face whose corners are on the cylinder, such as the end of a
-        # bar
+        # this condition excludes a flat face whose corners are on the cylinder, such as
+        # the end of a bar
         middle = corners.mean(axis=1) - interface.point
         middle -= (middle @ interface.direction)[:, None] * interface.direction
         radial = np.abs((normals * middle).sum(axis=1))

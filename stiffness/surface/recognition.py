@@ -22,23 +22,28 @@ from forcefit.stiffness.surface.primitives import (
 )
 from forcefit.stiffness.surface.triangle_graph import SHARP, TriangleGraph
 
-# maximum numbers of failed seeds in a part: for planes and cones, and for all shapes
+# maximum numbers of seed facets without a recognised shape in a part: for planes and
+# cones, and for all shapes
 _MISSES = (60, 20)
 # largest relative difference between the areas of congruent facets
 _CONGRUENT = 1e-6
 _CONE = 10  # smallest number of points that determine a cone
 # slope below which a cone is a cylinder, which is determined by seven points
 _CYLINDER = 1e-4
-_FEW = 12  # smallest number of facets around a curved surface
-_STEP = 2e-3  # [rad] smallest difference between distinct angles
+_FEW = 12  # smallest number of facets around a surface of revolution
+_STEP = 2e-3  # [rad] smallest difference between two distinct angles
 _MANY = 5  # smallest number of distinct angles of points on a circle
 # smallest ratio of the widths of equally wide facets
 _EVEN = 0.75
-# lift, relative to the median of the part, above which a face is flat
+# A face is flat if the distance between its edges and the smooth surface, relative to
+# the median of the part, is larger.
 _LIFT = 4.0
-# lift, relative to the median of the part, above which an edge is a ruling
+# An edge is a ruling of a cone if its distance from the smooth surface, relative to the
+# median of the part, is larger.
 _RULING = 2.0
-_NO_LIFT = 0.01  # lift, relative to the median, below which an edge is straight
+# An edge is straight if its distance from the smooth surface, relative to the median of
+# the part, is smaller.
+_NO_LIFT = 0.01
 
 
 def recognise(graph: TriangleGraph, part: NDArray) -> list[tuple[NDArray, Shape]]:
@@ -72,7 +77,7 @@ def recognise(graph: TriangleGraph, part: NDArray) -> list[tuple[NDArray, Shape]
 
 
 class _Lifts:
-    """Lifts of edges, computed as if all facets were on a single curved surface."""
+    """Distances from edges to a single smooth curved surface through all facets."""
 
     def __init__(self, graph: TriangleGraph, part: NDArray) -> None:
         self._facets = graph.lifted(part)
@@ -82,7 +87,7 @@ class _Lifts:
         self._usual = max(float(np.median(self._facets.lifts())), 1e-300)
 
     def share(self, edges: NDArray) -> float:
-        """Return the median lift of edges, relative to the median of the part."""
+        """Return the median lift of given edges over the median lift of all edges."""
         own = self._facets.edge_lifts(self._place[edges])
         return float(np.median(own)) / self._usual
 
@@ -154,7 +159,7 @@ def _even(angles: NDArray) -> bool:
     """Return whether angles belong to many facets or to three equally wide facets."""
     angles = np.sort(angles)
     gaps = np.diff(np.r_[angles, angles[0] + 2 * np.pi])
-    if gaps[-1] > _STEP:  # the largest gap of an open arc is not part of it
+    if gaps[-1] > _STEP:  # the largest gap between angles is outside the arc
         widest = int(np.argmax(gaps))
         outside = gaps[widest] > 1.5 * np.sort(gaps)[-2]
         gaps = np.delete(gaps, widest) if outside else gaps
@@ -187,7 +192,8 @@ def _pieces(
         if not shapes and not strips:
             missed.append(seed)
             if misses == most and (kinds := _kinds(missed, order, area)) is not None:
-                # facets that are congruent to failed seeds are the last seeds
+                # facets that are congruent to seeds without a recognised shape are
+                # tried last
                 order, misses, missed = np.where(kinds, order - 2.0, order), 0, []
         if shapes:
             best = max(shapes, key=lambda s: float(graph.areas[s[0]].sum()))
@@ -197,7 +203,7 @@ def _pieces(
 
 
 def _kinds(missed: list[int], order: NDArray, area: NDArray) -> NDArray | None:
-    """Return which facets are similar to failed seeds, or None if seeds vary much."""
+    """Return facets similar to seeds without a shape, or None if these seeds differ."""
     kinds = np.zeros(len(order), dtype=bool)
     count = 0
     for seed in missed:
@@ -249,8 +255,8 @@ def _shapes_around(
 def _is_proper(
     graph: TriangleGraph, lifts: _Lifts, piece: NDArray, shape: Shape
 ) -> bool:
-    """Return whether a shape is more than a part of another curved shape."""
-    # two coplanar triangles can be a single facet of another shape
+    """Return whether a shape is not merely a part of a different curved shape."""
+    # two coplanar triangles can be a single facet of a different shape
     straight = not isinstance(shape, Cone) or _is_straight(graph, lifts, piece, shape)
     return len(piece) > 2 and straight
 

@@ -39,7 +39,7 @@ class SmoothOutline:
     side: float
 
     def outside(self, points: NDArray) -> NDArray:
-        """Return the distances of points from the wall, negative inside, (n,) [m]."""
+        """Return distances from the wall, negative inside the interface, (n,) [m]."""
         return self.side * self.wall.signed(points)[0]
 
     def distance(self, points: NDArray) -> NDArray:

@@ -17,7 +17,7 @@ from forcefit.inputs.packages import naming_packages
 from forcefit.inputs.table import BadInput, nearest, quoted
 
 _FACETS = 48  # number of facets around a circle
-# ratio of an overlap to the volume of a solid below which the overlap is ignored
+# the overlap of two solids is ignored if its ratio to the volume of a solid is smaller
 _TOUCHING = 1e-6
 _ALL, _AND = "*", "+"  # name of all solids; sign between the names of several solids
 
@@ -182,7 +182,7 @@ def sides(model: Any, owners: Mapping[int, int]) -> dict[int, tuple[int, int]]:
 
     Args:
         model: gmsh model of the file.
-        owners: number of the solid of each volume.
+        owners: number of the solid to which each volume of gmsh belongs.
 
     Returns:
         Dictionary from face tags to the numbers of both solids, or -1 for no solid.
@@ -200,7 +200,7 @@ def sides(model: Any, owners: Mapping[int, int]) -> dict[int, tuple[int, int]]:
 def _fragments(
     model: Any, path: Path, chosen: Mapping[str, int]
 ) -> tuple[dict[int, int], tuple[str, ...]]:
-    """Split solids at common faces; return the solid of each volume and overlaps."""
+    """Split solids at common faces, and return their volumes and overlaps."""
     solids, names = [(3, tag) for tag in chosen.values()], list(chosen)
     volume = [float(model.occ.getMass(*solid)) for solid in solids]
     _, made = model.occ.fragment(solids[:1], solids[1:])

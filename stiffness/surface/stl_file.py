@@ -62,7 +62,7 @@ def _binary(path: Path, content: bytes) -> NDArray:
         raise BadInput(f"{path}: not a readable STL file")
     if stated in _UNKNOWN_COUNTS:
         stated = len(body) // size
-    if len(body) < size * stated - 2:  # the last two bytes are not used
+    if len(body) < size * stated - 2:  # the last two bytes of a triangle are not used
         raise BadInput(
             f"{path}: found {len(body) // size} complete triangles, expected {stated} "
             "as in the header; the file is truncated, or is not an STL file"

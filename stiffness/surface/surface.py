@@ -166,7 +166,7 @@ def check_surface(
         unit: unit of length in the file, for error messages.
 
     Returns:
-        The surface. Equal points are merged, triangles without an area are removed, and
+        The surface. Equal points are merged, triangles with zero area are removed, and
         normals point outward.
 
     Raises:
@@ -226,7 +226,7 @@ def _check_coordinates(
 def _merge(
     points: NDArray, triangles: NDArray, name: str
 ) -> tuple[NDArray, NDArray, list[str]]:
-    """Merge equal points, and remove triangles without an area."""
+    """Merge equal points, and remove triangles with zero area."""
     repairs = []
     used, triangles = np.unique(triangles, return_inverse=True)
     points, triangles = points[used], triangles.reshape(-1, 3)

@@ -80,7 +80,7 @@ def _limit_memory() -> None:
         if hard == resource.RLIM_INFINITY or hard > memory:
             resource.setrlimit(resource.RLIMIT_AS, (memory, hard))
     except (ImportError, ValueError, OSError):
-        return  # there is no such limit in this operating system
+        return  # this operating system cannot limit the memory
 
 
 def _with_vtk(path: Path) -> tuple[NDArray, NDArray]:

@@ -12,7 +12,7 @@ SHARP = np.cos(np.radians(35.0))
 # largest distance of a point on a shape, relative to the size of the part; coordinates
 # in STL files are rounded to 1e-7
 _ON_SHAPE = 2e-6
-# maximum number of seeds on a surface
+# maximum number of facets around which shapes are fitted
 _TRIES = 500
 
 
@@ -36,7 +36,7 @@ class TriangleGraph:
         )
 
     def connected_parts(self, members: NDArray, bend: float) -> NDArray:
-        """Number the parts between edges with a cosine of at most ``bend``."""
+        """Number the parts that are separated by edges with cos(angle) <= ``bend``."""
         from scipy.sparse import coo_array
         from scipy.sparse.csgraph import connected_components
 
@@ -73,7 +73,7 @@ class TriangleGraph:
         return Facets(self.points[used], index.reshape(-1, 3))
 
     def fits(self, shape: Shape, part: NDArray) -> NDArray:
-        """Find the triangles of a part whose corners and normals fit a shape."""
+        """Find the triangles of a part whose corners and normals agree with a shape."""
         corners = self.points[self.triangles[part]].reshape(-1, 3)
         distances = np.abs(shape.signed(corners)[0]).reshape(-1, 3).max(axis=1)
         centers = corners.reshape(-1, 3, 3).mean(axis=1)

@@ -15,7 +15,7 @@ from forcefit.stiffness.surface.patches import Patches
 from forcefit.stiffness.surface.surface import Surface
 from forcefit.stiffness.surface.triangle_graph import SHARP, TriangleGraph
 
-_UNSURE = 0.3  # relative uncertainty of the lift of facets of unknown shape
+_UNSURE = 0.3  # relative uncertainty of the distance from facets to an unknown shape
 # quadrature points on a triangle, exact to degree 4 (Dunavant 1985)
 _NEAR, _FAR = 0.445948490915965, 0.091576213509771
 _PLACES = np.concatenate([np.full((3, 3), a) + (1 - 3 * a) * np.eye(3)
@@ -86,8 +86,8 @@ class TrueSurface:
             places = np.einsum("qk,mkx->mqx", _PLACES, corners)
             distance, slope = shape.signed(places.reshape(-1, 3))
             slope = slope.reshape(places.shape)
-            # distance along the normal of the facet: the distance times the component
-            # of the gradient along this normal
+            # The distance along the normal of the facet is the distance from the shape
+            # times the component of its gradient along this normal.
             flux = np.einsum("mqx,mx->mq", slope, areas[members])
             gap = -distance.reshape(flux.shape) * flux
             volumes[number] = float((gap @ _WEIGHTS).sum())
