@@ -27,7 +27,7 @@ from forcefit.assembly.callouts.zones_of_features import (
 from forcefit.inputs.table import BadInput
 
 SHAPES = ("axis", "plane", "point")
-# screw components that a datum constrains, in the axes of the datum, by its shape
+# for each shape of a datum, screw components that the datum constrains, in datum axes
 HELD = {
     "axis": (0, 1, 3, 4),
     "plane": (0, 1, 5),
@@ -53,9 +53,10 @@ class Datum:
         at: centre of the feature in frame axes, (3,) [m].
         hole: size of a hole with maximum material condition, for example ``"12 H7"``;
             empty for other datums.
-        hole_of: name of the fit or joint of the hole; see :attr:`Callout.hole_of`.
-        extent: length of the hole if it is datum A with maximum material condition [m],
-            so that it can tilt; 0 for other datums.
+        hole_of: name of the fit or joint to which the hole belongs; see
+            :attr:`Callout.hole_of`.
+        extent: length of the hole [m] if the datum is datum A with maximum material
+            condition and can therefore tilt; 0 for other datums.
     """
 
     frame: str
@@ -93,8 +94,8 @@ class Callout:
         at: centre of the feature in frame axes, (3,) [m].
         envelope: whether the length tolerance applies to the entire face according to
             the envelope principle, not only to its centre.
-        hole_of: name of the fit or joint of the hole.  Features with the same name have
-            the same hole size.
+        hole_of: name of the fit or joint to which the hole belongs. Features with the
+            same name have the same hole size.
     """
 
     name: str

@@ -1,7 +1,7 @@
 """ISO 286 fits: limits of a hole and a shaft, and the clearance between them.
 
 The tables contain the values of ISO 286-1:2010 for the letters d to p, without the
-intermediate size ranges.  A size range includes its upper limit.
+intermediate size ranges of the standard. A size range includes its upper limit.
 """
 
 import re

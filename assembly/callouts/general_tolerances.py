@@ -66,7 +66,7 @@ def linear_tolerance(length: float, kind: str) -> float:
 
 
 def perpendicularity_tolerance(side: float, kind: str) -> float:
-    """Return the zone width [m] for a shorter side [m] in a tolerance class.
+    """Return the zone width [m] for the length of the shorter side [m] in a class.
 
     Raises:
         BadInput: the table does not contain a value for this length.

@@ -18,8 +18,8 @@ def largest_product(
     Args:
         w: coefficients, (m,).
         bounds: matrices (k, m), which together bound all directions.
-        cones: matrices (k, m) with the first row s and the other rows S, which define a
-            double cone |s.x| + |S x| <= 1.
+        cones: matrices (k, m) that consist of a row s and rows S, and define a double
+            cone |s.x| + |S x| <= 1.
 
     Returns:
         Feasible point x, (m,), and an upper bound on the maximum.  The upper bound is

@@ -293,18 +293,18 @@ class Zone:
 
 
 def intersection(zones: Sequence[Zone]) -> Zone:
-    """Return the intersection of zones; its bonus is that of the first zone."""
+    """Return the intersection of zones, with the ``bonus`` of the first zone."""
     bounds = tuple(bound for zone in zones for bound in zone.bounds)
     cones = tuple(cone for zone in zones for cone in zone.cones)
     return Zone(bounds, zones[0].bonus, cones)
 
 
 def _scale(rows: NDArray) -> NDArray:
-    """Return the largest rotation and translation entries, (6,) [1/rad, 1/m]."""
+    """Return the largest bound entries for rotations and translations, (6,)."""
     sizes = [np.abs(rows[:, part]).max() for part in (slice(0, 3), slice(3, 6))]
     return np.repeat([size if size > 0 else 1.0 for size in sizes], 3)
 
 
 def _sample(words: int, attempt: int = 0) -> NDArray:
-    """Return uniform random numbers that are identical in each call."""
+    """Return uniform random numbers, which are the same in each call."""
     return np.random.default_rng([words, attempt]).random((_SAMPLE, words))

@@ -114,7 +114,7 @@ def _hole_of(step: Step, drawn: DrawnCallout) -> str:
 
 
 def _side(step: Step, body: str) -> tuple[str, bool, DrawnJoint]:
-    """Return the frame of a joint at a body, whether it moves, and the joint."""
+    """Return the joint frame at a body, whether this frame moves, and the joint."""
     joint = step.edge.item
     assert isinstance(joint, DrawnJoint)
     after = step.start[0] != body

@@ -127,7 +127,7 @@ def guide(
         Contacts in two chains, which rotate about opposite edges of the block.
     """
     edge = np.array([width / 2, height / 2, 0.0])
-    # the bound on RZ is inactive, because the gaps limit RZ to half of it
+    # the bound on RZ is inactive, because the gaps limit RZ to half of this bound
     c_x, c_y = largest or gaps
     most = 2 * min(2 * c_y / width, 2 * c_x / height)
     rolls = Clearance(spin=most), Clearance(spin=np.inf, axial=np.inf)

@@ -32,7 +32,7 @@ NEAR_X = 0.985  # cosine of 10 deg
 
 @dataclass(frozen=True, eq=False)
 class JointNumbers:
-    """Error, clearance and stiffness of a joint or bearing, in joint axes.
+    """Geometric error, clearance and stiffness of a joint or bearing, in joint axes.
 
     Attributes:
         clearance: clearance bounds, or None.
@@ -40,10 +40,12 @@ class JointNumbers:
             for rigid components and 0 for free motions, or None.
         error: geometric error delta l, (6,) [rad, m].
         tolerance: standard deviations of the error, (6,) [rad, m], or None.
-        fit: ISO 286 fit with the mean radial clearance in ``clearance``, or empty.
+        fit: ISO 286 fit whose mean radial clearance is the bound in ``clearance``;
+            empty without a fit.
         fitted_end: relation between the fit and the tilt; None if the fit determines
             the radial clearance.
-        contacts: additional frames for clearance that depends on contact dimensions.
+        contacts: additional frames for a clearance that is computed from the dimensions
+            of contacts.
         locked_at: pose at which a fixed joint is bolted, with its clearance before
             bolting, or None.
     """
@@ -66,20 +68,21 @@ class DrawnJoint:
         name: name of the joint.
         kind: key of :data:`FREE_ROWS`.
         first: name of the first body, or ``"base"``.
-        second: name of the second body, which moves in the positive direction of
-            ``axis`` relative to the first body if the coordinate increases.
+        second: name of the second body. If the coordinate increases, this body moves in
+            the positive direction of ``axis`` relative to the first body.
         at: position of the joint, (3,) [m].
         axis: unit vector along the axis, (3,).  For a universal joint, this axis is
             fixed to the first body.  For a planar joint, it is the normal.
-        across: unit vector along the x axis, (3,), perpendicular to ``axis``.
+        across: unit vector along the x axis of the joint, (3,), perpendicular to
+            ``axis``.
         axis2: unit vector along the axis of a universal joint that is fixed to the
             second body, (3,); equal to ``across`` for other joint types.
         actuated: whether the joint is driven.
         position: coordinate in the home pose [rad or m].
         limits: minimum and maximum coordinate [rad or m], or None.
         pitch: translation per turn of a helical joint [m]; 0 for other joint types.
-        numbers: error, clearance and stiffness, with one entry for each bearing of a
-            universal joint, and one entry for other joint types.
+        numbers: geometric error, clearance and stiffness. A universal joint has one
+            entry for each of its two bearings. All other joints have one entry.
     """
 
     name: str

@@ -32,7 +32,7 @@ from forcefit.inputs.table import BadInput, quoted
 from forcefit.results.display import rounded
 from forcefit.stiffness.screws import rotation_vector, transform
 
-_SAME = 1e-12  # [rad, or fraction of the robot size] tolerance for coincidence
+_SAME = 1e-12  # [rad, or fraction of the robot size] tolerance for equal poses
 # attributes of a frame that are converted
 _HELD = {
     "name", "parent", "translation", "rotation", "joint", "actuated", "position",
@@ -107,7 +107,7 @@ class _Sheet:
         posture: the robot in its home pose.
         rigid: rigid bodies of the robot.
         found: joints of the robot.
-        bodies: bodies by number, without the base.
+        bodies: bodies other than the base, by their numbers.
         joints: joints, with the numbers of their two bodies.
         same: number of the body that contains a link, by the number of the rigid body
             at the start of the link.
@@ -126,7 +126,7 @@ class _Sheet:
         return self.bodies[k].name if k else BASE
 
     def new_name(self, name: str, joint: bool) -> str:
-        """Append underscores to the name of a body or joint until it is unique."""
+        """Append underscores to a body or joint name until the name is unique."""
         taken = {j.name for j, _, _ in self.joints} | {f.joint.name for f in self.found}
         if not joint:
             taken = {body.name for body in self.bodies.values()} | {BASE}

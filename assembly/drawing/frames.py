@@ -37,11 +37,14 @@ class _Plan:
         drawing: bodies and joints.
         joints: joints by name.
         bodies: bodies by name.
-        own: name of the body frame, by node; not all nodes have a body frame.
-        carriers: name of the parent frame of the next edges, by node.
-        links: name of the link frame, by body, if it differs from the body frame.
-        ends: name of the last frame of an edge that closes a loop.
-        seats: name of the frame with which the last frame coincides.
+        own: name of the body frame of each node that has a body frame.
+        carriers: name of the frame, for each node, that is the parent of the frames of
+            all edges that start at this node.
+        links: name of the link frame of each body for which it differs from the body
+            frame.
+        ends: name of the last frame of each edge that closes a loop.
+        seats: name of the frame that coincides with this last frame when the loop is
+            closed.
     """
 
     drawing: Drawing

@@ -26,7 +26,7 @@ from forcefit.assembly.kinematics.posture import Posture
 from forcefit.assembly.model.robot import Clearance, Frame, Robot
 from forcefit.inputs.table import BadInput, quoted
 
-_SAME = 1e-12  # [sine, or fraction of the robot size] tolerance for coincidence
+_SAME = 1e-12  # [sine, or fraction of the robot size] tolerance for equal poses
 _PARALLEL = 1e-2  # smallest sine of the angle between the axes of a universal joint
 _TURNS = ("revolute", "revolute")
 # suffixes of the names of joint frames (``parts.py``)
@@ -93,7 +93,7 @@ def _ends(bodies: RigidBodies, rows: list[int]) -> tuple[int, int]:
 
 
 def _following(posture: Posture, bodies: RigidBodies) -> dict[int, int]:
-    """Return the indices of consecutive frames at one point without a mass between."""
+    """Return consecutive frames at one point that have no mass between them."""
     robot, size = posture.robot, size_of(posture.robot)
     held = Counter(bodies.before[robot.index(robot.platform)] for _ in range(2))
     for i, frame in enumerate(robot.frames):
@@ -177,7 +177,7 @@ def _several(posture: Posture, rows: list[int]) -> tuple[DrawnJoint, list[int]] 
     kind, R, numbers = found
     name = _common_name(posture.robot, rows)
     if R is not axes[0] and kind == "spherical":
-        rows = rows[::-1]  # the last frame, which has the clearance, becomes the first
+        rows = rows[::-1]  # the last frame, with the clearance, becomes the first
     second = R[:, 0] if kind != "universal" else z[1]
     joint = DrawnJoint(
         name, kind, "", "", posture.transforms[rows[0]][:3, 3], R[:, 2],
@@ -225,7 +225,7 @@ def _turned(own: JointNumbers, R: NDArray) -> JointNumbers | None:
 def _with_one_contact(
     kind: str, axes: list[NDArray], own: list[JointNumbers], bounds: Sequence[str]
 ) -> _Found:
-    """Return a joint with the properties of its first frame; None if impossible."""
+    """Return a joint if only its first frame has an error, clearance or spring."""
     if not all(map(_empty, own[1:])):
         return None
     clearance = own[0].clearance or Clearance()
@@ -259,7 +259,7 @@ def _isotropic(own: JointNumbers) -> bool:
 
 
 def _empty(own: JointNumbers) -> bool:
-    """Return whether a frame has no error, clearance, spring and tolerance."""
+    """Return whether a frame has no error, clearance, spring or tolerance."""
     return (
         own.clearance is None and own.stiffness is None and own.tolerance is None
         and not own.error.any()

@@ -33,7 +33,7 @@ def link_at_tip(
     Args:
         body: body with a link.
         base: home pose of the end nearer to the robot base, (4, 4).
-        tip: home pose of the other end, (4, 4).
+        tip: home pose of the end farther from the robot base, (4, 4).
         reverse: whether ``tip`` is the start of the link.
 
     Returns:

@@ -42,7 +42,7 @@ class Parallel:
     Attributes:
         start: name of the parent frame of the chain.
         parts: frames of the chain; the last frame closes a loop with the first chain.
-        meets: name of the frame in the first chain with which it coincides.
+        meets: name of the frame in the first chain that coincides with this last frame.
     """
 
     start: str
@@ -92,7 +92,7 @@ def parallel_parts(joint: DrawnJoint, reverse: bool = False) -> Parallel | None:
 
 
 def every_part(joint: DrawnJoint, reverse: bool = False) -> list[Part]:
-    """Return the frames of a joint, followed by those of a second chain."""
+    """Return the frames of a joint, followed by the frames of its second chain."""
     chain = parallel_parts(joint, reverse)
     return [*parts_of(joint, reverse), *(chain.parts if chain else ())]
 
@@ -104,7 +104,7 @@ def _bare(joint: DrawnJoint, suffix: str) -> Part:
 
 
 def _all_parts(joint: DrawnJoint) -> list[tuple[Part, int]]:
-    """Return the frames of a joint from its first body, and their chains."""
+    """Return the frames of a joint from its first body, and the chain of each frame."""
     parts: list[tuple[Part, int]] = []
     for row, numbers in zip(_motions(joint), _shares(joint), strict=True):
         part = _part(joint, *row, numbers)
@@ -113,13 +113,14 @@ def _all_parts(joint: DrawnJoint) -> list[tuple[Part, int]]:
             for c in numbers.contacts
         ]
         own = [(part, 0)]
-        # contacts follow the frame of a planar joint and precede that of other joints
+        # contact frames come after the frames of a planar joint, and before the frames
+        # of any other joint
         parts += [*own, *contacts] if joint.kind == "planar" else [*contacts, *own]
     return parts
 
 
 def _passed(parts: list[Part], reverse: bool) -> list[Part]:
-    """Return the frames in their order in the spanning tree."""
+    """Return the frames of a joint in the order of the spanning tree."""
     return [_reversed(part) for part in reversed(parts)] if reverse else parts
 
 
@@ -195,7 +196,7 @@ def _shares(joint: DrawnJoint) -> list[JointNumbers]:
     return [own]
 
 
-# permutation of a screw from the axes of a planar joint to those of its first frame
+# permutation that expresses a screw in the axes of the first frame of a planar joint
 _TO_SLIDE = np.array([1, 2, 0, 4, 5, 3])
 
 

@@ -97,7 +97,7 @@ def steps_of(drawing: Drawing) -> list[Step]:
 
 
 def _step(edge: Edge, node: Node, entered: Mapping[Node, Edge]) -> Step | None:
-    """Return an edge with its direction, or None if it is traversed to the node."""
+    """Return the step from a node along an edge, or None if there is no such step."""
     reverse = edge.second == node
     if entered.get(edge.first if reverse else edge.second) is edge:
         return Step(edge, reverse, False)

@@ -35,7 +35,7 @@ def balls_at_rest(joints: tuple[Joint, ...]) -> tuple[Joint, ...]:
 def _is_ball(turns: tuple[Joint, ...]) -> bool:
     """Return whether three joints represent one passive ball joint."""
     name = turns[0].name.removesuffix(".rx")
-    # names of the first intermediate body from chain() and from the MJCF reader
+    # names that chain() and the MJCF reader give to the first intermediate body
     made = {f"{name}.after_rx", f"{name}.rx.after"}
     return (
         turns[0].child in made

@@ -12,7 +12,8 @@ class Coupling:
 
     Attributes:
         follower: name of the coupled joint.
-        leader: name of the joint that it follows; None if the follower is fixed.
+        leader: name of the joint that determines its coordinate; None if the follower
+            is fixed.
         coefficients: coefficients c_0, c_1, ...
         rest: rest coordinate of the follower [rad or m].
         leader_rest: rest coordinate of the leader [rad or m].

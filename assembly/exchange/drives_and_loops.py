@@ -29,9 +29,9 @@ def with_loops(
         driven: joints that the robot's file declares as driven.
 
     Returns:
-        The mechanism.  Its drives are those of the loops file.  If the loops file does
-        not list drives, they are the joints in ``driven``.  If this set is empty and
-        there are no loops, all joints are driven.
+        The mechanism. Its drives are the drives that the loops file lists. If the loops
+        file does not list drives, they are the joints in ``driven``. If this set is
+        empty and there are no loops, all joints are driven.
 
     Raises:
         BadInput: a name is not a joint or link of the robot.
@@ -45,7 +45,7 @@ def with_loops(
     mechanism, parts = _retyped(mechanism, loops.turns, parts)
     ends = {name: name for name in mechanism.bodies}
     children = {joint.name: joint.child for joint in mechanism.joints}
-    # the last elementary joint of a compound joint has the child of the compound joint
+    # the child body of a compound joint is the child body of its last elementary joint
     ends |= {name: children[several[-1]] for name, several in parts.items()}
     # a fixed joint and its link may have the same name, because they are one frame
     count, closed = len(mechanism.loops), list(mechanism.loops)

@@ -104,7 +104,7 @@ def drawn_difference(robot: Robot, back: Robot, frames: Mapping[str, str]) -> fl
 def _passes(
     robot: Robot, row: int, pairs: Sequence[tuple[int, int]], which: int
 ) -> tuple[object, ...]:
-    """Return the indices in ``pairs`` of the joints between the base and a frame."""
+    """Return the indices in ``pairs`` of all joints on the path from base to frame."""
     numbers = {pair[which]: k for k, pair in enumerate(pairs)}
     passed = np.flatnonzero(robot.on_path[row]).tolist()
     moving = [i for i in passed if i != row and robot.frames[i].joint != "fixed"]

@@ -33,7 +33,7 @@ def loop_residual(mechanism: Mechanism, coordinates: NDArray) -> float:
 
 
 def close_loops(mechanism: Mechanism, file: str) -> tuple[NDArray, bool]:
-    """Find joint coordinates that close all loops, near those of the file.
+    """Find joint coordinates that close all loops, near the coordinates of the file.
 
     In the first search, the drive coordinates are fixed.  If it fails, the drive
     coordinates are varied as well, first from the coordinates of the file and then from
@@ -79,7 +79,7 @@ def _check_alone(mechanism: Mechanism, file: str) -> None:
 
 
 def nearest_closed(mechanism: Mechanism, starts: int) -> tuple[NDArray, float, bool]:
-    """Find joint coordinates with minimum loop mismatch, near those of the file.
+    """Find coordinates with minimum loop mismatch, near the coordinates of the file.
 
     Args:
         mechanism: mechanism with n joints.

@@ -162,7 +162,7 @@ def _defaults(root: Node) -> dict[str, dict[str, dict[str, str]]]:
         name = node.text("class", "main")
         attached = node.has("attached")
         gather(node, {} if attached else classes["main"], name)
-        if not attached:  # the outermost class also has the name "main"
+        if not attached:  # the outermost default class is also named "main"
             classes["main"] = classes[name]
     return classes
 
@@ -297,7 +297,7 @@ def _pose(node: Node, angles: Angles) -> NDArray:
 def _at_key(
     root: Node, reading: _Reading, joints: tuple[Joint, ...]
 ) -> tuple[Joint, ...]:
-    """Set the home coordinates of joints to those of the keyframe ``home``."""
+    """Set the home coordinates of joints from the keyframe ``home``."""
     keys = [k for group in root.children("keyframe") for k in group.children("key")]
     counts = {name: _COUNTS.get(kind, 1) for name, kind in reading.coordinates.items()}
     for key in keys:

@@ -97,7 +97,7 @@ def _bodies(mechanism: Mechanism) -> list[str]:
             )
         if body.mass or body.inertia.any():
             J = body.inertia
-            # the format rejects collinear masses, whose moment of inertia about their
+            # MJCF does not permit collinear masses, whose moment of inertia about their
             # line is zero
             if np.linalg.eigvalsh(J)[0] < _SMALLEST_INERTIA:
                 J = J + _SMALLEST_INERTIA * np.eye(3)

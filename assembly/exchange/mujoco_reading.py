@@ -247,7 +247,7 @@ def _rules(mujoco: Any, model: Any) -> dict[str, tuple[int, float]]:
 
 
 def _rows(mujoco: Any, data: Any, constraint: int) -> NDArray:
-    """Return a mask of the residuals of an equality constraint."""
+    """Return a mask that selects the residuals of an equality constraint."""
     equal = data.efc_type == int(mujoco.mjtConstraint.mjCNSTR_EQUALITY)
     return np.asarray(equal & (data.efc_id == constraint))
 

@@ -18,14 +18,15 @@ _WHOLE = ("name", "description", "platform", "effect", "frame")
 
 
 def lay_over(robot: Mapping[str, Any], overlay: Path | str) -> Table:
-    """Add or replace keys of a robot by those of an overlay.
+    """Add the keys of an overlay to a robot, and replace existing keys.
 
     Args:
         robot: table from :func:`forcefit.assembly.files.robot_file.robot_table`, with
             paths relative to the overlay's folder.
         overlay: path of the file. It may contain ``[[frame]]`` with a ``name`` (``*``
-            matches any letters) and any keys of a frame except those of its placement.
-            It may also contain ``platform``, ``description`` and ``[[effect]]``.
+            matches any letters) and any keys of a frame except the keys of its
+            placement. It may also contain ``platform``, ``description`` and
+            ``[[effect]]``.
 
     Returns:
         Root table of the robot.  Error messages name the overlay as the file.

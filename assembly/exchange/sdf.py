@@ -121,7 +121,8 @@ def _tree(
 def _of_axis(joint: Node, tag: str, part: Node) -> str:
     """Describe a property of an axis that is not converted, or return an empty text."""
     spring = part.child("spring_stiffness")
-    # both axes are read for these joint types, and otherwise only the first axis
+    # both axes are read for universal and revolute2 joints, and only the first axis for
+    # other joints
     crossed = joint.optional("type") in {"universal", "revolute2"}
     single = joint.optional("type") not in {"ball", "screw"}
     taken = crossed or (tag == "axis" and single)

@@ -1,4 +1,4 @@
-"""Coordinate frames in SDF: those of links, joints, frames and nested models.
+"""Coordinate frames of links, joints, frames and nested models in SDF.
 
 Sources:
     sdformat.org, specification 1.12 and "Pose frame semantics".  The pose of a link is
@@ -205,7 +205,7 @@ def _take(frames: Frames, node: Node, scope: str, name: str, old: bool) -> None:
     """
     full = scope + name
     if full in frames.named and frames.named[full].node.tag != node.tag:
-        full += f"_{node.tag}"  # same suffix as in libsdformat
+        full += f"_{node.tag}"  # libsdformat appends the same suffix
     if full in frames.named:
         raise node.bad("name", "found this name twice; expected unique names")
     frames.named[full] = Named(node, scope, old)

@@ -38,7 +38,7 @@ def joint_ends(frames: Frames, named: Named) -> tuple[str, str]:
 
     Args:
         frames: frames of the model.
-        named: the joint.
+        named: element of the joint.
 
     Returns:
         Names of two different links; ``"world"`` for the world.
@@ -104,7 +104,7 @@ def joint_parts(
     if len(parts) == 1:
         ((_, one, axis),) = parts
         joint = Joint(name, one, parent, carried, placement, axis, after)
-        if kind == "screw":  # not converted: the unit of its range is undefined
+        if kind == "screw":  # the unit of the range of a screw joint is undefined
             return [replace(joint, lead=_lead(node))], []
         return [joint if one == "fixed" else _of_axis(joint, node, "axis")], []
     joints, between = chain(name, parent, carried, placement, after, parts)

@@ -36,7 +36,7 @@ def link_body(frames: Frames, name: str, named: Named) -> tuple[Body, str]:
     Args:
         frames: frames of the model.
         name: name of the link.
-        named: the link.
+        named: element of the link.
 
     Returns:
         The body, and the assumptions, which are empty if the file contains its mass and

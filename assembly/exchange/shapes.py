@@ -116,7 +116,7 @@ def shell_moments(shape: str, sizes: Sequence[float]) -> NDArray:
 
 
 def _across(squares: NDArray) -> NDArray:
-    """Return the sum of the other two values for each of three values."""
+    """Return y + z, z + x and x + y for three values x, y and z."""
     return np.asarray(np.sum(squares) - squares)
 
 

@@ -17,8 +17,8 @@ def springs_at_rest(mechanism: Mechanism) -> dict[str, NDArray]:
         mechanism: mechanism in the home pose.
 
     Returns:
-        Stiffness by joint name, (6, 6) [N m/rad .. N/m].  It is infinite in all
-        directions except that of the joint motion.
+        Stiffness by joint name, (6, 6) [N m/rad .. N/m]. It is infinite in all
+        directions except along the joint motion.
     """
     matrices = {}
     for joint in mechanism.joints:

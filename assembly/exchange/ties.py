@@ -15,7 +15,7 @@ def refuse_ties(node: Node, owners: Mapping[str, str]) -> None:
 
     Args:
         node: element that is not converted.
-        owners: name of the body for each name of a body or frame.
+        owners: name of the body to which a name of a body or frame belongs.
 
     Raises:
         BadInput: the element refers to two bodies and may connect them.

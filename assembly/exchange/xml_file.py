@@ -220,7 +220,7 @@ def read_xml(path: Path | str, *roots: str) -> Node:
 
     Raises:
         BadInput: the file cannot be read, is not XML, declares entities or a document
-            type, or has another root element.
+            type, or has a different root element.
     """
     text = _SKIPPED.sub(_blank_lines, read_text(path, _encoding(read_bytes(path))))
     element = _parsed(text, path)

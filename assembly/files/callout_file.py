@@ -124,7 +124,7 @@ def read_drawn_callouts(
 def _drawn(
     table: Table, copied: Copy, body: str, joints: list[DrawnJoint]
 ) -> DrawnCallout | None:
-    """Read a callout of a body feature; return None for a form tolerance alone."""
+    """Read a callout of a body feature; return None if it has only a form tolerance."""
     here = {j.name: j for j in joints if body in (j.first, j.second)}
     short = body.removeprefix(copied.prefix)
 

@@ -60,7 +60,7 @@ def read_bodies(copied: Copy) -> Iterator[DrawnBody]:
                 raise table.bad(
                     key, 'found a joint, but no "link"; expected both or neither'
                 )
-        table.tables("tolerance")  # read later, when all joints are known
+        table.tables("tolerance")  # marked as known; read when all joints are known
         table.finish()
         yield turned_body(body, copied.T)
 

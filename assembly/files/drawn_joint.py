@@ -174,7 +174,7 @@ def _tolerance(table: Table) -> NDArray | None:
 
 
 def _stiffness(table: Table, kind: str, actuated: bool) -> NDArray | None:
-    """Return the joint stiffness including that of the drive, (6, 6), or None."""
+    """Return the stiffness of a joint including its drive, (6, 6), or None."""
     free = FREE_ROWS[kind]
     if len(free) > 1:
         return _several_free(table, kind)

@@ -113,7 +113,7 @@ def _numbers(
 
 
 def _of_main(variable: str, robot: Robot) -> str:
-    """Replace the name of a joint in a variable by that of its main frame."""
+    """Replace the name of a joint in a variable by the name of its main frame."""
     kind, _, rest = variable.partition(".")
     name, _, axis = rest.rpartition(".")
     if kind == "wrench" and name in robot.joints:

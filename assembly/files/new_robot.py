@@ -22,7 +22,7 @@ class Kind:
     Attributes:
         about: short description.
         legs: default number of legs.
-        step: divisor of the number of legs.
+        step: number of which the number of legs must be a multiple.
         platform: reference point of the platform [mm].
         body: function that returns the text of the legs for a number of legs.
     """

@@ -67,7 +67,7 @@ def read_robot(path: Path | str, close: Closing | None = None) -> Robot:
     """Read a robot file.
 
     Args:
-        path: ``.toml`` file in the public format.
+        path: ``.toml`` file in the format of ``docs/robot_files.md``.
         close: function that closes the loops of the robot in the file; None if they are
             already closed.
 
@@ -99,7 +99,7 @@ def robot_of(root: Table, name: str, close: Closing | None = None) -> Robot:
     try:
         robot = robot if close is None else close(robot)
         home = home_posture(robot)
-        place_callouts(home)  # raises BadInput if callouts do not fit the geometry
+        place_callouts(home)  # raises BadInput if a callout contradicts the geometry
         return with_spans(robot, home.coordinates)
     except BadInput as error:
         raise BadInput(f"{root.file}: {error}") from None
@@ -155,7 +155,7 @@ def _framed(root: Table, name: str, description: str) -> Robot:
     """Return the robot in a file of format 1 (frames and closures)."""
     platform = root.text("platform", expected="the name of a frame")
     tables = root.tables("frame"), root.tables("closure")
-    root.tables("tolerance")  # read later, when all frames are known
+    root.tables("tolerance")  # marked as known; read when all frames are known
     root.finish()
     if not 0 < len(tables[0]) <= MOST_FRAMES:
         fault = f"found {len(tables[0])}" if tables[0] else "missing"
@@ -206,7 +206,7 @@ def _reference_point(root: Table) -> tuple[float, float, float] | None:
 
 
 def _diagnosis(root: Table) -> dict[str, Any]:
-    """Return the diagnosis in the file, with the absolute path of the covariance."""
+    """Return the diagnosis, with the absolute path of its covariance file."""
     # texts, numbers and lists are not interpreted
     content: dict[str, Any] = {}
     if root.has("diagnosis"):
@@ -236,8 +236,9 @@ def _is_record(value: object) -> bool:
 
 
 def _remarks(tables: list[Table]) -> tuple[str, ...]:
-    """Return a remark on frames with ``dh`` but without ``alpha``."""
-    # alpha is rarely zero, in contrast to the other parameters
+    """Return a remark on frames whose ``dh`` parameters do not include ``alpha``."""
+    # the Denavit-Hartenberg parameter alpha is rarely zero, in contrast to a, d and
+    # theta
     dh = {table.content["name"]: table.content.get("dh") for table in tables}
     without_alpha = [
         quoted(name) for name, given in dh.items() if given and "alpha" not in given

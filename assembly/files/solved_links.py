@@ -37,7 +37,7 @@ def solve_links(robot: Robot) -> Robot:
         robot: robot from a file or created in Python.
 
     Returns:
-        Robot for solvers; the same object if it has no such links.
+        Robot with the computed stiffness; the same object if it has no such links.
 
     Raises:
         BadInput: a file is unreadable or unusable, or an interface is invalid.
@@ -66,7 +66,7 @@ def _note(done: int, total: int) -> None:
 
 
 def solved_link(frame: Frame, accuracy: float = 0.005) -> Link:
-    """Compute the stiffness of a mesh link, or read that of a library link.
+    """Compute the stiffness of a mesh link, or read the stiffness of a library link.
 
     Args:
         frame: frame with a mesh or library link.
@@ -149,7 +149,7 @@ def _solve(
 
 
 def _as_stored(solved: "MeshedLink") -> "MeshedLink":
-    """Remove the surface, which only mesh refinement requires, from a solution."""
+    """Remove the surface from a solution, because only mesh refinement requires it."""
     solid = replace(solved.level.solid, walls={}, surface=None)
     return replace(solved, level=replace(solved.level, solid=solid))
 

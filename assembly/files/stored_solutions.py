@@ -77,7 +77,7 @@ def stored_solution(key: str, solve: Callable[[], MeshSolution]) -> MeshSolution
             wait until it returns.
 
     Returns:
-        Solution, which is bit-identical in both cases.
+        Solution. Stored and computed solutions are bit-identical.
     """
     folder = cache_folder()
     if folder is None:

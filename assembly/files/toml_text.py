@@ -20,7 +20,8 @@ def file_text(
         diagnosis: values in the table ``[diagnosis]``.
 
     Returns:
-        Text.  The first line marks the file as one that may be overwritten.
+        Text. Its first line shows that the file was written by forcefit and may be
+        overwritten.
     """
     lines = [ROBOT_MARK, *_lines(values)]
     if diagnosis:

@@ -20,7 +20,7 @@ _VARIABLE = "FORCEFIT_MARCH"
 
 
 def levels_here() -> list[str]:
-    """Return the instruction levels of this processor, the lowest first.
+    """Return the instruction set levels that this processor supports, lowest first.
 
     Returns:
         Names in :data:`LEVELS`; none for processors other than x86-64.
@@ -35,15 +35,16 @@ def levels_here() -> list[str]:
 
 
 def chosen() -> ModuleType:
-    """Return the module for this processor, or for the level in ``FORCEFIT_MARCH``.
+    """Return the module for the level in ``FORCEFIT_MARCH`` or for this processor.
 
     Returns:
         The compiled functions.
 
     Raises:
-        BadInput: the value of ``FORCEFIT_MARCH`` is not a level that this processor
-            has.
-        ImportError: the module is missing, or the processor lacks the lowest level.
+        BadInput: the value of ``FORCEFIT_MARCH`` is not an instruction set level that
+            this processor supports.
+        ImportError: the module is missing, or the processor does not support the lowest
+            level.
     """
     wanted, here = os.environ.get(_VARIABLE), levels_here()
     if wanted and wanted not in here:

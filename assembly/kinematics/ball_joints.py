@@ -16,7 +16,8 @@ from forcefit.assembly.kinematics.nominal import size_of
 from forcefit.assembly.model.robot import Robot
 from forcefit.stiffness.screws import rotation_matrix
 
-# largest accepted distance of axes [reference lengths] and cosine of right angles
+# largest accepted distance between intersecting axes [reference lengths], and largest
+# accepted cosine of a right angle
 _SAME = 1e-9
 
 

@@ -51,7 +51,7 @@ class _Bodies:
     robot: Robot
     before: NDArray  # (n, 4, 4) frames before their joint motion, seen from the base
     after: NDArray  # (n, 4, 4) frames after their joint motion, seen from the base
-    # body that each frame's joint carries; the last is the base
+    # index of the body after the joint of each frame; the last entry is for the base
     groups: tuple[int, ...]
 
     def body(self, side: Side) -> int:
@@ -74,8 +74,8 @@ def place_callouts(home: Posture) -> tuple[PlacedCallout, ...]:
         The callouts in the order of the robot, followed by the datum shifts.
 
     Raises:
-        BadInput: a feature has two callouts, a datum is on another body, datums form a
-            cycle, or a callout contradicts the nominal geometry.
+        BadInput: a feature has two callouts, a datum is on a different body, datums
+            form a cycle, or a callout contradicts the nominal geometry.
     """
     callouts = home.robot.callouts
     if not callouts:
@@ -132,7 +132,7 @@ def _own_screw(zone: Zone, end: int, total: int) -> NDArray:
 
 
 def _check_names(names: list[str], callouts: tuple[Callout, ...]) -> None:
-    """Raise BadInput if two features have the same name in tables."""
+    """Raise BadInput if two features have the same name in printed tables."""
     for k, name in enumerate(names):
         if name in names[:k]:
             fault = f"found {quoted(name)} twice, expected a different name per feature"
@@ -165,7 +165,7 @@ def _bodies(home: Posture) -> _Bodies:
 def _datum_sides(
     bodies: _Bodies, callout: Callout, sides: Mapping[Side, int]
 ) -> list[Side]:
-    """Return the frame and side of each datum on the body of a feature."""
+    """Return the frame of each datum, and whether the body is after its joint."""
     body = bodies.body((callout.feature, callout.after))
     found = []
     for name in (datum.frame for datum in callout.datums):
@@ -178,7 +178,8 @@ def _datum_sides(
             fault = f"found the datum {quoted(name)}, which is the feature itself"
             fault += ", expected another feature of the body"
             raise BadInput(fault_of(callout, fault))
-        # Of two rigidly connected sides, the side with callouts is selected.
+        # If two frames of the datum are on this body, the frame with callouts is
+        # selected.
         found.append(next((side for side in here if side in sides), here[0]))
     return found
 
@@ -237,7 +238,7 @@ def _zone(
 
 
 def _to_feature(pose: NDArray) -> NDArray:
-    """Return the map of screws from the base origin to a pose and its axes, (6, 6)."""
+    """Return the matrix that transforms screws from the base to a pose, (6, 6)."""
     R = pose[:3, :3]
     return screw_map(-R.T @ pose[:3, 3], R.T)
 
@@ -292,5 +293,5 @@ def _add_errors(
 
 
 def _carried(old: NDArray, new: NDArray) -> NDArray:
-    """Return the map of screws from one pose and its axes to another, (6, 6)."""
+    """Return the matrix that transforms screws from one pose to another, (6, 6)."""
     return _to_feature(new) @ np.linalg.inv(_to_feature(old))

@@ -25,7 +25,7 @@ from forcefit.inputs.table import BadInput, nearest
 from forcefit.stiffness.screws import rotation_matrix, rotation_vector, transform
 
 _OPEN = 1e-9  # [rad, m] largest mismatch of a closed loop
-_SMALL = 0.1  # [rad, m] largest mismatch that is a small motion
+_SMALL = 0.1  # [rad, m] largest mismatch that is treated as a small motion
 
 
 def closing_of(
@@ -40,8 +40,8 @@ def closing_of(
         rest: name of a frame, see :func:`rest_in`.
         mismatch: ``"spring"``, see :func:`preloaded`.
         joints: coordinates of drives for ``mismatch``.
-        own_errors: whether to retain the geometric errors of the robot.  If False, only
-            the errors due to its closures are retained.
+        own_errors: whether to retain the geometric errors of the robot. If False, only
+            the errors that close the loops are retained.
 
     Returns:
         A function that closes a robot; None if neither ``rest`` nor ``mismatch`` is

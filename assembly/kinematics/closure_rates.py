@@ -16,7 +16,7 @@ _NOISE = 30.0  # assumed ratio of singular value noise to closure error
 
 @lru_cache(maxsize=64)
 def closure_signs(robot: Robot) -> NDArray:
-    """Return signs (closures, n): +1 on the first chain, -1 on the second, else 0."""
+    """Return +1 for frames in a closure's first chain, -1 in the second, else 0."""
     paths = robot.on_path.astype(int)
     pairs = [(robot.index(a), robot.index(b)) for a, b in robot.closures]
     count = len(robot.frames)

@@ -1,7 +1,6 @@
 """Compiled continuation to several targets in parallel.
 
-Each lane of the processor's vector registers follows one target, independently of the
-others.
+Each element of the processor's vector registers follows one target independently.
 """
 
 from typing import Any

@@ -65,7 +65,7 @@ def _compared(A: NDArray, B: NDArray, rank: int) -> tuple[NDArray, NDArray]:
 
     Returns:
         (k,) signs of the determinants; (k,) overlaps, 1 if A and B span the same space,
-        0 if a direction of one space is orthogonal to the other.
+        0 if a direction of one space is orthogonal to the other space.
     """
     U, _, Vt = np.linalg.svd(A)
     U, V = U[..., :rank], np.swapaxes(Vt[:, :rank], -1, -2)
@@ -83,7 +83,7 @@ def _compared(A: NDArray, B: NDArray, rank: int) -> tuple[NDArray, NDArray]:
 def _along(
     robot: Robot, home: Posture, target: Target, steps: int, rank: int, ends: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Return signs and smallest overlaps along paths from home."""
+    """Return signs of determinants and smallest overlaps of bases along paths."""
     before = locked_closures(robot, home.transforms[None]).repeat(len(ends), axis=0)
     signs, alike = np.ones(len(ends)), np.ones(len(ends))
     for k in range(1, steps + 1):

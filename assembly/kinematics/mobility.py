@@ -23,13 +23,14 @@ from forcefit.results.display import html_table
 # Relative size below which singular values are treated as zero. Files are rounded to 6
 # digits, and singular postures have errors of sqrt(1e-10).
 ZERO = 1e-5
-# [rad, lengths] smallest platform motion for unit joint rates that is not noise
+# [rad, reference lengths] smallest platform motion for unit joint rates that is not
+# treated as round-off
 _PLATFORM_RANK = 1e-6
-_ERROR = 10.0  # assumed error of free motions relative to the ratio of singular values
+_ERROR = 10.0  # the assumed error of free motions is this factor divided by ``gap``
 _NOISE = 1e-14  # relative round-off error of singular values
 _DISTANCE = 0.05  # [rad or reference lengths] distance to nearby postures
 _NEIGHBOURS = 16  # largest number of nearby postures
-_AGREEING = 3  # number of nearby postures that must have equal counts
+_AGREEING = 3  # number of nearby postures that must have equal mobility
 _EXACT = 1e-12  # [rad, m] closure error that is only round-off
 _LEAST = 1e-8  # threshold of singular values for closure errors below _EXACT
 _CLOSED = 1e-6  # [rad, m] largest closure error of a nearby posture
@@ -53,8 +54,8 @@ class Mobility:
             rigid robot.
         drives: number of actuated joints.
         locked_freedoms: equal to ``freedoms_drives_locked``.
-        overconstraint: number of closure equations that depend linearly on the others,
-            with the drives free.
+        overconstraint: number of closure equations minus their rank, with the drives
+            free.
         smallest_singular_value: [-] smallest nonzero singular value of the constraint
             matrix, with lengths divided by the size of the robot.  A value near zero
             indicates a nearby singularity.
@@ -147,8 +148,8 @@ def platform_screws(posture: Posture) -> tuple[NDArray, float]:
 
     Returns:
         (k, 6) [rad, m] screws of the k ``platform_freedoms`` at the platform's origin,
-        base axes.  They are orthonormal if lengths are in reference lengths.  Also
-        their error [rad, reference lengths].
+        base axes. They are orthonormal if lengths are in reference lengths. The second
+        result is their error [rad, reference lengths].
     """
     A, P = _rates(posture)
     moves = mobile(posture.robot)
@@ -193,7 +194,7 @@ def mobility_near(posture: Posture, here: Mobility) -> NearMobility:
         if _AGREEING in {returned, *agreeing.values()}:
             break
     if not found:
-        # Without a nearby posture, no smaller count is known.
+        # Without a nearby posture, no smaller mobility is known.
         return NearMobility(0 if returned == _AGREEING else here.freedoms, None)
     least = min(found, key=lambda m: (m.freedoms, m.freedoms_drives_locked))
     return NearMobility(min(least.freedoms, here.freedoms), least)

@@ -35,7 +35,7 @@ def follow_in_mode(
             fixed only at targets that cannot be reached otherwise.
 
     Returns:
-        The ends of the tracks, and their progress.
+        The end points of the motions, and the completed fraction of each path.
     """
     kept = _KEPT if target.pose is not None else _KEPT[1:]
     held = [_held(target, pose, components) for components in kept]

@@ -117,7 +117,7 @@ def follow(robot: Robot, start: NDArray, target: Target, guess: bool = False) ->
             is made.
 
     Returns:
-        The ends of the tracks, and their progress.
+        The end points of the motions, and the completed fraction of each path.
     """
     tree, start = _tree(robot), np.array(start, dtype=float)
     addresses = _tree_side_by_side(robot)

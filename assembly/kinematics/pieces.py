@@ -53,7 +53,7 @@ class CutRobot:
         return Posture(self.robot, q, T, posture.mismatch)
 
     def spread(self, rows: NDArray) -> NDArray:
-        """Return rows (..., m, k), with the given rows at the last elements."""
+        """Return an array (..., m, k) that is zero except at the last elements."""
         spread = np.zeros((*rows.shape[:-2], len(self.owner), rows.shape[-1]))
         spread[..., self.last, :] = rows
         return spread
@@ -66,7 +66,7 @@ def cut_beams(robot: Robot) -> CutRobot:
         robot: robot of n frames.
 
     Returns:
-        The divided robot.  Without beams of several elements, its frames are those of
+        The divided robot. If no beam has several elements, the frames are the frames of
         ``robot``.
     """
     frames: list[Frame] = []
@@ -83,7 +83,7 @@ def cut_beams(robot: Robot) -> CutRobot:
 
 
 def _pieces(frame: Frame) -> list[tuple[Frame, float]]:
-    """Return the elements of a body from base to tip, and distances to its tip."""
+    """Return the elements of a body from base to tip, and distances from the tip."""
     link = frame.link
     if not isinstance(link, BeamLink) or link.pieces == 1:
         return [(frame, 0.0)]

@@ -76,7 +76,7 @@ def check_holes(
         body_of: function that returns the index of the body before or after a joint.
 
     Raises:
-        BadInput: a hole has two sizes, a size other than that of its fit, or two
+        BadInput: a hole has two sizes, differs in size from its fit, or belongs to two
             bodies.
     """
     fits, seen = fits_by_parts(robot), dict[str, tuple[str, int]]()

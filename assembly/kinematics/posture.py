@@ -9,8 +9,8 @@ M_j     ``paths``           (..., n,6,6)  eqs (13)-(15): map from a screw at fra
                                           its axes, to the platform, in base axes
 ======  ==================  ============  =========================================
 
-The index in the printed eq. (14) is wrong by one, because its product down to h = j
-maps a screw in frame ant(j).  ``paths`` maps a screw in frame j, ``[R 0; [p_j - p]x R,
+The index in eq. (14) of the paper is wrong by one, because the product down to h = j
+maps a screw in frame ant(j). ``paths`` maps a screw in frame j, ``[R 0; [p_j - p]x R,
 R]``.
 """
 
@@ -256,7 +256,7 @@ def home_posture(robot: Robot) -> Posture:
 
 
 def _left_open(robot: Robot, T: NDArray) -> tuple[NDArray, NDArray]:
-    """Return the largest rotation [rad] and translation [m] error of each closure."""
+    """Return the largest rotation error [rad] and translation error [m] of closures."""
     pairs = [[robot.index(name) for name in pair] for pair in robot.closures]
     first, second = (T[[pair[k] for pair in pairs]] for k in (0, 1))
     between = first[:, :3, :3] @ np.swapaxes(second[:, :3, :3], -1, -2)
@@ -265,7 +265,7 @@ def _left_open(robot: Robot, T: NDArray) -> tuple[NDArray, NDArray]:
 
 
 def _either(turned: float, shifted: float, least: float) -> str:
-    """Return the rotation or the translation of a closure mismatch as text."""
+    """Format the translation or, if it is small, the rotation of a mismatch."""
     if shifted < least:
         return f"{turned:.3g} rad with locked drives, expected < 1e-06 rad"
     return f"{shifted:.3g} m with locked drives, expected < {least:.3g} m"
@@ -297,17 +297,17 @@ def place_robot(
 ) -> Posture:
     """Return the posture for a nominal platform pose, or for actuated coordinates.
 
-    The robot moves from the home pose along a straight line, so the assembly mode is
-    that of the home pose.  Undetermined components remain near their home values.  If
-    the home pose is singular, unspecified components are fixed at their home values if
-    possible, the rotation first.
+    The robot moves from the home pose along a straight line, so the assembly mode of
+    the home pose is preserved. Undetermined components remain near their home values.
+    If the home pose is singular, unspecified components are fixed at their home values
+    if possible. The rotation is fixed before the translation.
 
     Args:
         robot: any robot.
         pose: translation ``tx ty tz`` [m] and rotation vector ``rx ry rz`` [rad] of the
             platform in base axes; unspecified components are free.
-        joints: coordinates [rad or m] of actuated joints by frame; the others stay at
-            their ``position``.
+        joints: coordinates [rad or m] of actuated joints by frame; all other actuated
+            joints stay at their ``position``.
 
     Returns:
         The posture.

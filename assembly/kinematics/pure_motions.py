@@ -80,7 +80,7 @@ def _plain_basis(rows: NDArray, zero: float) -> NDArray:
     P = np.linalg.pinv(rows, rcond=zero) @ rows if rank else np.zeros((3, 3))
     basis: list[NDArray] = []
     for _ in range(rank):
-        # Select the base axis that is closest to the remaining space.
+        # Select the base axis that is closest to the space not yet spanned.
         k = int(np.argmax(np.round(np.diag(P), 9)))
         d = P[k] / np.linalg.norm(P[k])
         d = np.where(np.abs(d) < 1e-12, 0.0, d)

@@ -7,13 +7,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 RANK = 1e-10  # relative size below which a singular value is treated as zero
-# the same threshold for closure equations without springs and free motions
+# relative threshold for singular values of closure equations without springs and free
+# motions
 ROWS_RANK = 1e-9
-# factor of the nominal closure error, which is added to RANK
+# RANK is increased by this factor times the nominal closure error
 MISMATCH_FACTOR = 30.0
-# relative round-off of columns after a projection
+# relative round-off error of matrix columns after a projection
 NOISE = 1e-12
-UNBOUNDED = 1e-8  # [rad, m] smallest platform motion per unit of an unbounded motion
+UNBOUNDED = 1e-8  # [rad, m] smallest platform motion per unit unbounded joint motion
 
 
 def rank_tolerance(mismatch: float, least: float = RANK) -> float:
@@ -44,7 +45,7 @@ def rank_of(values: NDArray, tolerance: float, noise: float = 0.0) -> int:
 
 
 def noise_of(columns: ArrayLike) -> float:
-    """Estimate the round-off of columns after a projection.
+    """Estimate the round-off error of matrix columns after a projection.
 
     Args:
         columns: (m, n) columns before the projection.

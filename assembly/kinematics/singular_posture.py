@@ -23,7 +23,7 @@ _NEIGHBOURS = 6  # number of nearby postures
 # relative size above which singular values at nearby postures are nonzero
 _APART = 1e-5
 _CLOSED = 1e-8  # [rad, m] largest closure error of a nearby posture
-_NOISE = 1e3  # ratio to the closure error below which singular values are zero
+_NOISE = 1e3  # singular values below this factor times the closure error are zero
 
 
 def is_singular(robot: Robot, q: NDArray, T: NDArray) -> bool:

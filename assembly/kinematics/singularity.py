@@ -39,7 +39,7 @@ from forcefit.stiffness.screws import SCREW
 
 KINDS = ("serial", "parallel", "closure")
 _RANK = 1e-9  # relative size below which a singular value is treated as zero
-# [rad or lengths] drive motions at which ranks are computed
+# [rad or reference lengths] displacements of the drives at which ranks are computed
 _PERTURBATIONS = (0.0, 0.013, -0.021)
 
 
@@ -128,7 +128,7 @@ def find_singularities(robot: Robot, transforms: NDArray) -> Singularities:
 
 @dataclass(frozen=True)
 class _Ranks:
-    """Ranks of the closures, of Q and of Q_t at regular postures."""
+    """Ranks of closures, joint motions and platform motions at regular postures."""
 
     closures: int
     motions: int
@@ -173,13 +173,13 @@ def _null_space(A: NDArray, rank: int) -> tuple[NDArray, NDArray, NDArray]:
 
 
 def _measure(robot: Robot, T: NDArray, ranks: _Ranks) -> Singularities:
-    """Return the distances for given ranks."""
+    """Return the distances from singularities for given ranks."""
     A, B, _ = closure_matrices(robot, T)
     N, closure, resisting = _null_space(A, ranks.closures)
     measured = _drives_and_platform(N, B, ranks)
     closure = np.where(closure > SINGULAR, closure, 0.0)
     for i in np.flatnonzero(closure == 0.0).tolist():
-        # Here, the closures allow more motions than at other postures.
+        # At this posture, the closures permit more motions than at other postures.
         here = slice(i, i + 1)
         more, _, _ = _null_space(A[here], _rank(A[i], SINGULAR))
         own = _ranks_there(more[0] @ B[i], ranks)
@@ -207,9 +207,9 @@ def _measure(robot: Robot, T: NDArray, ranks: _Ranks) -> Singularities:
 
 
 def _ranks_there(moved: NDArray, generic: _Ranks) -> _Ranks:
-    """Return the ranks at postures with additional motions."""
+    """Return the ranks at a posture where the closures permit additional motions."""
     motions = _rank(moved, SINGULAR)
-    # Motions without platform motion at all postures are not serial singularities.
+    # Motions that do not move the platform at any posture are not serial singularities.
     always = generic.motions - generic.platform
     return _Ranks(generic.closures, motions, min(motions - always, 6))
 
@@ -221,7 +221,7 @@ def _drives_and_platform(
     drives = B.shape[2] - 6
     W, t, Q = np.linalg.svd(N @ B, full_matrices=False)
     Q = Q[:, : ranks.motions]
-    # joint rates for the rows of Q
+    # joint rates for each basis vector of drive and platform rates (rows of Q)
     rates = np.swapaxes(W[:, :, : ranks.motions], 1, 2) @ N
     rates = rates / np.maximum(t[:, : ranks.motions, None], 1e-300)
     serial, still_platform = _least(Q[..., drives:], ranks.platform)

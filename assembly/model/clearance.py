@@ -34,7 +34,7 @@ def clearance_bounds(robot: Robot, own_axes_free: bool = False) -> NDArray:
     Args:
         robot: robot with n frames.
         own_axes_free: whether passive joints with stiffness move freely about or along
-            their z axis.  If False, only the spring moves in this direction, and a
+            their z axis. If False, only the spring deforms in this direction, and a
             given bound ``spin`` is a clearance in series with the spring.
 
     Returns:
@@ -65,8 +65,8 @@ def bound_name(columns: NDArray) -> str:
     """Return the key of the bound of a cone, for example ``"tilt"``.
 
     Args:
-        columns: columns of the cone (6n, 1 to 3); see
-            :class:`forcefit.assembly.linear.closure.VirtualJoints`.
+        columns: matrix (6n, k) that maps the k coordinates of the cone to the screws of
+            all frames; see :class:`forcefit.assembly.linear.closure.VirtualJoints`.
 
     Returns:
         One of :data:`BOUNDS`.
@@ -101,8 +101,8 @@ def has_bounded_motion(robot: Robot) -> bool:
 def clearance_components(robot: Robot, screws: NDArray) -> NDArray:
     """Return the components of clearance screws to which the bounds apply.
 
-    For a helical joint, component TZ is the translation relative to the thread,
-    TZ - h RZ.  All remaining components are those of the screw.
+    For a helical joint, component TZ is the translation TZ - h RZ relative to the
+    thread. All other components do not change.
 
     Args:
         robot: robot with n frames.

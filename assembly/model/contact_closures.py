@@ -40,7 +40,7 @@ def contact_frames(robot: Robot) -> frozenset[str]:
 
 
 def _apart(robot: Robot, first: str, second: str) -> list[Frame]:
-    """Return the frames that are on the path to only one of two frames."""
+    """Return the frames on the path from the base to exactly one of two frames."""
     paths = robot.on_path[[robot.index(first), robot.index(second)]]
     return [robot.frames[i] for i in np.flatnonzero(paths[0] != paths[1])]
 

@@ -76,7 +76,7 @@ def _feed(update: Callable[[bytes], None], value: Any) -> None:
 
 
 def _feed_parts(update: Callable[[bytes], None], value: Any) -> None:
-    """Add the items of a value to a digest, or the value as a string."""
+    """Add the items of a collection, or the text of any other value, to a digest."""
     if is_dataclass(value):
         update(type(value).__name__.encode())
         parts = _fields_of(value)

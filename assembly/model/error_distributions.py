@@ -34,7 +34,7 @@ from forcefit.results.display import html_table, short_repr
 
 KINDS = ("uniform", "normal", "truncated")
 _LARGEST = 1e3  # [rad, m] largest number in a file of error distributions
-# columns of the result of _rows
+# names of the properties that _rows returns for each error source
 _COLUMNS = (
     "frame", "component", "kind", "centre", "scale", "least", "limit", "signed",
 )  # fmt: skip
@@ -47,7 +47,7 @@ class ErrorSources:
 
     Attributes:
         robot: robot to which the frames belong.
-        frame: index of the frame (m,).
+        frame: index of the frame of each error (m,).
         component: component of the error screw at the frame (m,).
         kind: index into :data:`KINDS` (m,).
         centre: value at s = 0 (m,) [rad or m].
@@ -147,7 +147,7 @@ class ErrorSources:
         return self.scale**2 * np.where(self.kind == 0, uniform, normal)
 
     def of_numbers(self, slopes: NDArray) -> NDArray:
-        """Select the derivatives (..., m) with respect to the sources."""
+        """Select the derivatives (..., m) with respect to the errors of the sources."""
         return np.asarray(slopes[..., self.frame, self.component])
 
     @property
@@ -272,7 +272,7 @@ def read_sources(
 
 
 def _rows(table: Table, robot: Robot) -> list[tuple]:
-    """Return one row per error source in an ``[[errors]]`` table."""
+    """Return the properties of each error source in an ``[[errors]]`` table."""
     names = table.require("frames", "a list of frame names")
     if not isinstance(names, list) or not all(isinstance(n, str) for n in names):
         raise table.bad("frames", "expected a list of frame names")

@@ -79,10 +79,11 @@ class LockedAt:
         joints: drive coordinates [rad or m] at that pose, as an alternative to
             ``pose``.  If both are empty, the joint is bolted in the home pose.
         left: rule for the position within the clearance at which the joint is bolted,
-            used for random draws.  Each rule selects one of the minimum-energy
-            positions: ``"least"`` the one with the minimum sum of squares,
-            ``"uniform"`` a random one, ``"worst"`` the one with the largest pose error,
-            for which ``assembly error`` computes bounds.
+            used for random draws. All rules select a position of minimum energy. The
+            rule ``"least"`` selects the position with the minimum sum of squares, and
+            ``"uniform"`` selects a random position. The rule ``"worst"`` selects the
+            position with the largest pose error, for which ``assembly error`` computes
+            bounds.
         screw: position (6,) [rad, m] within the clearance after bolting, which is part
             of the geometric error.  Computed by
             :func:`forcefit.assembly.steps.bolted.bolt_joints`.
@@ -125,8 +126,8 @@ class Frame(EqualData):
         tolerance: standard deviations of delta l about the given value (6,) [rad, m]; 0
             for exact components, None if unknown.
         clearance: clearance of the joint, or None.
-        locked_at: pose at which a fixed joint is bolted, and its clearance before; None
-            if the joint is not bolted.
+        locked_at: pose at which a fixed joint is bolted, and its clearance before
+            bolting; None if the joint is not bolted.
         joint_stiffness: stiffness K_B of the joint (6, 6), or None.  Rigid directions
             have ``inf`` on the diagonal.  Zeros in the row and column of a passive
             joint's own motion leave this motion free.  An array (6,), as in robot
@@ -140,7 +141,7 @@ class Frame(EqualData):
             [kg m^2], in the frame axes.  The matrix must be symmetric, and its
             principal moments must be those of a physically possible rigid body.
         pitch: translation of a helical joint per turn [m], positive for a right-handed
-            thread; 0 for all remaining joint types.
+            thread; 0 for all other joint types.
     """
 
     name: str
@@ -209,7 +210,7 @@ class Frame(EqualData):
 
     @cached_property
     def _hash(self) -> int:
-        # Robots that are compared often differ only in these numbers.
+        # Compared robots often differ only in translations and geometric errors.
         numbers = self.translation.tobytes() + self.geometric_error.tobytes()
         return hash((self.name, numbers))
 

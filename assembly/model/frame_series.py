@@ -13,8 +13,8 @@ from forcefit.assembly.model.frame import Frame
 from forcefit.stiffness.screws import rotation_matrix, transform
 
 _SAME = 1e-9  # [m] largest distance between coincident frames
-# Joint types, by the name endings and joint types of the frames from the first to the
-# second body.
+# Types of joints that consist of several frames. Each key contains the name ending and
+# the joint type of these frames, in order from the first to the second body.
 _SERIES: dict[tuple[tuple[str, str], ...], str] = {
     (("first", "revolute"), ("second", "revolute")): "universal",
     (
@@ -39,9 +39,9 @@ class NamedJoint:
         name: name of the joint.
         kind: ``"universal"``, ``"spherical"``, ``"cylindrical"`` or ``"planar"``.
         frames: names of the moving frames of the joint, parents first.
-        main: name of the frame whose origin and axes are those of the joint.
-        carriers: names of the frames whose geometric errors are those of the joint: two
-            for a universal joint, otherwise one.
+        main: name of the frame that has the origin and the axes of the joint.
+        carriers: names of the frames to which the geometric error of the joint is
+            assigned: two for a universal joint, otherwise one.
     """
 
     name: str

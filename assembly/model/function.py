@@ -1,7 +1,7 @@
 """Effects that are functions of variables: a small screw or a compliance.
 
-:mod:`forcefit.assembly.effects.forms` defines the forms and their parameters;
-:mod:`forcefit.assembly.effects.functions` applies the effect.
+:mod:`forcefit.assembly.effects.forms` defines the functional forms and their
+parameters; :mod:`forcefit.assembly.effects.functions` applies the effect.
 """
 
 from collections.abc import Mapping

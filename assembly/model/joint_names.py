@@ -2,9 +2,9 @@
 
 A joint with several degrees of freedom is a series of coincident passive frames, for
 example ``ball.first``, each with one degree of freedom
-(:mod:`forcefit.assembly.drawing.parts`).  One of these frames carries the geometric
-error, clearance and springs of the joint; in a universal joint, both frames do.  The
-joints are identified by :mod:`forcefit.assembly.model.frame_series`.
+(:mod:`forcefit.assembly.drawing.parts`). The geometric error, clearance and springs of
+the joint are assigned to one of these frames, or to both frames of a universal joint.
+The joints are identified by :mod:`forcefit.assembly.model.frame_series`.
 """
 
 from collections.abc import Container, Sequence
@@ -26,13 +26,13 @@ CHAIN_START, CHAIN_END, FAR_END = "contacts_start", "contacts_end", "contacts_fa
 _CONTACTS = {
     *BORE, *BEARING, *GUIDE, *GUIDE_FAR, *PAD, CHAIN_START, CHAIN_END, FAR_END,
 }  # fmt: skip
-# Component of the frame slide_x for each component of a planar joint. The z axis of
-# this frame is the x axis of the joint.
+# Component of a screw in the frame slide_x for each component in the axes of a planar
+# joint. The z axis of this frame is the x axis of the joint.
 _OF_PLANE = (2, 0, 1, 5, 3, 4)
 
 
 def row_of(robot: Robot, name: str) -> int:
-    """Return the index of the frame whose origin and axes are those of a joint.
+    """Return the index of the frame that has the origin and the axes of a joint.
 
     Args:
         robot: robot with the joint.
@@ -156,7 +156,7 @@ def owner_of_contact(name: str, names: Container[str]) -> str:
         names: names of all frames and joints.
 
     Returns:
-        For this example ``"foot"``, if ``names`` contains it; an empty string if the
+        The name, for example ``"foot"``, if it is in ``names``; an empty string if the
         frame is not a contact.
     """
     stem, _, end = name.rpartition(".")
@@ -200,7 +200,7 @@ def names_of(robot: Robot) -> list[str]:
 
 
 def joint_paths(joint: NamedJoint, path: str) -> list[str]:
-    """Convert the path of a value of a joint to the paths of the values of its frames.
+    """Convert the parameter path of a joint to the parameter paths of its frames.
 
     Args:
         joint: joint that consists of several frames.

@@ -35,7 +35,8 @@ def with_spans(robot: Robot, home: NDArray) -> Robot:
     links: dict[str, Link] = {}
     for i, frame in enumerate(robot.frames):
         parent = robot.parents[i]
-        # A joint moves its children along z by q if prismatic, and by h q if helical.
+        # A prismatic joint moves its children along z by its coordinate, and a helical
+        # joint by its coordinate times its lead.
         travel = own_screw(robot.frames[parent])[5] if parent >= 0 else 0.0
         shift = float(home[parent] * travel)
         shift = shift if abs(shift) > _SAME_POINT else 0.0

@@ -47,7 +47,7 @@ def refuse_unsolved(frame: Frame) -> NoReturn:
 
 
 def modulus_factor(frame: Frame) -> float:
-    """Return the ratio of Young's modulus of a mesh link to that of its solution."""
+    """Return Young's modulus of a mesh link over the modulus used in its solution."""
     return _mesh(frame).young / mesh_solution(frame).young
 
 

@@ -47,7 +47,7 @@ class PointResults:
         return True
 
     def __getitem__(self, rows: Any) -> Self:
-        """Return the result at one point, or a selection by slice, indices or mask."""
+        """Return the results at one point or at a selection of points."""
         taken = {}
         for name, axes in self.AXES.items():
             values = getattr(self, name)

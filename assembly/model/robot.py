@@ -69,7 +69,8 @@ class Robot(EqualData):
         reference_point: point at which the robot was identified (3,) [m], in platform
             axes; None if the robot was not identified.
         diagnosis: data of the diagnosis that identified the robot: verdict, number of
-            fitted rows, hold-out error, hash of the campaign, path of the covariance.
+            fitted readings, hold-out error, hash of the campaign, path of the
+            covariance file.
         remarks: sentences about default values that a user can overlook.
         callouts: tolerance callouts of features.
         fits: ISO 286 fits by frame, for example ``"12 H7/g6"``; ``radial`` of the
@@ -237,7 +238,7 @@ class Robot(EqualData):
 
 
 def _with_error(frame: Frame, error: NDArray) -> Frame:
-    """Return the frame with a new geometric error, which replaces that of bolting."""
+    """Return the frame with a new geometric error, without an error due to bolting."""
     bolt = frame.locked_at
     if bolt is not None:
         bolt = replace(bolt, screw=np.zeros(6))

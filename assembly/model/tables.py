@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-# names of quantities whose variable has a different name
+# name of the variable for each quantity whose variable has a different name
 _RENAMED = {
     "clearance_screw": "clearance", "link_screw": "link", "joint_screw": "joint",
     "stiffness": "axis_stiffness", "stiffness_matrix": "stiffness", "read_at": "point",
@@ -112,7 +112,7 @@ def points_dataset(values: Mapping[str, NDArray]) -> "xarray.Dataset":
     """Return results at many points as a dataset with the dimension ``point``.
 
     Args:
-        values: arrays (k, ...), by the name of the sweep variable.
+        values: array (k, ...) of each sweep variable, by name.
 
     Returns:
         Dataset with units.
@@ -195,7 +195,7 @@ def labelled(
     """Combine arrays into a dataset with units and descriptions.
 
     Args:
-        values: array of each variable; or a pair of a
+        values: array of each variable by name, or a pair of a
             :class:`~forcefit.results.quantities.Quantity` and its array.
         axis: name of a common first dimension of all arrays, or empty.
         points: labels along this dimension.

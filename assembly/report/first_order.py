@@ -44,7 +44,7 @@ def first_order_status(
         finite: text on the exact solution.
 
     Returns:
-        ``status`` and ``reason`` of the public format; empty if the analysis is valid.
+        ``status`` and ``reason`` of the JSON output; empty if the analysis is valid.
     """
     change = abs(linearisation.get("relative_energy", 0.0))
     scale = np.repeat([1.0, assembly.linearisation.size], 3)
@@ -74,7 +74,7 @@ def posture_status(
         gravity: (3,) [m/s^2] gravity in base axes.
 
     Returns:
-        ``status`` and ``reason`` of the public format; empty for any other posture.
+        ``status`` and ``reason`` of the JSON output; empty for any other posture.
     """
     if passed := limits_passed(posture.robot, posture.coordinates):
         return {"status": BEYOND_LIMITS, "reason": passed}
@@ -92,7 +92,7 @@ def singular_status(
         gravity: (3,) [m/s^2] gravity in base axes.
 
     Returns:
-        ``status`` and ``reason`` of the public format; empty for any other posture.
+        ``status`` and ``reason`` of the JSON output; empty for any other posture.
     """
     if not _singular(posture):
         return {}

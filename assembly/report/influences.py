@@ -23,11 +23,11 @@ def influences_among_joins(
         machine: the robot at its posture.
         state: state before the step.
         plan: assembly steps.
-        number: index of the first of these steps.
+        number: index of the first joining step.
 
     Returns:
-        The influences. Empty if the previous step also joins, or if joints are not in
-        contact.
+        The influences; empty if the previous step is also a joining step, or if no
+        joint is in contact.
     """
     before = plan.steps[number - 1] if number else None
     if isinstance(before, Join) or not state.is_linear(machine):
@@ -37,7 +37,7 @@ def influences_among_joins(
 
 
 def about_influences(plan: Plan, found: list[Influence]) -> list[str]:
-    """Return sentences on the order of the steps and on openings that they move.
+    """Return sentences on the order of the steps and on the loop openings they change.
 
     Args:
         plan: assembly steps.

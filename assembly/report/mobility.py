@@ -77,7 +77,8 @@ def mobility_of(posture: Posture) -> dict[str, Any]:
     singular = near.freedoms < here.freedoms
     singular |= there.freedoms_drives_locked < here.freedoms_drives_locked
     if singular and near.there is not None:
-        # Nearby motions are omitted, because operation modes may intersect here.
+        # Motions at nearby postures are omitted, because operation modes may intersect
+        # at a singular posture.
         counts["near"] = vars(near.there)
     counts |= {"singular": singular, "finite_freedoms": near.freedoms}
     return counts | {"words": mobility_words(counts)}

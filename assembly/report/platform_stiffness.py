@@ -30,7 +30,7 @@ from forcefit.results.text import lines_of, table_lines, value_text
 from forcefit.stiffness.screws import SCREW, WRENCH
 
 DIRECTIONS = tuple(name.lower() for name in SCREW)
-# names of both directions of a contact change in the public format
+# names of the loading and the unloading direction in the JSON output
 _SIDES: dict[Side, str] = {"loading": "holding", "unloading": "letting go"}
 _KINDS = {"link": "links", "joint": "joints", "clearance": "clearances"}
 _SHOWN = 12  # number of contributions in tables and charts
@@ -58,7 +58,7 @@ def stiffness_of(
         direction: (6,) unit screw in base axes for an additional stiffness, or None.
 
     Returns:
-        The keys of the public format. ``status`` is ``"ok"``, ``"free motion"``,
+        The keys of the JSON output. ``status`` is ``"ok"``, ``"free motion"``,
         ``"unstable"``, or the reason why there is no equilibrium.
     """
     results: dict[str, Any] = {

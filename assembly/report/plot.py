@@ -240,7 +240,7 @@ def finitely_displaced_bodies(assembly: ExactAssembly) -> DisplacedBodies:
     posture = assembly.posture
     nominal = posture.transforms
     ends = assembly.placement.body_ends[assembly.cut.last]
-    # row -1 for the base
+    # the last row is for the base
     at_start, at_end = np.zeros((len(nominal) + 1, 6)), np.zeros((len(nominal), 6))
     for screws, T in ((at_start[:-1], assembly.transforms), (at_end, ends)):
         turned = T[:, :3, :3] @ np.swapaxes(nominal[:, :3, :3], 1, 2)

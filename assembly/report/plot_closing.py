@@ -1,7 +1,7 @@
 """Animation of a robot from open loops to the assembled state.
 
 In the first picture, the loops are open due to geometric errors. Deformations and joint
-motions increase from zero to those of the minimum-energy solution (22).
+motions increase from zero to their values in the minimum-energy solution (22).
 """
 
 from collections.abc import Iterator

@@ -49,7 +49,7 @@ def pose_error_of(
             :func:`forcefit.assembly.linear.pose_error.bound_pose_error`.
 
     Returns:
-        The keys of the public format.
+        The keys of the JSON output.
 
     Raises:
         BadInput: there is a load, and the assumption is ``budget`` or a joint has
@@ -83,7 +83,7 @@ def pose_error_of(
         for name in assumptions:
             try:
                 bound = bound_pose_error(assembly, name, offset=offset, **options)
-            except FreeMotion as error:  # for "free", there may be no spring
+            except FreeMotion as error:  # a motion may have no spring
                 no_bounds = dict.fromkeys(("rotation", "translation"))
                 table[name] = no_bounds | {"reason": str(error)}
                 continue
@@ -142,7 +142,7 @@ def _support(
 
 
 def _bracket(bounds: Sequence[float] | NDArray, screw: NDArray) -> dict[str, Any]:
-    """Return a dictionary of both bounds and the screw of the lower bound."""
+    """Return the lower and upper bound and the screw of the lower bound by name."""
     return {"lower": bounds[0], "upper": bounds[1], "platform_screw": screw}
 
 

@@ -98,7 +98,7 @@ def solution_of(
         gravity: (3,) [m/s^2] gravity in base axes.
 
     Returns:
-        The keys of the public format. ``status`` is ``"ok"``, ``"not proved"``
+        The keys of the JSON output. ``status`` is ``"ok"``, ``"not proved"``
         (incomplete certificate), ``"singular"`` (invalid first-order solution) or the
         type of failure. ``reason`` contains details.
     """
@@ -212,8 +212,8 @@ def exact_of(
         progress: argument of :func:`forcefit.assembly.exact.exact.solve_exact`.
 
     Returns:
-        The keys of the public format. ``status`` may be ``"unstable"`` in addition to
-        the values in :func:`solution_of`.
+        The keys of the JSON output. ``status`` may be ``"unstable"`` in addition to the
+        values in :func:`solution_of`.
     """
     results: dict[str, Any] = {
         "robot": posture.robot.name, "status": "ok", "pose": posture.pose(),

@@ -54,9 +54,9 @@ def show(
         see a figure.
 
     Raises:
-        BadInput: the object has another type or many points; ``errors`` is given for
-            another object than an assembly or for an assembly with a free motion; or
-            matplotlib is not installed.
+        BadInput: the type of the object is not supported, or the object has many
+            points; ``errors`` is given for an object that is not an assembly, or for an
+            assembly with a free motion; or matplotlib is not installed.
         SolverFailed: the cone solver failed for ``errors``.
     """
     if interactive is None:

@@ -148,7 +148,7 @@ def drawn_steps(
 ) -> dict[str, Any]:  # fmt: skip
     """Compute quantiles of the results over many robots with random errors.
 
-    After Ctrl-C, the quantiles are those of the robots assembled so far.
+    After Ctrl-C, quantiles are computed for the robots that have been assembled.
 
     Args:
         plan: assembly steps, which have been checked.

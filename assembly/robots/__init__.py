@@ -44,8 +44,8 @@ def load_robot(name: str | Path, close: Closing | None = None) -> Robot:
         :func:`forcefit.assembly.exchange.robot_files.load_robot`.
 
     Raises:
-        BadInput: the name is neither that of a built-in robot nor a file, or the file
-            is invalid.
+        BadInput: the name is neither a built-in robot nor a file, or the file is
+            invalid.
     """
     if str(name) in BUILT_IN:
         robot = BUILT_IN[str(name)]()

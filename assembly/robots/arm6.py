@@ -52,7 +52,8 @@ def arm6(parameters: Arm6Parameters | None = None) -> Robot:
     """Return the arm at its home posture.
 
     Args:
-        parameters: parameters of the arm; by default those of :class:`Arm6Parameters`.
+        parameters: parameters of the arm; by default an :class:`Arm6Parameters`
+            instance.
 
     Returns:
         The arm with 7 frames and no closure; platform ``flange``.  A joint's coordinate

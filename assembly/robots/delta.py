@@ -61,8 +61,8 @@ def delta(parameters: DeltaParameters | None = None) -> Robot:
     """Return the robot at its home pose, on its vertical axis.
 
     Args:
-        parameters: parameters of the robot; by default those of
-            :class:`DeltaParameters`.
+        parameters: parameters of the robot; by default a :class:`DeltaParameters`
+            instance.
 
     Returns:
         The robot with 48 frames and 5 closures; platform ``leg1.a_tip``.  The

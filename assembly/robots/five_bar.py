@@ -35,8 +35,8 @@ def five_bar(parameters: FiveBarParameters | None = None) -> Robot:
     """Return the robot in its home pose, with both elbows outward.
 
     Args:
-        parameters: parameters of the robot; by default those of
-            :class:`FiveBarParameters`.
+        parameters: parameters of the robot; by default a :class:`FiveBarParameters`
+            instance.
 
     Returns:
         The robot with 9 frames and 1 closure.  The platform ``left.tip`` is on the

@@ -44,8 +44,8 @@ def four_bar(parameters: FourBarParameters | None = None) -> Robot:
     """Return the linkage at its home angle.
 
     Args:
-        parameters: parameters of the linkage; by default those of
-            :class:`FourBarParameters`.
+        parameters: parameters of the linkage; by default a :class:`FourBarParameters`
+            instance.
 
     Returns:
         The linkage with 8 frames and 1 closure.  The platform ``point`` is the tracing
@@ -84,8 +84,9 @@ def corners(angle: float) -> tuple[NDArray, ...]:
     """
     foot, tip = np.array([2.0, 0.0]), direction(angle)
     to_pin = tip - foot
-    # By Thales' theorem, the line from the foot to the point is perpendicular to this
-    # line, and the point has a distance of 5 from the crank pin.
+    # By Thales' theorem, the line from the foot to the point is perpendicular to the
+    # line from the foot to the crank pin, and the point has a distance of 5 from the
+    # crank pin.
     across = np.array([to_pin[1], -to_pin[0]]) / np.linalg.norm(to_pin)
     point = foot + np.sqrt(25.0 - to_pin @ to_pin) * across
     return foot, tip, (tip + point) / 2, point

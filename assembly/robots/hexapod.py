@@ -53,8 +53,8 @@ def hexapod(parameters: HexapodParameters | None = None) -> Robot:
     """Return the robot at its home pose, with the platform parallel to the base.
 
     Args:
-        parameters: parameters of the robot; by default those of
-            :class:`HexapodParameters`.
+        parameters: parameters of the robot; by default a :class:`HexapodParameters`
+            instance.
 
     Returns:
         The robot with 42 frames and 5 closures; platform ``leg1.tip``.  The coordinate

@@ -13,9 +13,9 @@ Errors act at the frames :data:`ERROR_FRAMES`.
 symbol  meaning [m, rad]
 ======  ===========================================================================
 b       distance from the base's origin to the parallelogram's first joint
-d       fixed side of the parallelogram, alpha its angle to the platform's plane
-f g e   from the parallelogram's end to the universal joints, base axes
-p a     from the far universal joints to the platform, base axes
+d       fixed side of the parallelogram; alpha is its angle to the platform plane
+f g e   offsets from the parallelogram to the universal joints, in base axes
+p a     offsets from the distal universal joints to the platform, in base axes
 L1 L2   moving side of the parallelogram, links of the distal module
 beta    azimuth and (alpha_d) altitude of the universal joints' body-fixed axis
 ======  ===========================================================================
@@ -41,9 +41,9 @@ NAMES = (
     "loop1_elbow", "loop1_idler", "loop2_platform", "loop2_link", "tip",
 )  # fmt: skip
 ERROR_FRAMES = ("elbow_a", "link_a", "elbow_b", "link_b", "loop2_platform", "tip")
-# [rad, m] smallest errors in the paper
+# [rad, m] minimum absolute values of the random error components in the paper
 ERROR_LEAST = (1e-4, 1e-4, 1e-4, 1e-6, 1e-6, 1e-6)
-# [rad, m] largest errors in the paper
+# [rad, m] maximum absolute values of the random error components in the paper
 ERROR_MOST = (2e-2, 2e-2, 2e-2, 2e-4, 2e-4, 2e-4)
 
 _PARENTS = {
@@ -90,9 +90,9 @@ def irsbot2(
     """Return the robot, whose joint coordinates are all zero in its home pose.
 
     Args:
-        parameters: parameters of the robot; by default those of the paper.
-        x: [m] platform position in the home pose.
-        z: [m] platform position in the home pose.
+        parameters: parameters of the robot; by default the parameters of the paper.
+        x: [m] x coordinate of the platform in the home pose.
+        z: [m] z coordinate of the platform in the home pose.
 
     Returns:
         The robot with 42 frames and 5 closures; platform ``leg1.tip``, parallel to the
@@ -126,8 +126,8 @@ def drive_angle(parameters: IRSBot2Parameters, x: float, z: float) -> float:
 
     Args:
         parameters: parameters of the robot.
-        x: [m] platform position; its negative for leg 2.
-        z: [m] platform position.
+        x: [m] x coordinate of the platform for leg 1, or its negative for leg 2.
+        z: [m] z coordinate of the platform.
 
     Returns:
         [rad] the angle q.
@@ -161,8 +161,8 @@ def _leg(P: IRSBot2Parameters, x: float, z: float) -> dict[str, NDArray]:
     A = np.array([P.b, 0.0, 0.0])
     C = A + P.L1 * arm
     platform = np.array([x, 0.0, z])
-    # Revolute axes are perpendicular to the x-z plane, and x axes along the moving
-    # side.
+    # Revolute axes are perpendicular to the x-z plane. The x axes are along the moving
+    # side of the parallelogram.
     swing = _axes(arm, np.array([0.0, -1.0, 0.0]))
     placed = {
         "drive": transform(A, swing), "elbow": transform(C, swing),

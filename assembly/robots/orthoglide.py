@@ -48,8 +48,8 @@ def orthoglide(parameters: OrthoglideParameters | None = None) -> Robot:
     """Return the robot at its isotropic point.
 
     Args:
-        parameters: parameters of the robot; by default those of
-            :class:`OrthoglideParameters`.
+        parameters: parameters of the robot; by default an :class:`OrthoglideParameters`
+            instance.
 
     Returns:
         The robot with 30 frames and 5 closures; platform ``x.tip``.  The coordinate of
@@ -71,7 +71,7 @@ def orthoglide(parameters: OrthoglideParameters | None = None) -> Robot:
 def _leg(
     name: str, along: NDArray, hinge: NDArray, P: OrthoglideParameters
 ) -> list[PlacedFrame]:
-    """Return the frames of a leg along one base axis, with hinges along another."""
+    """Return the frames of a leg along a base axis, with hinges along a second axis."""
     near, far = -(P.leg + P.platform) * along, -P.platform * along
     slide = Frame(
         f"{name}.slide", joint="prismatic", actuated=True, position=-P.leg,

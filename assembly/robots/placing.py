@@ -70,8 +70,8 @@ def ball_joint(
 ) -> list[PlacedFrame]:  # fmt: skip
     """Return a ball joint, modelled as three revolute joints at one point.
 
-    The axes are perpendicular at home.  The joint is singular at a right angle of the
-    second revolute joint.
+    The axes are perpendicular at home. The joint is singular if the second revolute
+    joint is rotated by a right angle.
 
     Args:
         name: name of the joint; its frames are ``name_1`` to ``name_3``.

@@ -53,8 +53,8 @@ def three_rrr(parameters: ThreeRRRParameters | None = None) -> Robot:
     """Return the robot at its home pose, with the platform parallel to the base.
 
     Args:
-        parameters: parameters of the robot; by default those of
-            :class:`ThreeRRRParameters`.
+        parameters: parameters of the robot; by default a :class:`ThreeRRRParameters`
+            instance.
 
     Returns:
         The robot with 15 frames and 2 closures; platform ``leg1.tip``, the centre of

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 _TASK = 0.5  # [s] target duration of a task
 _IN_FLIGHT = 3  # number of simultaneously submitted tasks per thread
 _LARGEST = 256  # largest number of blocks per task
-_LAST = 2  # minimum number of tasks per thread for the remaining blocks
+_LAST = 2  # minimum number of tasks per thread into which the last blocks are divided
 # The profiler of Dask makes workers about 3 % slower.
 _QUIET = {"distributed.worker.profile.enabled": False}
 _PATIENCE = 60.0  # [s] time limit for the connection of the first worker
@@ -217,7 +217,7 @@ def solve_task(
 
     Args:
         question: pickled :class:`Question` of the sweep.
-        digest: digest of the question on the client.
+        digest: digest of this :class:`Question` on the client.
         tasks: index and points of each block.
 
     Returns:
@@ -237,7 +237,7 @@ def solve_task(
 
 @lru_cache(maxsize=4)
 def _question(content: bytes, digest: str) -> Question:
-    """Return the question of a sweep, cached for all tasks of a worker."""
+    """Return the :class:`Question` of a sweep, cached for all tasks of a worker."""
     asked: Question = pickle.loads(content)
     question = replace(asked, robot=solve_links(asked.robot))
     if question_hash(question) != digest:

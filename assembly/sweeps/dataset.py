@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from forcefit.assembly.sweeps.plan import Sweep
 
 Texts = dict[str, dict[int, str]]
-# kinds of NetCDF files, and an attribute that only this kind has
+# kinds of NetCDF files, and for each kind an attribute that identifies it
 KINDS = {
     "a sweep": "near", "draws": "sources_and_posture_sha256", "tolerances": "cost_law",
     "a path": "path_law",
@@ -239,7 +239,8 @@ def check_dataset(path: Path | str, what: str) -> None:
         what: required kind of an existing file, one of :data:`KINDS`.
 
     Raises:
-        BadInput: an existing file is of another kind, or the file cannot be written.
+        BadInput: an existing file is of a different kind, or the file cannot be
+            written.
     """
     check_writable(path, NETCDF)
     path = Path(path)

@@ -75,7 +75,7 @@ class Journal:
         self.places[block] = start + len(head), len(content)
 
     def remove_after(self, held: ExitStack) -> None:
-        """Remove the file when ``held`` is closed without an exception."""
+        """Remove the file when the stack ``held`` is closed without an exception."""
 
         def remove(kind: object, *_: object) -> None:
             if kind is None:
@@ -156,7 +156,7 @@ def open_journal(
 
 
 def _recover(path: Path, header: bytes, owner: int) -> dict[int, tuple[int, int]]:
-    """Return the places of finished blocks in a journal, and repair the file."""
+    """Return the positions of finished blocks in a journal, and repair the file."""
     try:
         with path.open("r+b") as file:
             size = os.fstat(file.fileno()).st_size
@@ -167,8 +167,8 @@ def _recover(path: Path, header: bytes, owner: int) -> dict[int, tuple[int, int]
                 with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
                     places, end = _scan(content, len(header), owner)
             if first_line != header:
-                # If there are valid records, the sweep is the same and only the line is
-                # damaged.
+                # If the journal has valid records, it belongs to this sweep and only
+                # its first line is damaged.
                 if not places and not header.startswith(first_line):
                     file.seek(0)
                     raise BadInput(f"{path}: {_difference(file.readline(), header)}")
@@ -183,7 +183,7 @@ def _recover(path: Path, header: bytes, owner: int) -> dict[int, tuple[int, int]
 def _scan(
     content: mmap.mmap, start: int, owner: int
 ) -> tuple[dict[int, tuple[int, int]], int]:
-    """Return the places of all valid records, and the end of the last one."""
+    """Return the positions of all valid records, and the end of the last record."""
     places: dict[int, tuple[int, int]] = {}
     end = start
     place = content.find(_MAGIC, start)
@@ -209,7 +209,7 @@ def _check(owner: int, block: int, content: bytes) -> int:
 
 
 def _difference(first_line: bytes, header: bytes) -> str:
-    """Return a description of how a journal differs from the expected one."""
+    """Return a text on the differences between a journal and the expected journal."""
     expected = json.loads(header.rpartition(b" ")[0])
     line, _, check = first_line.rstrip(b"\n").rpartition(b" ")
     if not first_line.startswith(b'{"kind": "forcefit sweep journal'):

@@ -33,7 +33,7 @@ def figure_of(
         at: values of the axes that are not drawn, by name. The nearest points are used.
             Without a value for ``draw``, medians over all draws are drawn.
         quantities: names of quantities, see :mod:`forcefit.assembly.sweeps.panels`; by
-            default those in figure 5 of the paper.
+            default the quantities in figure 5 of the paper.
 
     Returns:
         A figure with one panel per quantity, which a notebook displays as the result of
@@ -159,7 +159,7 @@ def map_figure(
 
     Args:
         data: data set of a sweep over two axes with several values each.
-        panels: panels to draw; by default those of figure 5 of the paper and the
+        panels: panels to draw; by default the panels of figure 5 of the paper and the
             status.
 
     Returns:
@@ -213,7 +213,7 @@ def path_figure(
 
     Args:
         data: data set of a sweep over one axis.
-        panels: panels to draw; by default those of figure 5 of the paper and the
+        panels: panels to draw; by default the panels of figure 5 of the paper and the
             condition number.
 
     Returns:

@@ -126,7 +126,8 @@ def check_heaps(path: Path) -> None:
             end, place = start + min(length, size - start), start + 16
             while place + 16 <= end:
                 number, _, own = struct.unpack_from("<HH4xQ", data, place)
-                # An entry is a text or, with number 0, free space including its header.
+                # An entry contains a text. An entry with number 0 is free space, whose
+                # size includes the header.
                 step = 16 + -(-own // 8) * 8 if number else own
                 if step < 16:
                     raise BadInput(f"{path}: cannot be read as NetCDF: damaged heap")

@@ -23,7 +23,7 @@ class Sweep:
     """Quantities to compute, and the points at which to compute them.
 
     Attributes:
-        question: the quantities.
+        question: quantities to compute at each point.
         targets: the postures.
         values: values of each varied parameter, in the order of ``question.varied``.
         draws: number of random draws of errors; 0 to use the errors in the robot file.
@@ -127,6 +127,6 @@ class Sweep:
             "strength": str(question.strength),
             "conditions": str((question.load, question.gravity, dict(question.under))),
             "block": str(self.block_size),
-            # digest of all attributes of the question
+            # digest of all attributes of ``question``
             "question_sha256": question_hash(question),
         }

@@ -35,7 +35,8 @@ def note_geometry(
         postures: the reachable postures.
         rows: for each posture, the indices of its records.
         records: records of the points, which are modified.
-        near_singularity: names of nearby singularities by row, which are modified.
+        near_singularity: names of nearby singularities by index of the record, which
+            are modified.
 
     Returns:
         Status and reason for each posture, as in

@@ -71,7 +71,7 @@ def nominal_stiffnesses(
         posture: the k postures.
 
     Returns:
-        Quantities by name, each with k rows; and texts on free motions by row.
+        Quantities by name, each with k rows; and texts on free motions by row index.
     """
     many: Any = platform_stiffness(posture)  # Stiffnesses
     return many_quantities(many), {i: one.free_text for i, one in many.apart.items()}
@@ -87,8 +87,8 @@ def tangent_stiffnesses(
         state: ``"contact"`` or ``"exact"``.
 
     Returns:
-        The quantities of :func:`nominal_stiffnesses`, which are NaN without an
-        equilibrium; and reasons by row.
+        The quantities of :func:`nominal_stiffnesses`, which are NaN for rows without an
+        equilibrium; and the reasons for these rows, by row index.
     """
     parts = _parts(conditions.robot, state)
     rows, reasons = [], {}
@@ -109,7 +109,7 @@ def tangent_stiffnesses(
 
 
 def _tangent(conditions: Conditions, i: int, state: str) -> PlatformStiffness:
-    """Compute the tangent stiffness at a point, for unloading at a contact change."""
+    """Compute the tangent stiffness at a point, for unloading if a contact changes."""
     if conditions.laws or any(not place.linear for place in conditions.yields):
         raise SolverFailed(
             "tangent",

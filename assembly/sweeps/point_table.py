@@ -17,7 +17,8 @@ if TYPE_CHECKING:
     import pandas
     import xarray
 
-# variables with the axes of the rows, for sweeps and draws or for tolerances
+# variables whose axes are the axes of the table rows: ``status`` for sweeps and draws,
+# ``tolerance`` for tolerances
 _OF_POINTS = ("status", "tolerance")
 
 
@@ -66,7 +67,7 @@ def write_point_table(
     """Write the table of :func:`point_table` as a CSV file.
 
     The columns are ``id`` (row index from 0), the axes, and ``variable.component
-    [unit]``. Cells of NaN are empty.
+    [unit]``. NaN values are written as empty cells.
 
     Args:
         data: see :func:`point_table`.

@@ -138,7 +138,7 @@ def _robots(question: Question, values: tuple[float, ...]) -> tuple[Robot, Robot
 def _solve_variant(
     question: Question, points: Points, solved: SolvedPoints, first: int
 ) -> None:
-    """Solve points of one design, and store the results from record ``first``."""
+    """Solve points of one design, and store the results from record ``first`` on."""
     count = len(points.rows)
     runs = list(_runs(points.rows))
     starts = [run.start for run in runs]
@@ -210,7 +210,7 @@ def _fail(solved: SolvedPoints, rows: range, status: str, reason: str) -> None:
 
 
 def _errors(question: Question, robot: Robot, draws: NDArray) -> NDArray:
-    """Return random errors, (k, n, 6) [rad, m], including those of bolted joints."""
+    """Return random errors, (k, n, 6) [rad, m], including errors of bolted joints."""
     pages = {page: _page(question, page) for page in np.unique(draws // _PAGE).tolist()}
     own, which = np.unique(draws, return_inverse=True)
     errors = np.array([pages[d // _PAGE][d % _PAGE] for d in own.tolist()])
@@ -282,7 +282,7 @@ def _solve_reached(
 def _solved_rows(
     energies: Assembly, failed: Mapping[int, str], solved: SolvedPoints, rows: NDArray
 ) -> list[int]:
-    """Return the points with a solution, and store the status of the others."""
+    """Return the points with a solution, and store the status of all other points."""
     ok = []
     for i, row in enumerate(rows.tolist()):
         status, reason = energies.status[i], energies.reason[i]

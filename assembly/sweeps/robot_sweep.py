@@ -85,7 +85,7 @@ def sweep(
         mismatch: ``"spring"`` to preload redundant drives by the closure error in the
             home pose.
         output: NetCDF file to write. An interrupted sweep resumes from the points in
-            ``<output>.journal``, and the file is the same.
+            ``<output>.journal``. The file does not depend on interruptions.
         progress: function called with the number of finished points and the number of
             all points.
         solve: function that solves blocks of points, for example on a cluster, see

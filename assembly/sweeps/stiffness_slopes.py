@@ -21,7 +21,7 @@ _AS_ERROR = {"translation": "t", "rotation": "r"}
 
 
 class CannotChange(BadInput):
-    """No other value of a number gives a valid robot."""
+    """Error for a number in a robot file that cannot be changed on its own."""
 
 
 def stiffness_slopes(
@@ -44,8 +44,9 @@ def stiffness_slopes(
         under: covariates of the effects.
 
     Returns:
-        By path, derivative of the compliance in base axes, (6, 6) [rad/(N m) .. m/N per
-        unit of the number]. It is NaN for free motions and at a contact change.
+        For each path, the derivative of the compliance in base axes, (6, 6) [rad/(N m)
+        .. m/N per unit of the number]. It is NaN for free motions and at a contact
+        change.
 
     Raises:
         BadInput: no number has a given path.

@@ -75,7 +75,7 @@ def run_sweep(
     """Solve a sweep and write a NetCDF file.
 
     Finished blocks are stored in the journal ``<path>.journal``, from which an
-    interrupted sweep resumes. The resulting file is the same.
+    interrupted sweep resumes. The resulting file does not depend on interruptions.
 
     Args:
         sweep: sweep to solve.
@@ -83,8 +83,8 @@ def run_sweep(
         progress: function called after each block with the number of finished points
             and the number of all points.
         solve: function that solves blocks, such as :func:`solve_here`.
-        held: exit stack whose closing removes the journal. By default, the journal is
-            removed when the file is complete.
+        held: exit stack that removes the journal when it is closed. By default, the
+            journal is removed when the file is complete.
 
     Raises:
         BadInput: the journal belongs to another sweep or is used by another process, or

@@ -49,7 +49,7 @@ class Targets:
         return self.names if self.labels is None else ("posture",)
 
     def at(self, numbers: NDArray) -> NDArray:
-        """Return the components of postures, (k, components), by index."""
+        """Return the components of postures with given indices, (k, components)."""
         if self.labels is not None:
             return np.stack([v[numbers] for v in self.values], axis=1)
         places = np.unravel_index(numbers, self.shape)
