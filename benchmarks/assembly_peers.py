@@ -152,7 +152,7 @@ def moreau_batched(postures: list[Posture]) -> float:
     A = np.array([np.vstack([np.hstack([u, y, q]), limits]) for q, u, y, _ in data])
     at = np.nonzero(np.any(A, axis=0))
     offsets = np.cumsum([0, *np.bincount(at[0], minlength=A.shape[1])])
-    stored = len(group) + np.arange(springs)  # unit quadratic cost on the springs
+    stored = len(group) + np.arange(springs)  # spring unknowns
     P_offsets = np.searchsorted(stored, np.arange(A.shape[2] + 1))
     solver = moreau.CompiledSolver(
         A.shape[2], A.shape[1], P_offsets, stored, offsets, at[1],

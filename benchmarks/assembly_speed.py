@@ -219,7 +219,7 @@ def print_calls(robot: Robot, postures: list[Posture]) -> None:
 
 
 def print_certified(robot: Robot, postures: list[Posture]) -> None:
-    """Print the fraction of certified points, and the use of the reference method."""
+    """Print the fractions of certified points and of reference solutions."""
     at = together(postures)
     print(f"\ncertified energies of {len(postures)} points")
     for kappa in (0.0, 0.05, 0.1, 0.2, 0.5, 1.0):

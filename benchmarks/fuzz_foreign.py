@@ -139,7 +139,7 @@ MADE_FOREIGN = [
 
 
 def write_foreign(folder: Path) -> None:
-    """Write all files except those that commands write.
+    """Write all files that are not written by commands.
 
     Args:
         folder: folder that contains the robot ``arm.toml``.

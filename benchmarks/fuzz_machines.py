@@ -77,7 +77,7 @@ MADE_MACHINES = [
 
 
 def write_machines(folder: Path) -> None:
-    """Write all files except those that commands write.
+    """Write all files that are not written by commands.
 
     Args:
         folder: folder with ``arm.toml``, ``smr.toml`` and ``campaign/robot.toml``.

@@ -209,7 +209,7 @@ COMMANDS = [
 
 
 def write_seeds(folder: Path) -> None:
-    """Write all input files except those that commands write.
+    """Write all input files that are not written by commands.
 
     Args:
         folder: empty folder.

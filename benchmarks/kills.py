@@ -194,7 +194,7 @@ def points_in_all(case: Case) -> int:
 
 
 def spoil(path: Path, case: Case, random: Random, counts: Counter) -> int:
-    """Truncate a journal, flip a bit or do nothing, and return the intact points."""
+    """Truncate a journal, flip a bit or do nothing, and count the intact points."""
     content = bytearray(path.read_bytes())
     sound = records(bytes(content), case)
     everything = sum(points for *_, points in sound)
@@ -227,7 +227,7 @@ def trial(case: Case, random: Random, counts: Counter, small: bool) -> None:
         before = {
             *Path().glob("*.part"),
             *Path().glob("*.lock"),
-        }  # files of a killed child
+        }  # temporary files of a killed process
         child = start(case.words, limit)
         if way == "full":
             status = finish(child)

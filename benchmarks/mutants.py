@@ -3,17 +3,17 @@
     python -m benchmarks.mutants [COUNT] [--seed N] [--only FOLDER] [--files PATH ...]
         [--seconds S] [--traced FOLDER]
 
-The tests are run once, and the lines and the time of each test are recorded.  This
-trace is stored in the folder after --traced, and updated for folders with changed
-tests.  For each fault, the tests that execute its line are run until the first failure,
-for up to S seconds.  Near and short tests are run first.  If no test fails, the fault
-survives.
+The tests are run once, and the lines and the time of each test are recorded. This trace
+is stored in the folder after --traced, and updated for folders with changed tests. For
+each fault, the tests that execute its line are run until the first failure, for up to S
+seconds. Short tests and tests of the same folder are run first. If no test fails, the
+fault survives.
 
 Faults within functions are injected into an imported module (``exchanged_code.py``).
 All other faults are written into a copy of the source tree.  C++ code is excluded.
 
-With --files, all faults of these files are tested instead of COUNT random faults.  The
-program prints the fraction of detected faults and lists all others.
+With --files, all faults of these files are tested instead of COUNT random faults. The
+program prints the fraction of detected faults and lists the undetected faults.
 """
 
 import argparse
@@ -119,7 +119,7 @@ def asked_for(asked: argparse.Namespace) -> list[Fault]:
 
 
 def main() -> None:
-    """Test the faults, print the fraction detected, and list the others."""
+    """Test the faults, print the detected fraction, and list undetected faults."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("count", nargs="?", type=int, default=300)
     parser.add_argument("--seed", type=int, default=1)

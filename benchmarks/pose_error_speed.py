@@ -1,8 +1,8 @@
 """Measure the speed of problem (27) on one core, compared with global solvers.
 
-Run ``python benchmarks/pose_error_speed.py``, which takes some minutes.  The robot and
-the grid are those of ``benchmarks/assembly_speed.py``.  Rotation and translation errors
-are computed
+Run ``python benchmarks/pose_error_speed.py``, which takes some minutes. The robot and
+the grid are the same as in ``benchmarks/assembly_speed.py``. Rotation and translation
+errors are computed
 
 - without geometric errors, with the assumption ``frozen``;
 - with geometric errors and the assumption ``free``, at the points inside the assembly
@@ -44,9 +44,9 @@ from forcefit.assembly.model.robot import Robot
 from forcefit.assembly.solvers import conic
 from forcefit.assembly.solvers.cones import cone_sizes
 
-SAMPLE = 6  # number of points that the other solvers solve
+SAMPLE = 6  # number of points for all solvers except forcefit
 UNIT = 1e-3  # [rad, m] unit of poses for other solvers
-TOLERANCE = 1e-6  # [rad or m] difference between both bounds
+TOLERANCE = 1e-6  # [rad or m] accepted difference between the lower and upper bound
 LIMIT = 30.0  # [s] time limit for each point
 PARTS = {"rotation": slice(0, 3), "translation": slice(3, 6)}
 
@@ -70,7 +70,7 @@ def scaled(
 
 
 def box(c: NDArray, X: NDArray, group: NDArray) -> tuple[NDArray, NDArray]:
-    """Return the bounds of x without the loop-closure equations."""
+    """Return the bounds of x if the loop-closure equations are omitted."""
     reach = np.array([cone_sizes(row, group).sum() for row in X])
     return c - reach, c + reach
 

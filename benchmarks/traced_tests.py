@@ -139,7 +139,7 @@ class Trace:
         return tests & self.seconds.keys()
 
     def nearest(self, fault: Fault) -> list[str]:
-        """Return the tests that execute a fault, near and short tests first."""
+        """Return the tests that execute a fault, with tests near the fault first."""
         tests = self.of(fault.path, fault.rows)
         if fault.name:
             named = re.compile(rf"\b{fault.name}\b")
@@ -150,7 +150,7 @@ class Trace:
         return sorted(tests, key=self.cost(fault))
 
     def cost(self, fault: Fault) -> Callable[[str], float]:
-        """Return the time [s] of a test, which is reduced for tests near the fault."""
+        """Return a function that computes the sort key of a test for a fault [s]."""
         near = f"tests/{fault.path.parent}/test_{fault.path.stem}"
 
         def cost(test: str) -> float:

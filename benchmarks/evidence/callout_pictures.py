@@ -110,7 +110,7 @@ def face(panel: Axes, zone: Zone, width: float | None) -> None:
 def of_axis(
     zone: Zone, width: float | None, components: tuple[int, int] = (3, 1)
 ) -> Callable[[Axes, Axes], None]:
-    """Return a function that draws both panels of an axis."""
+    """Return a function that draws both panels for the zone of an axis."""
 
     def draw(left: Axes, right: Axes) -> None:
         bore(left, zone, width)
@@ -122,7 +122,7 @@ def of_axis(
 def of_face(
     zone: Zone, width: float | None, components: tuple[int, int] = (5, 1)
 ) -> Callable[[Axes, Axes], None]:
-    """Return a function that draws both panels of a face."""
+    """Return a function that draws both panels for the zone of a face."""
 
     def draw(left: Axes, right: Axes) -> None:
         face(left, zone, width)
@@ -139,7 +139,7 @@ def point(left: Axes, right: Axes) -> None:
 
 
 def length(left: Axes, right: Axes) -> None:
-    """Draw both interpretations of the tolerance of a distance to a face."""
+    """Draw both interpretations of a toleranced distance to a face."""
     face(left, shift_along(25e-6, np.eye(3)[2]), 50e-6)
     left.set_title("middle of the face", fontsize=8)
     face(right, plane_position(50e-6, *SIZES), 50e-6)

@@ -61,7 +61,7 @@ NAMES = [
     name for name in (*LIBRARY, *OUTSIDE)
     if acts_on_machine(name)
     and name not in {"joint_clearance", "geometric_stiffening", "body_mass"}
-    and name not in {"delayed_expansion", "_tilting"}  # they do not depend on commands
+    and name not in {"delayed_expansion", "_tilting"}  # independent of commands
 ]  # fmt: skip
 
 

@@ -4,9 +4,10 @@ Run ``python benchmarks/evidence/crosscheck_validity.py``, which takes five minu
 prints the tables of ``docs/validity.md``, and writes the figures and ``validity.json``
 to ``docs/`` or to a given folder.
 
-There are 4 sets of random geometric errors at each of 5 poses.  The largest error is
-given in rad for rotations, and a hundredth of this number in m for translations.
-Joints have no clearance, except for the comparison of disc and cone.
+There are 4 sets of random geometric errors at each of 5 poses. The magnitude of a set
+of errors is the largest rotation error in rad. The largest translation error in m is a
+hundredth of this number. Joints have no clearance, except for the comparison of disc
+and cone.
 """
 
 import itertools
@@ -61,7 +62,7 @@ POSES = {
 
 
 def erring(name: str, seed: int) -> Robot:
-    """Return a robot with the errors of the paper, which have random signs if odd."""
+    """Return a robot with random errors; signs are random only for odd seeds."""
     if name == "irsbot2":
         return papers_robot(seed, signed=seed % 2 == 1)
     return drawn(hexapod(play=True), seed, PAPER, PAPER / 100)

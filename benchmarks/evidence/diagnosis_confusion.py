@@ -59,7 +59,7 @@ STRENGTHS = (2.0, 5.0, 9.0)
 TRIES = 12  # maximum number of attempts per case
 FINE = 2e-7  # [m] lower limit of the noise
 VISIBLE = 200.0  # [-] minimum chi-square that effects of the library do not explain
-SMALL = 1e-2  # [-] factor of errors and load for which the robot is linear
+SMALL = 1e-2  # [-] factor by which errors and load are reduced for a linear response
 
 
 def finite_part(campaign: Synthetic) -> NDArray:
@@ -97,7 +97,7 @@ def _measure(kind: str, rng: np.random.Generator) -> Synthetic:
     kinds |= dict.fromkeys(("joint_clearance", "_torque_backlash"), "arm")
     drawn = draw_robot(rng, next((kinds[n] for n in names if n in kinds), None))
     robot, load = drawn.robot, drawn.load
-    # fewer rows are simulated for robots with many legs, which are slow
+    # fewer measurements are simulated for robots with many legs, which are slow
     many = len(robot.frames) > 20
     design = CampaignDesign(
         configurations=12 if many else 24,
@@ -149,7 +149,7 @@ def _one_beam(name: str, robot: Any, rng: np.random.Generator) -> Parameters:
 def truth_with_rivals(kind: str, campaign: Synthetic) -> dict[str, Any]:
     """Return the hidden effects, and other sets that explain the data equally well."""
     names = sorted(effect.name for effect in campaign.effects)
-    # two effects of the library may explain an effect outside it
+    # two effects of the library may explain an effect outside the library
     most = 2 if len(names) == 2 or kind == "outside" else 1
     rivals = alternatives(campaign, most) if names else []
     same = {
@@ -157,7 +157,7 @@ def truth_with_rivals(kind: str, campaign: Synthetic) -> dict[str, Any]:
         for one in rivals
         if one.residual < SAME and tuple(sorted(_plain(one))) != tuple(names)
     }
-    # without effects, the data are explained if the hidden effects are very small
+    # a model without effects explains the data if the hidden effects are very small
     unseen = float(np.nansum((campaign.added / campaign.sigma) ** 2)) < SAME
     accept = [list(one) for one in sorted(same)] + ([[]] if unseen else [])
     if kind == "none":  # near a singularity, declared errors may cause finite motions
@@ -187,7 +187,7 @@ def truth_with_rivals(kind: str, campaign: Synthetic) -> dict[str, Any]:
 
 
 def _plain(one: Alternative) -> list[str]:
-    """Return the names of effects, with drifts of all time constants as one effect."""
+    """Return the names of effects; drifts with any time constant have the same name."""
     return [name.partition("(")[0] for name in one.names]
 
 
@@ -230,7 +230,7 @@ def answer(folder: Path, seed: int) -> None:
 
 
 def _saved(found: Diagnosis, campaign: Campaign) -> dict[str, Any]:
-    """Return the error of the saved robot file, relative to two other errors."""
+    """Compare the error of the saved robot file with errors before saving."""
     if not found.better:
         return {}
     with tempfile.TemporaryDirectory() as folder:

@@ -14,7 +14,7 @@ import numpy as np
 
 from forcefit.validation.synthetic.outside import OUTSIDE_COVARIATES
 
-WITHIN_90 = 1.645  # [-] standard deviations of a 90 % interval
+WITHIN_90 = 1.645  # [-] half width of a 90 % interval in standard deviations
 VERDICTS = (
     "explained", "learned", "none_needed", "ambiguous", "outside_library",
     "not_enough_rows",
@@ -94,7 +94,7 @@ def score(folder: Path) -> dict[str, Any]:
 
 
 def _judge(truth: dict, diagnosis: dict) -> str:
-    """Return the class of a result, for example right or false claim."""
+    """Return the class of a result, such as ``"right"`` or ``"abstained"``."""
     verdict = diagnosis["verdict"]
     if verdict == "crashed":
         return "crashed"
@@ -153,7 +153,7 @@ def _told(diagnosis: dict) -> str:
 
 
 def _band(strength: float) -> str:
-    """Return the class of the size of the smallest hidden effect, in sigma."""
+    """Return the size class of the smallest hidden effect, relative to the noise."""
     return (
         "none"
         if not strength

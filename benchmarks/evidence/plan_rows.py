@@ -95,14 +95,14 @@ def is_right(campaign: Campaign, name: str, values: dict[str, float],
 
 
 def needed(right: list[bool]) -> int:
-    """Return the smallest number of rows beyond which all diagnoses are correct."""
+    """Return the number of measurements beyond which all diagnoses are correct."""
     wrong = [k for k, good in enumerate(right) if not good]
     first = wrong[-1] + 1 if wrong else 0
     return ROWS[first] if first < len(ROWS) else 2 * ROWS[-1]
 
 
 def run_case(seed: int) -> dict[str, Any]:
-    """Return the required numbers of planned and random rows."""
+    """Return the required numbers of planned and of random measurements."""
     begin = time.process_time()
     rng = np.random.default_rng([seed, 14])
     robot: Robot = without_clearance(load_robot(str(rng.choice(ROBOTS))))
@@ -124,7 +124,7 @@ def run_case(seed: int) -> dict[str, Any]:
 
 
 def summary(answers: list[dict[str, Any]]) -> str:
-    """Return the medians, and the fraction of correct diagnoses by number of rows."""
+    """Return medians, and fractions of correct diagnoses for each campaign size."""
     rows = {h: np.array([a[h] for a in answers]) for h in ("planned", "random")}
     lines = [
         f"{how}: median {np.median(count):g} rows, mean {count.mean():.1f}"

@@ -61,7 +61,8 @@ class Bricks:
         modes: (8, 3, 3) [1/m] gradients of the incompatible modes, one along each axis.
         weight: [m^3] weight of a Gauss point.
         places: (nodes, 3) [m] positions of the nodes.
-        share: (nodes,) share of each node in a force spread over the last face.
+        share: (nodes,) fraction of a uniform force on the last face that acts on each
+            node.
     """
 
     counts: tuple[int, int, int]
@@ -220,7 +221,7 @@ def refined(box: Bricks, u: NDArray, finer: Bricks) -> NDArray:
 
 
 def bent_rows(angle: float) -> dict[float, NDArray]:
-    """Return the displacements (height, width) of the end face by force, (2,) [m]."""
+    """Return the end face displacements along height and width by force, (2,) [m]."""
     coarse, middle, fine = (bricks(counts) for counts in (*_COARSE, COUNTS))
     u, before, rows = np.zeros((len(coarse.places), 3)), 0.0, {}
     axis = np.array([0.0, np.cos(angle), np.sin(angle)])

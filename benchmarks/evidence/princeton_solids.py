@@ -91,7 +91,7 @@ class Box:
         gradients: (q, m, 3) [1/m] gradients of shape functions at Gauss points.
         weights: (q,) [m^3] weights of Gauss points.
         clamped: nodes of the first face.
-        pulled: (nodes,) share of each node in the force on the last face.
+        pulled: (nodes,) fraction of the force on the last face that acts on each node.
     """
 
     elements: NDArray
@@ -195,7 +195,7 @@ def bent(solid: Box, force: NDArray, u: NDArray, start: NDArray) -> NDArray:
 def solid_rows(
     counts: tuple[int, int, int], orders: tuple[int, int, int], angle: float
 ) -> dict[float, NDArray]:
-    """Return the displacements (height, width) of the end face by force, (2,) [m]."""
+    """Return the end face displacements along height and width by force, (2,) [m]."""
     solid = box(counts, orders)
     u, start, rows = np.zeros((len(solid.pulled), 3)), np.zeros(3), {}
     for size in PUBLISHED:

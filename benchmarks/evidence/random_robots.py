@@ -27,7 +27,7 @@ from forcefit.validation.synthetic.springs import rest_on_springs
 
 KINDS = ("arm",) * 5 + ("3rrr",) * 2 + ("five_bar",) * 2 + ("hexapod", "delta")
 _MOST = 1.5e-3  # [rad, m] largest deviation at all poses
-_ALLOWED = np.array([6e-4, 3e-4])  # [rad, m] largest deviations by errors and by load
+_ALLOWED = np.array([6e-4, 3e-4])  # [rad, m] largest deviations due to errors and loads
 
 
 @dataclass(frozen=True, eq=False)

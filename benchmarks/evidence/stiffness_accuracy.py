@@ -6,9 +6,9 @@ Each link of ``meshes/`` is refined up to 430 000 unknowns or seven meshes, whic
 about two minutes.  The program prints the errors of the K of each mesh, and the ratio
 of true to estimated error [%] for each significant entry of the last K.
 
-For rigid interfaces, the true K is that of NGSolve in ``stiffness_references.json``, if
-it is sufficiently accurate.  For other interfaces, it is extrapolated from the finest
-mesh.
+For rigid interfaces, the true K is the result of NGSolve in
+``stiffness_references.json``, if this result is sufficiently accurate. For other
+interfaces, it is extrapolated from the finest mesh.
 """
 
 import argparse

@@ -3,11 +3,11 @@
 ``python benchmarks/evidence/stiffness_fresh_references.py FOLDER [--parts 0:40]``
 requires NGSolve (``pip install ngsolve``).
 
-Each part is written to FOLDER as a STEP file in millimetres.  K is computed on a half
-or a quarter of the part because of its symmetry.  The mesh consists of curved
-tetrahedra, with layers of prisms along the edges of interfaces and material layers.
-The result is extrapolated from two polynomial orders.  Its uncertainty is the change by
-the extrapolation, or the difference from a coarser mesh if that is larger.
+Each part is written to FOLDER as a STEP file in millimetres. K is computed on a half or
+a quarter of the part because of its symmetry. The mesh consists of curved tetrahedra,
+with layers of prisms along the edges of interfaces and material layers. The result is
+extrapolated from two polynomial orders. Its uncertainty is the change due to the
+extrapolation, or the difference from a coarser mesh if that is larger.
 
 Walls with sharp edges and round tubes use the references of
 ``stiffness_random_references.py``.  Results that the JSON file already contains are not
@@ -30,7 +30,7 @@ from stiffness_references import scaled
 
 REFERENCES = Path(__file__).with_name("stiffness_fresh_parts.json")
 FAR = 1e3  # [mm] length that exceeds all dimensions
-MORE = 0.3  # [-] fraction of the difference of both orders that is extrapolated
+MORE = 0.3  # [-] fraction of the difference between two orders that is added to K
 
 
 def cut_shape(part):

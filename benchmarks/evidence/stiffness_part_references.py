@@ -43,7 +43,8 @@ def mode_stiffness(mesh, order, even, motions, held="", lame=(LAM, MU)):
     (lam, mu), fixed = lame, {c: ["tip", held] if held else ["tip"] for c in "xyz"}
     for cut, same in zip("xyz", even, strict=True):
         for c in "xyz":
-            # motions normal to a cut are zero if even, and motions along it if odd
+            # On a symmetry plane, even fields have no normal displacement, and odd
+            # fields have no tangential displacement.
             if (c == cut) == same:
                 fixed[c].append(PLANES[cut])
     x, y, z = ("|".join(fixed[c]) for c in "xyz")

@@ -282,7 +282,7 @@ def kept(path: Path, key: str, make) -> dict:
 
 
 def reference(part: Part) -> dict:
-    """Return K by another solver, and its uncertainty."""
+    """Return the K that a second solver computes, and its uncertainty."""
     from stiffness_random_references import independent_stiffness
 
     return independent_stiffness(part, YOUNG)

@@ -100,7 +100,7 @@ def graded(places, thin, wide, cut, least):
     """Return positions whose spacing decreases towards each plane, and their counts."""
     found, counts = [places[0]], []
     for k, (a, b) in enumerate(zip(places, places[1:], strict=False)):
-        whole = cut and k == 0  # the fields are smooth at the cut
+        whole = cut and k == 0  # the fields are smooth at a symmetry plane
         size = (b - a) / (1 if whole else 2)
         # edge effects decay as exp(-pi s / thin) and require several elements
         layers = max(least, round(np.log(size / (SHRINK * thin)) / np.log(4)))
@@ -199,7 +199,8 @@ def free_unknowns(mesh, order, mirrors, kind):
     held = {c: ["base", "tip"] for c in "xyz"}
     for cut, even in zip(mirrors, kind, strict=True):
         for c in "xyz":
-            # motions normal to a cut are zero if even, and motions along it if odd
+            # On a symmetry plane, even fields have no normal displacement, and odd
+            # fields have no tangential displacement.
             if (c == cut) == bool(even):
                 held[c].append(f"{cut}0")
     names = {f"dirichlet{c}": "|".join(held[c]) for c in "xyz"}

@@ -63,7 +63,7 @@ ERRORS = np.repeat([1e-3, 1e-4], 3)  # [rad, m] largest errors of the built-in r
 # [rad or m] largest motion of drives, and smallest motion to another pose
 _FAR, _MOVED = 0.1, 1e-3
 _SIZE = np.repeat([1.0, 20.0], 3)  # [N m, N] standard deviation of loads
-_STEPS = 0.5 * 0.2 ** np.arange(8)  # [-] steps of the load, relative to the load
+_STEPS = 0.5 * 0.2 ** np.arange(8)  # [-] load steps, relative to the load
 _MOVES = 0.03  # [rad or reference lengths] motion of the platform under load
 _STIFF = 1e8  # [N m/rad, N/m] stiffness of locked rotations
 

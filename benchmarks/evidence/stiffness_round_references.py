@@ -58,7 +58,7 @@ def half_section(corners, lines, size, layers=8):
 
 
 def energy(u, v, m, lame=(LAM, MU)):
-    """Return the work of the stresses of one field on the strains of another."""
+    """Return the work of the stresses of one field on the strains of a second field."""
     r, (lam, mu) = ng.x, lame
     (U, V, W, dU, dV, dW), (S, T, X, dS, dT, dX) = u, v
     e, f = (

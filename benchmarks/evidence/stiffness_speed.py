@@ -75,7 +75,7 @@ def given(name):
 
 
 def ours(name, accuracy):
-    """Measure forcefit from the surface to K, and separately on the last mesh."""
+    """Measure the time of forcefit from the surface to K, and on the last mesh."""
     from forcefit.stiffness.fem.condensation import condense
     from forcefit.stiffness.fem.fea import Budget, FemOptions, solve_link
     from forcefit.stiffness.fem.material import Material
@@ -99,7 +99,7 @@ def used():
 
 
 def ngsolve(name, order, layers, finer):
-    """Measure NGSolve from the exact geometry to K."""
+    """Measure the time of NGSolve from the exact geometry to K."""
     sys.path.insert(0, str(HERE))
     import stiffness_references as references
 
@@ -131,7 +131,7 @@ def quadratic(name, accuracy):
 
 
 def ccx(name, accuracy):
-    """Measure one load case of CalculiX on a mesh of forcefit, without meshing."""
+    """Measure the time of one load case of CalculiX on a mesh of forcefit."""
     with tempfile.TemporaryDirectory() as folder:
         mesh, solved = quadratic(name, float(accuracy))
         points = mesh.nodes[mesh.cells[:, :4]]

@@ -134,7 +134,7 @@ def surface_of(part: Part) -> Surface:
 
 
 def main() -> None:
-    """Print the errors of each part, and the number of covered parts."""
+    """Print the errors of each part, and count parts with a sufficient estimate."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--accuracy", type=float, default=0.02)
     parser.add_argument("--parts", default="0:20")

@@ -42,7 +42,7 @@ FITS = {
 def shoulder_factor(load: str, wide: float, radius: float) -> float:
     """Return the stress concentration factor of a shoulder fillet.
 
-    The formulas are those of Tipton, Sorem & Rolovic (1996).
+    The formulas are from Tipton, Sorem & Rolovic (1996).
 
     Args:
         load: tension or bending.
@@ -140,7 +140,7 @@ def largest_principal(stresses: NDArray) -> float:
 
 
 def main() -> None:
-    """Print the errors of each part, and the number of covered parts."""
+    """Print the errors of each part, and count parts with a sufficient estimate."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--accuracy", type=float, default=0.02)
     parser.add_argument("--parts", default="0:10")

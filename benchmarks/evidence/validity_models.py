@@ -1,4 +1,4 @@
-"""Models with one assumption less or more, for ``docs/validity.md``."""
+"""Models with an assumption added or removed, for ``docs/validity.md``."""
 
 from collections.abc import Mapping
 from dataclasses import replace

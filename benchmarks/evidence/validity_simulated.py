@@ -32,7 +32,7 @@ def closures(at: Posture) -> tuple[float, ...]:
 
 
 def weights(at: Posture) -> tuple[float, ...]:
-    """Return the errors [um] and [%] of weights at the ends of beams."""
+    """Return the errors [um] and [%] of a model with weights at the ends of beams."""
     assembly = simulate_assembly(
         at, model=SimulationModel(elements=ELEMENTS), gravity=GRAVITY
     )
