@@ -136,10 +136,10 @@ def discretisation_errors(
 ) -> NDArray:
     """Estimate the errors of frequencies due to the cubic shape of vibrating beams.
 
-    The frequencies are computed again with twice the number of pieces of every beam
-    with a density.  The error due to bending is of fourth order in the length of the
-    pieces, and the error due to longitudinal and torsional waves of second order.  The
-    second-order error follows from the mode, and the rest is 16/15 of the difference.
+    The frequencies are computed again with twice the number of elements of every beam
+    with a density.  The error due to bending is of fourth order in the element length,
+    so it is 16/15 of the difference.  The error due to longitudinal and torsional waves
+    is of second order and is computed from the mode.
 
     Args:
         modes: modes of the robot.
@@ -148,10 +148,9 @@ def discretisation_errors(
         state: state of :func:`natural_modes`.
 
     Returns:
-        (k,) relative errors; 0 without such beams.  NaN for frequencies that are 0 or
-        NaN, or that are with twice the number of pieces, where a mode is unstable.  All
-        are NaN if a mesh link has a density, because its condensed mass has an unknown
-        error.
+        Relative errors (k,); 0 without such beams.  An error is NaN if the frequency is
+        0 or NaN in one of the two computations.  All errors are NaN if a mesh link has
+        a density, because the error of its condensed mass is unknown.
 
     Raises:
         CannotAssemble: as in :func:`natural_modes`.
