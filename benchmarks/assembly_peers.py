@@ -45,9 +45,8 @@ def loaded_matrices(posture: Posture) -> tuple[NDArray, ...]:
     lin, joints = linearise(posture), virtual_joints(posture.robot)
     loads = all_loads(posture, LOAD, None, GRAVITY)
     small = np.abs(lin.rows @ joints.cones).max()
-    soft = (
-        np.abs(lin.rows @ joints.elastic).max() / small
-    )  # scaling factor of the springs
+    # scaling factor of the springs
+    soft = np.abs(lin.rows @ joints.elastic).max() / small
     on_springs = np.where(
         joints.links, loads.body @ joints.elastic, loads.joint @ joints.elastic
     )

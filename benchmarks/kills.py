@@ -224,10 +224,8 @@ def trial(case: Case, random: Random, counts: Counter, small: bool) -> None:
         if way == "full" and not small:
             largest = max(map(len, case.files.values()))
             limit = int(np.exp(random.uniform(0, np.log(1.2 * largest))))
-        before = {
-            *Path().glob("*.part"),
-            *Path().glob("*.lock"),
-        }  # temporary files of a killed process
+        # temporary files of a killed process
+        before = {*Path().glob("*.part"), *Path().glob("*.lock")}
         child = start(case.words, limit)
         if way == "full":
             status = finish(child)

@@ -12,7 +12,7 @@ def found(text, *names):
     return list(CHECK["find_words"](text, WORDS, names))
 
 
-def test_private_words_are_found_with_line_and_replacement():
+def test_listed_words_are_found_with_their_line_and_replacement():
     text = "one\n# Gizmo of a side\n    # row\n"
     assert found(text) == [
         (2, "gizmo", "candidate model"), (2, "side row", "held-out"),

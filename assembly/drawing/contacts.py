@@ -124,7 +124,8 @@ def guide(
         largest: maximum gaps of a fit [m]; ``gaps`` by default.
 
     Returns:
-        Contacts in two chains, which rotate about opposite edges of the block.
+        Contacts of two chains of frames.  The chains rotate about opposite edges of the
+        block.
     """
     edge = np.array([width / 2, height / 2, 0.0])
     # the bound on RZ is inactive, because the gaps limit RZ to half of this bound

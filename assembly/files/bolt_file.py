@@ -1,4 +1,4 @@
-"""Reading of ``locked_at``, the pose at which a fixed joint is bolted."""
+"""Read ``locked_at``: the posture at which a fixed joint is bolted."""
 
 from collections.abc import Mapping
 from typing import Any

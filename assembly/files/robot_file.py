@@ -430,7 +430,7 @@ def _check_meeting_frames(robot: Robot) -> None:
                 fault = has[0] if has else f"a {frame.joint} joint"
                 raise BadInput(
                     f"{place}: found {fault} at frame {quoted(name)}; expected a fixed "
-                    "joint without clearance or joint_stiffness (add a frame after it)"
+                    "joint without clearance or joint_stiffness; add such a frame"
                 )
 
 

@@ -17,11 +17,10 @@ from forcefit.assembly.kinematics.posture import Posture, home_posture, pose_com
 from forcefit.assembly.kinematics.singular_posture import rank_near
 from forcefit.assembly.model.robot import Robot
 
-_ALIKE = 0.3  # smallest accepted overlap of the bases of two successive points
-_STEPS = (
-    4,
-    32,
-)  # numbers of steps per path; the second is used if the overlap is too small
+# [-] smallest accepted cosine between the subspaces of two successive points
+_ALIKE = 0.3
+# numbers of steps per path; the second is used if the cosine is too small
+_STEPS = (4, 32)
 
 
 def beyond_singularity(robot: Robot, target: Target, T: NDArray) -> NDArray:

@@ -37,7 +37,7 @@ from forcefit.assembly.model.robot import Robot
 # [-] tolerance for zero singular values, relative to the largest, as in
 # forcefit.assembly.kinematics.closure_rates
 _SINGULAR = 1e-6
-# [-] tolerance for zero singular values, divided by the nominal loop-closure error
+# [-] singular values below this multiple of the nominal closure error count as zero
 _NOISE = 30.0
 _PRESCRIBED = 1e-4  # [-] largest relative error of a prescribed velocity
 

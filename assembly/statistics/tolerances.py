@@ -47,7 +47,7 @@ def grid_postures(robot: Robot, grid: str) -> tuple[list[Posture], dict[str, int
     if not reached:
         raise BadInput(
             "grid: found no posture that the robot reaches, expected at least "
-            f"one; the reason for the first: {reasons[0]}"
+            f"one; the first posture: {reasons[0]}"
         )
     said = verdicts(
         robot, Target(pose=goals[[p is not None for p in postures]]),

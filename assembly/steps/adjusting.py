@@ -162,8 +162,8 @@ def _check_not_bolted(machine: Machine, state: State, step: Adjust) -> None:
     if machine.posture.robot.index(step.frame) in state.bolted.values():
         raise BadInput(
             f"step {quoted(step.name)}: found an adjustment of {quoted(step.frame)}, "
-            "whose joint is bolted, although other joints with clearance are not "
-            "bolted; expected another frame to adjust"
+            "whose joint is bolted; this is possible only if all joints with clearance "
+            "are bolted; adjust another frame"
         )
 
 

@@ -92,8 +92,8 @@ def ask_sweep(robot: Robot | str | Path, options: SweepOptions) -> Sweep:
     if isinstance(robot, Robot):
         if options.vary:
             raise BadInput(
-                "--vary: found a robot in memory; expected a robot file or the name "
-                "of a built-in robot"
+                "--vary: found a robot made in Python; expected a robot file or the "
+                "name of a built-in robot"
             )
         machine = robot if close is None else close(robot)
     else:

@@ -54,7 +54,7 @@ ROBOTS = ("arm6", "hexapod", "delta")
 STRENGTH = 5.0
 TARGETS = 12
 TRIES = 20
-NEAR = 1.2  # [-] threshold of a small error after compensation, relative to the noise
+NEAR = 1.2  # [-] largest error, relative to the noise, that counts as compensated
 # self-weight, stiffening and clearance are excluded, because their size cannot be
 # chosen
 NAMES = [

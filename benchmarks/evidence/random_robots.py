@@ -131,10 +131,8 @@ def _gantry(rng: np.random.Generator) -> tuple[Robot, float]:
             if joint == "revolute"
             else np.diag([np.inf] * 5 + [3e6])
         )
-        along = {
-            "length": 0.3,
-            "axis": (1.0, 0.0, 0.0),
-        }  # length and axis of a slide's body
+        # length and axis of a slide's body
+        along = {"length": 0.3, "axis": (1.0, 0.0, 0.0)}
         frames.append(
             Frame(
                 f"{'wxyz'[(k + 1) % 4]}", parent, place.round(4), turn, joint=joint,

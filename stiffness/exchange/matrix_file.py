@@ -131,7 +131,7 @@ def _mapped(path: Path, n: int) -> list[Freedom]:
     if len(freedoms) != n or each > 6:
         raise BadInput(
             f"{path}: found {len(given)} rows or nodes, but the matrix has {n} rows; "
-            "expected a mapping of all rows"
+            "expected a node and direction for each row of the matrix"
         )
     return freedoms
 

@@ -144,9 +144,9 @@ def compare_link(
     if gap > 1e-6 + 1e-3 * length:
         ends = [", ".join(f"{v:.6g}" for v in link.tip) for link in (beam, fea)]
         raise BadInput(
-            f"compare: the tip of the beam is at ({ends[0]}) m, but the tip of the "
-            f"surface is at ({ends[1]}) m; expected the same point; change the beam, "
-            "or --base and --tip"
+            f"compare: the tip of the beam is at ({ends[0]}) m, but the tip "
+            f"interface of the surface is at ({ends[1]}) m; expected the same "
+            "point; change the beam, or --base and --tip"
         )
     difference = scaled(fea.stiffness - beam.stiffness, beam.stiffness)
     return LinkComparison(beam, fea, difference, length, size)

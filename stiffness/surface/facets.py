@@ -86,7 +86,7 @@ class Facets:
 
 
 def _rises(corners: NDArray, normals: NDArray, limited: bool) -> NDArray:
-    """Return four times the lifts of edge midpoints as vectors, (e, 3) [m]."""
+    """Return four times the distances of edge midpoints to the surface, (e, 3) [m]."""
     # The smaller of the lifts computed from the normals at the two ends is used. If
     # their signs differ, as between a flat side and a fillet, the lift is zero.
     along = corners[:, 0] - corners[:, 1]

@@ -314,9 +314,8 @@ def test_extension_cannot_replace_forcefit_effects(example, packages, tmp_path):
         written(tmp_path, ARM.replace("drive_gain", "encoder_offset"))
     )
     screw = ff.sweep(robot, grid="q.joint1=0.5").squeeze()["platform_screw"]
-    assert float(screw.sel(screw="RZ")) == pytest.approx(
-        1e-3
-    )  # offset, not gain times 0.5 rad
+    # the offset, not the gain times 0.5 rad
+    assert float(screw.sel(screw="RZ")) == pytest.approx(1e-3)
 
 
 def test_installed_reader_is_used_by_commands_and_functions(example, run, tmp_path):

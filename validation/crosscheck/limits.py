@@ -26,10 +26,8 @@ from forcefit.validation.crosscheck.verdict import Check
 
 # [-] Tolerance of every relative difference, extrapolated to scale 0.
 LIMIT_TOLERANCE = 1e-3
-FLOOR = {
-    "rotation": 1e-10,
-    "translation": 1e-11,
-}  # resolution of a simulation [rad], [m]
+# resolution of a simulation [rad], [m]
+FLOOR = {"rotation": 1e-10, "translation": 1e-11}
 # Changes are regarded as noise if they are smaller than this multiple of the effect of
 # weak springs.
 _NOISE = 3.0

@@ -31,7 +31,7 @@ _MOST_TURNS = 200.0
 _FINER = 1.2  # first factor by which a shape parameter is changed to refine it
 # Loads below this fraction of the largest load are treated as zero.
 _NO_LOAD = 1e-3
-_HIGH = 12  # highest harmonic that is tested without lower harmonics
+_HIGH = 12  # highest order of a harmonic that is tested as the only harmonic
 _CLOCKS = "time", "cov.time"
 # Number of tested times of a jump in the first search and in the refined search.
 _JUMPS, _MANY_JUMPS = 10, 91

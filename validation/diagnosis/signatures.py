@@ -135,7 +135,7 @@ class Tangents:
         self.declared = whiten(campaign, derivatives.declared)
 
     def model(self, effects: Mapping[str, Values], *, finite: bool = False) -> NDArray:
-        """Return the whitened readings (N,) of a machine with given effects.
+        """Return the whitened readings (N,) that the model predicts with given effects.
 
         The arguments are the same as for :meth:`.Derivatives.model`.
         """

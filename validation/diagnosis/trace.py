@@ -1,4 +1,4 @@
-"""Search for effects and functions, and fit the machine parameters.
+"""Search for effects that the model lacks, and fit the parameters of the machine.
 
 Steps:
 

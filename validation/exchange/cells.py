@@ -13,9 +13,8 @@ from forcefit.inputs.table import read_bytes
 
 _MARKS = (";", "\t", ",")  # possible separators between cells
 _BLANK = " "
-_QUOTED = re.compile(
-    r"[-+]?\d*,\d+(?:[eE][-+]?\d+)?"
-)  # matches a number with a decimal comma
+# matches a number with a decimal comma
+_QUOTED = re.compile(r"[-+]?\d*,\d+(?:[eE][-+]?\d+)?")
 # Largest accepted number of characters in a cell. The time for the search for units is
 # proportional to its square.
 _LONGEST = 1000

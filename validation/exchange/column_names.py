@@ -20,9 +20,8 @@ _NAMED_ANGLES = {
     "roll": "x", "pitch": "y", "yaw": "z", "omega": "x", "phi": "y", "kappa": "z",
     "c": "x", "b": "y", "a": "z",  # names of the angles on KUKA robots
 }  # fmt: skip
-_UNIT = re.compile(
-    r"\[\s*([^\]]*?)\s*\]|\(\s*([^)\d][^)]*?)\s*\)"
-)  # a unit in brackets; does not match the 95 in U(95)
+# a unit in brackets; does not match the 95 in U(95)
+_UNIT = re.compile(r"\[\s*([^\]]*?)\s*\]|\(\s*([^)\d][^)]*?)\s*\)")
 _UNIT_AFTER = re.compile(r"\s*[_ /]\s*(mm|um|cm|in|m|deg|mrad|rad)$", re.IGNORECASE)
 LENGTH_UNITS = ("mm", "m", "um", "cm", "in")
 _WORDS = {"meter": "m", "millimeter": "mm", "centimeter": "cm", "micrometer": "um",

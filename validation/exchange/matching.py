@@ -93,8 +93,8 @@ def match(
             before.append(reading)
     if not table and missing:
         raise BadInput(
-            f"{missing[0].place}: found no coordinates, and none in any other reading; "
-            "expected numbers"
+            f"{missing[0].place}: found no coordinates; all other readings of the "
+            "file have none either; expected numbers"
         )
     if not table:
         raise BadInput(

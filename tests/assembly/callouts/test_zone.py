@@ -281,7 +281,7 @@ def test_support_function_of_a_bore_is_sum_over_both_ends():
         assert POSITION.support(w) == pytest.approx(expected, rel=1e-12)
 
 
-def test_point_zone_is_a_ball():
+def test_tolerance_zone_of_a_point_is_a_ball():
     zone = point_position(40e-6)
     w = np.array([1, 2, 3, 0.3, -0.4, 1.2])
     assert zone.support(w) == pytest.approx(20e-6 * 1.3)

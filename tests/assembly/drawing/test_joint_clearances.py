@@ -287,7 +287,7 @@ STIFFNESS = [2e3, 3e3, 1e3, 2e6, 1e6, 4e6]
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_energy_of_a_bore_agrees_with_cvxpy(seed, held_shaft):
+def test_energy_of_a_pin_in_a_bore_agrees_with_cvxpy(seed, held_shaft):
     """The energy is the minimum of v K v / 2 with v + clearance + error = 0."""
     import cvxpy as cp
 

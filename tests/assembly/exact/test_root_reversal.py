@@ -106,7 +106,7 @@ def test_solution_does_not_depend_on_choice_of_base(seed):
     expected = -screw_map(R.T @ p, R.T) @ one.platform_screw
     size = np.abs(expected).reshape(2, 3).max(axis=1).repeat(3)
     assert np.all(np.abs(other.platform_screw - expected) < 1e-5 * size)
-    # the wrench of each body acts at its other end, with the opposite sign
+    # in the reversed leg, the wrench acts at the opposite end of each body
     for name in "ab":
         for k, this in enumerate(legs["ab".index(name)]):
             here = one.wrenches[one.posture.robot.index(f"{name}{k}")]

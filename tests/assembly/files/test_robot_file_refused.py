@@ -188,11 +188,11 @@ REFUSED = {
     "a closure at a joint": (
         '["coupler", "seat"]', '["coupler", "wrist"]',
         'closure[1].frames: found a revolute joint at frame "wrist"; expected a fixed '
-        "joint without clearance or joint_stiffness (add a frame after it)"),
+        "joint without clearance or joint_stiffness; add such a frame"),
     "a platform with a stiffness": (
         "mass = 1.2", "joint_stiffness = [1, 1, 1, 1, 1, 1]",
         'platform: found joint_stiffness at frame "coupler"; expected a fixed joint '
-        "without clearance or joint_stiffness (add a frame after it)"),
+        "without clearance or joint_stiffness; add such a frame"),
     "a closure that does not hold": (
         "translation = [0.5, 0.0, 0.0]\njoint", "translation = [1.5, 0.0, 0.0]\njoint",
         'four_bar: closure[1] ("coupler", "seat") is open in the home pose: found a '

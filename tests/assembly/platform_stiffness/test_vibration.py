@@ -102,7 +102,7 @@ def test_discretisation_error_of_waves_equals_that_of_linear_elements(pieces):
         np.testing.assert_allclose(estimates[first], error, rtol=0.01)
 
 
-def test_discretisation_errors_compare_equal_modes_near_buckling():
+def test_frequency_errors_near_buckling_belong_to_the_same_modes():
     """One spring in place of a column buckles at 3 EI/2L^2, below pi^2 EI/4L^2."""
     posture = cantilever(1)
     load = {"fx": -2.0 * E * SIDE**4 / 12 / LENGTH**2}

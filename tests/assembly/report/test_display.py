@@ -67,7 +67,7 @@ def test_assembly_summary_equals_the_lines_of_the_command(answer):
     assert answer.summary() == repr(answer)
 
 
-def test_text_of_many_points_contains_number_and_maximum():
+def test_text_of_many_points_contains_their_number_and_the_maximum():
     """The margins of the points are 1, 2 and 4."""
     play = Clearance(axial=1e-5, radial=1e-5)
     at = home_posture(coaxial_beams(np.zeros(6), clearance=play))

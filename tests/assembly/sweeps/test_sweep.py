@@ -119,7 +119,7 @@ def test_sweep_of_a_robot_object_equals_that_of_its_name():
     assert command == f"forcefit assembly sweep five_bar --grid {FIVE_BAR_GRID}"
     robot = ff.load_robot("five_bar")
     xarray.testing.assert_identical(ff.sweep(robot, grid=FIVE_BAR_GRID), named)
-    with pytest.raises(ff.BadInput, match="--vary: found a robot in memory"):
+    with pytest.raises(ff.BadInput, match="--vary: found a robot made in Python"):
         ff.sweep(robot, grid=FIVE_BAR_GRID, vary=["a.b=1,2"])
 
 

@@ -121,7 +121,7 @@ def test_first_mesh_that_exceeds_the_budget_is_rejected(budget):
         solve_bar({"radius": 0.1}, Material(E, NU), FemOptions(budget=budget))
 
 
-def test_interface_text_that_cannot_be_parsed_is_reported():
+def test_invalid_description_of_an_interface_is_rejected():
     surface = Path(__file__).parents[3] / "meshes/tapered_arm.stl"
     with pytest.raises(BadInput, match="base: found 'q=0', expected"):
         mesh_link(surface, "q=0", "z=0.35", E=7e10, nu=0.33)

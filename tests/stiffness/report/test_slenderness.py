@@ -126,7 +126,7 @@ def test_comparison_with_a_different_tip_is_rejected():
     C = beam_compliance(0.4, round_section(0.02, 0.3), 6e10, 0.3)
     one = LinkStiffness("beam", C, tip=[0.4, 0, 0], base=[0, 0, 0])
     other = LinkStiffness("fea", C, tip=[0.41, 0, 0], base=[0, 0, 0])
-    with pytest.raises(BadInput, match="the tip of the surface is at"):
+    with pytest.raises(BadInput, match="the tip interface of the surface is at"):
         compare_link(one, other, 0.02)
 
 

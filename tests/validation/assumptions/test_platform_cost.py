@@ -69,10 +69,8 @@ def test_virtual_joints_agree_with_solids_with_rigid_ends(posture):
     assert costs.meshed[0] < 1e-9
     assert 1e-3 < costs.beams[0] < 0.1
     assert 1e-3 < costs.ends[0] < 0.3
-    assert list(costs.by_link) == [
-        "stout",
-        "slim",
-    ]  # the bar of larger diameter has the larger error
+    # the bar of larger diameter has the larger error
+    assert list(costs.by_link) == ["stout", "slim"]
     assert 1e-4 < costs.mesh_error < 2e-2
 
 

@@ -240,7 +240,7 @@ BAD_TABLES = {
 
 
 @pytest.mark.parametrize("case", BAD_TABLES)
-def test_invalid_table_is_rejected_in_one_line(case, tmp_path):
+def test_invalid_table_is_rejected_with_a_one_line_message(case, tmp_path):
     head, rows, message = BAD_TABLES[case]
     folder = write_campaign(tmp_path, head=head, rows=rows)
     with pytest.raises(BadInput, match=message) as caught:

@@ -27,9 +27,8 @@ from tests.bar_for_tests import (
 )
 from tests.planar_arm_for_tests import SIGMA
 
-SURE = norm.isf(
-    0.5e-3
-)  # quantile of the normal distribution for a two-sided p-value of 0.001
+# quantile of the normal distribution for a two-sided p-value of 0.001
+SURE = norm.isf(0.5e-3)
 
 
 def first(fit):

@@ -46,7 +46,7 @@ def test_failure_without_a_load_reports_undetermined_positions(stages):
             found = simulate_assembly(stage, model=CLEARANCES)
         except SimulationFailed as error:
             failures.append(str(error))
-        else:  # the stage fits within its clearances and stores no energy
+        else:  # clearances take up the errors of the guided stage without energy
             assert found.rigid_energy < 1e-6
     for message in failures:
         assert "no equilibrium" in message
