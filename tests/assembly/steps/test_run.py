@@ -277,16 +277,21 @@ def test_displacement_of_gough_platform_agrees_with_jacobian():
     assert last.energy == pytest.approx(0.0, abs=1e-15)
 
 
-@pytest.mark.parametrize(
-    ("components", "change", "left"),
-    [(("TZ",), -40.0e-6, 6.6e-6), (("TX", "TY", "TZ"), -34.1e-6, 5.4e-6)],
-)
-def test_one_adjustable_leg_corrects_one_pose_component(components, change, left):
-    reading = Measure("pose", "platform", components)
-    steps = (*JOIN_LEGS, Adjust("shim", "leg6", ("TZ",), reading))
-    last = assemble_in_steps(Plan(steps), gough(LENGTHS))[-1]
-    assert last.adjustment[0, 0] == pytest.approx(change, abs=0.05e-6)
-    assert np.linalg.norm(last.platform_screw[0, 3:]) == pytest.approx(left, abs=5e-8)
+@pytest.mark.parametrize(("rows", "change"), [([5], -40.0e-6), ([3, 4, 5], -34.1e-6)])
+def test_adjusted_leg_minimises_the_measured_pose_components(rows, change):
+    """A change c of leg 6 minimises |J (L + c e6)| over the measured components."""
+    J = inverse_jacobian()
+    along, error = J[rows, 5], (J @ LENGTHS)[rows]
+    expected = -(along @ error) / (along @ along)
+    assert expected == pytest.approx(change, abs=0.05e-6)
+    components = tuple(SCREW[row] for row in rows)
+    steps = Adjust("shim", "leg6", ("TZ",), Measure("pose", "platform", components))
+    last = assemble_in_steps(Plan((*JOIN_LEGS, steps)), gough(LENGTHS))[-1]
+    assert last.adjustment[0, 0] == pytest.approx(expected, rel=1e-6)
+    lengths = LENGTHS + expected * np.eye(6)[5]
+    np.testing.assert_allclose(
+        last.platform_screw[0], J @ lengths, rtol=1e-6, atol=1e-12
+    )
 
 
 def test_adjusted_seventh_leg_has_no_closing_force():
