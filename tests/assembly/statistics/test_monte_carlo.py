@@ -126,11 +126,11 @@ def test_statistics_and_tolerances_commands_write_results_and_figures(
         assert "pose errors: clearance worst: largest pose errors" in title
         assert "of the 200 of 200 draws that assemble" in title
         assert len(tornado_figure(data).axes) == 6
-        with pytest.raises(ValueError, match="need a data set of draws"):
+        with pytest.raises(ValueError, match="requires a data set of random draws"):
             histogram_figure(data.drop_vars("energy"))
     with xarray.open_dataset(tmp_path / "t.nc", engine="h5netcdf") as data:
         allocation_figure(data)
-        with pytest.raises(ValueError, match="need a data set of draws"):
+        with pytest.raises(ValueError, match="requires a data set of random draws"):
             histogram_figure(data)
 
 
