@@ -96,7 +96,9 @@ def test_calculix_stiffness_mass_and_dof_files_are_read(tmp_path):
     assert_same(link.stiffness, named.stiffness)
     assert link.mass == pytest.approx(0.324)
     (tmp_path / "bar.dof").write_text("\n".join(names[:-1]))
-    with pytest.raises(BadInput, match=r"bar\.dof: found \d+ freedoms, expected"):
+    with pytest.raises(
+        BadInput, match=r"bar\.dof: found \d+ degrees of freedom, expected"
+    ):
         import_link(tmp_path / "bar.sti", nodes=tmp_path / "nodes.csv", **ENDS)
 
 
