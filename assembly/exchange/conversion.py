@@ -77,7 +77,7 @@ class Conversion:
         if count:
             moved = "" if self.drives_held else "; the drive coordinates were changed"
             lines.append(
-                f"home pose: loop mismatch {self.open_before:.2g} rad or m in the "
+                f"home pose: loops are open by {self.open_before:.2g} rad or m in the "
                 f"pose of the file, {self.open_after:.1e} in the computed pose{moved}"
             )
         lines += [f"taken: {line}" for line in self.taken]
