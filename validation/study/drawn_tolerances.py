@@ -177,7 +177,7 @@ def bounds_over_grid(
         The maps with certified upper bounds on rotation and translation over all parts
         and clearances.  Bounds are NaN at points without a solution.
     """
-    axes = [str(axis) for axis in maps["status"].dims]
+    common, axes = sources_of(robot), [str(axis) for axis in maps["status"].dims]
     bounds = np.full((maps["status"].size, len(POSE_ERRORS)), np.nan)
     values = [maps[axis].values for axis in axes]
     points = np.stack(np.meshgrid(*values, indexing="ij"), -1).reshape(-1, len(axes))
@@ -188,7 +188,9 @@ def bounds_over_grid(
             declared = place_robot(robot, pose=pose)
             posture = with_effects_applied(declared)
             fixed = errors_of_effects(declared, posture)
-            sources = sources_of(posture.robot, fixed=fixed)
+            sources = (
+                common if fixed is None else sources_of(posture.robot, fixed=fixed)
+            )
             prepared = linear_response(posture)
             found = bound_worst_pose(prepared, sources, _MAP_TOLERANCE)[1]
             bounds[k] = [found[key] for key in POSE_ERRORS]
